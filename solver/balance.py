@@ -1,0 +1,191 @@
+"""The harmonic balance of a joint: residual, exact Jacobian, and wear that goes with the motion.
+
+The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eq. (10). It gives at each pair, by itself, the contact
+force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` (Eqs. (10)-(12), with `X` the corrected motion), so that
+
+    R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
+
+is the only coupled equation. For a given wear depth this is the residual in u of the paper after a linear change of
+variable, so a Newton iteration takes the same steps. With the implicit scheme `W = W_k + h g(p)`, Eq. (24) (the print of
+(26b) lacks h): the wear rate of a pair depends on its own p alone, W is eliminated there, and the Jacobian changes by a
+rank-one block a pair:
+
+    dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.joint import Joint
+from solver.kernels import march_period, march_tangent, wear_integral
+from solver.model import FloatArray, IntArray
+
+CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
+MOST_PASSES = 8
+
+
+@dataclass(frozen=True)
+class Balance:
+    """A periodic problem: a joint, the history of its pairs and the wear.
+
+    history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start of
+    the slow step. wear_gain (n_contact,): `h k_w / alpha`, 1/N; zero where W does not grow with the motion.
+    """
+
+    joint: Joint
+    history: FloatArray
+    wear_depth: FloatArray
+    wear_gain: FloatArray
+
+    def evaluate(self, predicted_h: FloatArray) -> Evaluation:
+        """Residual and everything that it passes through, for a predicted force (n_rel, 2H+1), N."""
+        joint = self.joint
+        pairs = joint.to_pairs(predicted_h)
+        pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
+        predicted_t = pairs @ joint.basis.synthesis
+        start = self.history * joint.penalty[:, 1:]
+        limit = joint.friction_coefficient * max(float(predicted_t[:, 0].max(initial=0.0)), 0.0)
+        force_t, state_t, status_t, passes, drift = march_period(
+            predicted_t, joint.friction_coefficient, start, CLOSURE * limit, MOST_PASSES
+        )
+        slip_work = wear_integral(force_t, state_t) / joint.penalty[:, 1]
+        wear_depth = self.wear_depth + self.wear_gain * slip_work
+        force_h = force_t @ joint.basis.analysis
+        eps = joint.penalty[:, [0, 1, 1]]
+        displacement_h = (pairs - force_h) / eps[:, :, None]
+        displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
+        motion, force = joint.to_relative(displacement_h), joint.to_relative(force_h)
+        reduced_force = joint.structure.force_h()
+        residual = joint.structure.apply(motion) + force - reduced_force
+        return Evaluation(
+            predicted_h=predicted_h,
+            residual=residual,
+            scale=_residual_scale(reduced_force, force),
+            predicted_t=predicted_t,
+            start=start,
+            force_t=force_t,
+            state_t=state_t,
+            status_t=status_t,
+            passes=passes,
+            drift=float(drift.max(initial=0.0)),
+            force_h=force_h,
+            displacement_h=displacement_h,
+            slip_work=slip_work,
+            wear_depth=wear_depth,
+        )
+
+    def linearise(self, at: Evaluation) -> Linearisation:
+        """Exact derivative of the residual: closure of the history and wear included."""
+        joint = self.joint
+        force_tangent, wear_tangent = march_tangent(
+            at.predicted_t,
+            joint.friction_coefficient,
+            at.start,
+            at.passes,
+            joint.basis.synthesis,
+            joint.basis.analysis,
+            joint.has_normal,
+        )
+        m = joint.basis.synthesis.shape[0]
+        eps = np.repeat(joint.penalty[:, [0, 1, 1]], m, axis=1)
+        motion_tangent = (np.eye(3 * m) - force_tangent) / eps[:, :, None]
+        gain = self.wear_gain / joint.penalty[:, 1]
+        motion_tangent[:, 0, :] += gain[:, None] * wear_tangent
+        return Linearisation(joint, force_tangent, motion_tangent)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Residual (n_rel, 2H+1), N, and what led to it; arrays as in `kernels.march_period`.
+
+    scale: N, of the static and of the other harmonics. slip_work (n_contact,): integral of normal force times slip over
+    a period, N m. wear_depth (n_contact,): m. drift: N, change of the tangential state over the last pass.
+    """
+
+    predicted_h: FloatArray
+    residual: FloatArray
+    scale: tuple[float, float]
+    predicted_t: FloatArray
+    start: FloatArray
+    force_t: FloatArray
+    state_t: FloatArray
+    status_t: IntArray
+    passes: IntArray
+    drift: float
+    force_h: FloatArray
+    displacement_h: FloatArray
+    slip_work: FloatArray
+    wear_depth: FloatArray
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Euclidean norm of the residual, the static harmonic and the others each over its scale."""
+        static, moving = scale or self.scale
+        return float(
+            np.hypot(np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving)
+        )
+
+
+def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tuple[float, float]:
+    """Scales of the residual, N: the static preload must not hide an error in the vibration, which may be far smaller."""
+    moving = max(float(np.linalg.norm(reduced_force[:, 1:])), float(np.linalg.norm(contact_force[:, 1:])))
+    static = max(float(np.linalg.norm(reduced_force[:, 0])), float(np.linalg.norm(contact_force[:, 0])), moving)
+    if static == 0.0:
+        return 1.0, 1.0
+    # below this share of the preload the vibration is lost in round-off
+    return static, max(moving, 1e-6 * static)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
+
+    Where a pair stays stuck or closed all period long its motion does not depend on p: these unknowns stand in the
+    Jacobian as columns of the identity, are left out of the coupled system and follow from it (`active`).
+    """
+
+    joint: Joint
+    force_tangent: FloatArray
+    motion_tangent: FloatArray
+
+    def active(self) -> IntArray:
+        """Pairs whose motion depends on their predicted force."""
+        return np.flatnonzero(np.abs(self.motion_tangent).max(axis=(1, 2)) > 1e-15 / self.joint.penalty.max(axis=1))
+
+    def apply(self, step: FloatArray) -> FloatArray:
+        """Jacobian times a step (n_rel, m), N."""
+        joint = self.joint
+        spread = joint.to_pairs(step).reshape(joint.contact.n_contact, -1, 1)
+        shape = (joint.contact.n_contact, 3, step.shape[1])
+        motion = np.matmul(self.motion_tangent, spread).reshape(shape)
+        force = np.matmul(self.force_tangent, spread).reshape(shape)
+        return joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
+
+    def dense(self, pairs: IntArray) -> FloatArray:
+        """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic)."""
+        joint = self.joint
+        m = joint.basis.synthesis.shape[0]
+        n_harmonics = joint.basis.n_harmonics
+        chosen = np.isin(joint.slots // 3, pairs)
+        rows = np.flatnonzero(chosen)
+        matrix = np.zeros((rows.size, m, rows.size, m))
+        static = joint.structure.static_stiffness
+        dynamic = joint.structure.dynamic_stiffness
+        for pair in pairs:
+            own = np.flatnonzero(joint.slots[rows] // 3 == pair)
+            component = joint.slots[rows[own]] % 3
+            select = (component[:, None] * m + np.arange(m)).ravel()
+            block = self.motion_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size * m)
+            product = np.empty((rows.size, m, own.size * m))
+            product[:, 0] = static[np.ix_(rows, rows[own])] @ block[:, 0]
+            for n in range(n_harmonics):
+                amplitude = block[:, 2 * n + 1] - 1j * block[:, 2 * n + 2]
+                force = dynamic[n][np.ix_(rows, rows[own])] @ amplitude
+                product[:, 2 * n + 1] = force.real
+                product[:, 2 * n + 2] = -force.imag
+            matrix[:, :, own] = product.reshape(rows.size, m, own.size, m)
+            tangent = self.force_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size, m)
+            matrix[own[:, None], :, own[None, :]] += tangent.transpose(0, 2, 1, 3)
+        return matrix.reshape(rows.size * m, rows.size * m)

@@ -1,0 +1,72 @@
+"""Frozen results that the solver hands out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.model import ComplexArray, FloatArray
+from solver.outcome import Outcome
+
+
+@dataclass(frozen=True)
+class PeriodicState:
+    """One periodic state of the joint.
+
+    omega: angular frequency, rad/s. excitation_amplitude: N.
+    displacement_h (n_contact, 3, 2H+1): relative displacement, m, harmonics ordered 0, cos 1, sin 1, ...
+    contact_force_h (n_contact, 3, 2H+1): force that the contact takes up, N, compression positive.
+    start_history (n_contact, 2): corrected slip X_T that the state was found from, m. With it the state is reproduced;
+        the period itself ends at the slip that the next state starts from.
+    wear_depth (n_contact,): m.
+    """
+
+    omega: float
+    excitation_amplitude: float
+    displacement_h: FloatArray
+    contact_force_h: FloatArray
+    start_history: FloatArray
+    wear_depth: FloatArray
+
+
+@dataclass(frozen=True)
+class StartState:
+    """Unworn state of one frequency of a sweep, or the reason why there is none.
+
+    penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line.
+    newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
+    """
+
+    outcome: Outcome
+    state: PeriodicState | None
+    penalty_omega: float
+    newton_iterations: int
+    run_time: float
+
+
+@dataclass(frozen=True)
+class WearHistory:
+    """A point of a study on the slow time scale, at `n_output` cycle counts.
+
+    cycles (n_output,); worn_volume (n_output,) m3; wear_rate (n_output,) m3 per cycle; wear_depth, mean_pressure (Pa),
+    slip_range (m), open_fraction (n_output, n_contact); response (n_output, n_response) complex first harmonic, m;
+    response_peak (n_output, n_response) m. Output counts that were not reached hold NaN; where the point failed all do.
+    jump_cycle: first cycle count at which the branch was lost, NaN if never.
+    error_estimate: estimated relative error of the last worn volume.
+    run_time: CPU seconds of the computing thread, start state included.
+    """
+
+    outcome: Outcome
+    cycles: FloatArray
+    worn_volume: FloatArray
+    wear_rate: FloatArray
+    wear_depth: FloatArray
+    mean_pressure: FloatArray
+    slip_range: FloatArray
+    open_fraction: FloatArray
+    response: ComplexArray
+    response_peak: FloatArray
+    jump_cycle: float
+    error_estimate: float
+    newton_iterations: int
+    run_time: float
+    message: str = ""

@@ -1,0 +1,102 @@
+"""What is studied: a reduced linear structure and the contact pairs on it.
+
+These frozen dataclasses are the only thing that a scene hands to the solver. All values are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ComplexArray = NDArray[np.complex128]
+Matrix = NDArray[np.float64] | NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ContactInterface:
+    """Contact pairs, `n_contact` of them.
+
+    dofs (n_contact, 3) int: index, in every `LinearModel` of the scene, of the closing, first and second tangential
+        *relative* displacement of the pair (blade minus disk; the closing one positive when the pair closes);
+        -1 where the pair has none.
+    area (n_contact,): weight alpha of the pair, m2, Eq. (7).
+    gap (n_contact,): initial gap, m.
+    normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement;
+        not used for the others.
+    position (n_contact, 3): m, NaN where unknown.
+    surface: text label of each pair, e.g. "intrados".
+    """
+
+    dofs: IntArray
+    area: FloatArray
+    gap: FloatArray
+    normal_load: FloatArray
+    position: FloatArray
+    surface: tuple[str, ...]
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact pairs."""
+        return len(self.area)
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`.
+
+    mass, damping, stiffness (n, n): symmetric real, or Hermitian for a cyclic sector at one nodal diameter.
+    load_static (n,): N, real. load_harmonic (n,): N per unit excitation amplitude; complex, load(t) = Re(F exp(i w t)).
+    response (n_response, n): rows that give the reported responses, m, from the displacements.
+    """
+
+    mass: Matrix
+    damping: Matrix
+    stiffness: Matrix
+    load_static: FloatArray
+    load_harmonic: ComplexArray
+    response: Matrix
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """A scene: linear structure(s), the contact pairs on them and the names of the responses.
+
+    linear: by nodal diameter k in 0..n_sectors // 2; a structure that is no cyclic sector has the key 0 only. The
+        contact displacements have the same indices in all of them.
+    n_sectors: number of sectors of the cyclic structure; 0 for a structure that is no cyclic sector.
+    nodal_diameter: d of the travelling wave that excites the sector: harmonic n moves in nodal diameter n d.
+    """
+
+    linear: Mapping[int, LinearModel]
+    contact: ContactInterface
+    response_names: tuple[str, ...]
+    n_sectors: int = 0
+    nodal_diameter: int = 0
+
+    def harmonic_structure(self, harmonic: int) -> tuple[LinearModel, bool]:
+        """Linear model that a harmonic sees, and whether its conjugate holds (nodal diameter folded back).
+
+        A travelling wave of nodal diameter d moves in harmonic n with the interblade phase `2 pi n d / N`, that is in
+        nodal diameter `n d` modulo N; above N/2 it is the conjugate of nodal diameter N - n d.
+
+        Raises KeyError where the scene does not hold that nodal diameter.
+        """
+        if self.n_sectors == 0 or self.nodal_diameter == 0:
+            return self.linear[0], False
+        wrapped = (harmonic * self.nodal_diameter) % self.n_sectors
+        if 2 * wrapped > self.n_sectors:
+            return self.linear[self.n_sectors - wrapped], True
+        return self.linear[wrapped], False
+
+
+def needed_nodal_diameters(nodal_diameter: int, n_sectors: int, n_harmonics: int) -> tuple[int, ...]:
+    """Folded nodal diameters that the harmonics 0..n_harmonics of a travelling wave see, ascending, each once."""
+    if n_sectors == 0:
+        return (0,)
+    wrapped = {(harmonic * nodal_diameter) % n_sectors for harmonic in range(n_harmonics + 1)}
+    return tuple(sorted({min(k, n_sectors - k) for k in wrapped}))

@@ -1,0 +1,40 @@
+"""How a computation ended. Failure is a value with a sentence; raising is the caller's choice."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Outcome(IntEnum):
+    """End of a computation; the number is stored in result files, so numbers are never used again for others."""
+
+    CONVERGED = 0
+    STATIC_FAILED = 1
+    START_FAILED = 2
+    BRANCH_LOST = 3
+    MARCH_FAILED = 4
+    NOT_FINITE = 5
+    SINGULAR = 6
+
+    @property
+    def meaning(self) -> str:
+        """One word for `flag_meanings` in a result file."""
+        return self.name.lower()
+
+    @property
+    def sentence(self) -> str:
+        """What a user reads."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Outcome.CONVERGED: "The point was computed to tolerance.",
+    Outcome.STATIC_FAILED: "The static contact state was not found: check the static load, the gaps and the supports.",
+    Outcome.START_FAILED: "No periodic state was found at the first frequency of the sweep, not even with the excitation"
+    " raised gradually.",
+    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more frequencies or more harmonics.",
+    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller step"
+    " or more harmonics.",
+    Outcome.NOT_FINITE: "The computation produced a number that is not finite: check the matrices of the scene.",
+    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping or a support.",
+}

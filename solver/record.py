@@ -1,0 +1,83 @@
+"""From the steps of a march to the cycle counts that were asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from solver.history import WearHistory
+from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
+from solver.response import StateReport
+
+REPORTED = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response", "response_peak")
+
+
+@dataclass
+class Recorder:
+    """Takes the state after every step and keeps the requested counts, interpolated linearly between two steps."""
+
+    model: ReducedModel
+    cycles: FloatArray
+    start_iterations: int
+    start_time: float
+    _kept: dict[str, np.ndarray] = field(init=False, repr=False)
+    _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
+    _local_errors: float = field(init=False, default=0.0, repr=False)
+
+    def __post_init__(self) -> None:
+        n_output, n_contact = self.cycles.size, self.model.contact.n_contact
+        n_response = len(self.model.response_names)
+        widths = dict.fromkeys(REPORTED, n_contact) | {"response": n_response, "response_peak": n_response}
+        self._kept = {
+            name: np.full((n_output, width), np.nan, complex if name == "response" else float)
+            for name, width in widths.items()
+        }
+        self._kept["wear_rate"] = np.full(n_output, np.nan)
+
+    def add(self, cycle: float, report: StateReport, wear_coefficient: float) -> None:
+        """State at the end of a step; `cycle` never falls."""
+        rate = wear_coefficient * float(report.slip_work.sum())
+        if self._last is None:
+            wanted = self.cycles == cycle
+            before, before_report, before_rate = cycle, report, rate
+        else:
+            before, before_report, before_rate = self._last
+            wanted = (self.cycles > before) & (self.cycles <= cycle)
+            # Euler against the trapezoidal rule: the leading error of the step, whose share of the volume is reported
+            self._local_errors += 0.5 * (cycle - before) * abs(rate - before_rate)
+        share = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
+        for name in REPORTED:
+            old, new = getattr(before_report, name), getattr(report, name)
+            self._kept[name][wanted] = old + share[:, None] * (new - old)
+        self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
+        self._last = (cycle, report, rate)
+
+    def failed(self, outcome: Outcome, run_time: float) -> WearHistory:
+        """History of a point that has no start state: NaN everywhere."""
+        return self._history(outcome, np.nan, np.nan, 0, run_time)
+
+    def finish(self, outcome: Outcome, jump_cycle: float, iterations: int, run_time: float) -> WearHistory:
+        """The whole history; NaN everywhere where the point failed: an unfinished history is no result."""
+        if outcome is not Outcome.CONVERGED:
+            for kept in self._kept.values():
+                kept[:] = np.nan
+            return self._history(outcome, jump_cycle, np.nan, iterations, run_time)
+        volume = float(self._kept["wear_depth"][-1] @ self.model.contact.area)
+        error = self._local_errors / volume if volume > 0.0 else 0.0
+        return self._history(outcome, jump_cycle, error, iterations, run_time)
+
+    def _history(
+        self, outcome: Outcome, jump_cycle: float, error: float, iterations: int, run_time: float
+    ) -> WearHistory:
+        return WearHistory(
+            outcome=outcome,
+            cycles=self.cycles,
+            worn_volume=self._kept["wear_depth"] @ self.model.contact.area,
+            jump_cycle=jump_cycle,
+            error_estimate=error,
+            newton_iterations=self.start_iterations + iterations,
+            run_time=self.start_time + run_time,
+            **self._kept,
+        )

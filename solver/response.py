@@ -1,0 +1,131 @@
+"""One state of the joint: the static one, the periodic one above it, and what is reported of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from solver.balance import Balance, Evaluation
+from solver.harmonics import pad_harmonics, to_complex
+from solver.history import PeriodicState
+from solver.joint import Case, Joint, static_joint
+from solver.kernels import SEPARATED
+from solver.linear import JacobianSolver
+from solver.model import ComplexArray, FloatArray
+from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+
+LOAD_STEPS = 20
+
+
+def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
+    """Frictional unilateral state under the static load, raised gradually from nothing; None where there is none.
+
+    The state depends on the path of the load, so it is raised in equal steps and each starts from the tangential state of
+    the one before. The first evaluation lets the pairs stick.
+    """
+    idle = np.zeros(joint.contact.n_contact)
+    solver = JacobianSolver()
+
+    def balance_at(load_factor: float, history: FloatArray) -> Balance:
+        return Balance(static_joint(joint, load_factor), history, wear_depth, idle)
+
+    history = np.zeros((joint.contact.n_contact, 2))
+    first = balance_at(1.0 / LOAD_STEPS, history)
+    start = first.joint.structure.force_h()
+    result = solve_balance(first, start, solver, tolerance, effort, 60)
+    if not result.converged:
+        return None
+    point = PathPoint(1.0 / LOAD_STEPS, result.evaluation, final_history(first, result.evaluation))
+    for step in range(2, LOAD_STEPS + 1):
+        point, arrived = follow_naturally(balance_at, point, step / LOAD_STEPS, solver, tolerance, effort)
+        if not arrived:
+            return None
+    return point
+
+
+def solve_first_state(
+    case: Case,
+    omega: float,
+    excitation_amplitude: float,
+    wear_depth: FloatArray,
+    solver: JacobianSolver,
+    effort: Effort,
+) -> PathPoint | None:
+    """Periodic state found from nothing: the static state first, then the excitation raised; None where there is none.
+
+    omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
+    """
+    tolerance = case.settings.tolerance
+    idle = np.zeros_like(wear_depth)
+    quiet = case.joint(omega, 0.0)
+    static = solve_static_state(quiet, wear_depth, tolerance, effort)
+    if static is None:
+        return None
+
+    def balance_at(share: float, history: FloatArray) -> Balance:
+        return Balance(case.joint(omega, share * excitation_amplitude), history, wear_depth, idle)
+
+    still = balance_at(0.0, static.history)
+    start = pad_harmonics(static.evaluation.predicted_h, case.settings.harmonics)
+    result = solve_balance(still, start, solver, tolerance, effort)
+    if not result.converged:
+        return None
+    point = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
+    point, arrived = follow_naturally(balance_at, point, 1.0, solver, tolerance, effort)
+    return point if arrived else follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
+
+
+def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
+    """The frozen state that is handed on, in physical units."""
+    return PeriodicState(
+        omega=joint.omega,
+        excitation_amplitude=joint.excitation_amplitude,
+        displacement_h=point.evaluation.displacement_h,
+        contact_force_h=point.evaluation.force_h,
+        start_history=point.evaluation.start / joint.penalty[:, 1:],
+        wear_depth=point.evaluation.wear_depth,
+    )
+
+
+@dataclass(frozen=True)
+class StateReport:
+    """What is reported of a state; units and shapes as in `solver.history.WearHistory`, without the cycle dimension."""
+
+    wear_depth: FloatArray
+    slip_work: FloatArray
+    mean_pressure: FloatArray
+    slip_range: FloatArray
+    open_fraction: FloatArray
+    response: ComplexArray
+    response_peak: FloatArray
+
+
+def report_state(joint: Joint, evaluation: Evaluation) -> StateReport:
+    """Pressures, slip and responses of a converged state."""
+    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    response_t = response_h @ joint.basis.synthesis
+    return StateReport(
+        wear_depth=evaluation.wear_depth,
+        slip_work=evaluation.slip_work,
+        mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
+        slip_range=largest_distance(evaluation.state_t) / joint.penalty[:, 1],
+        open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
+        response=to_complex(response_h)[:, 0],
+        response_peak=np.abs(response_t).max(axis=1),
+    )
+
+
+@njit(cache=True)
+def largest_distance(state_t: FloatArray) -> FloatArray:
+    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period."""
+    n_contact, _, n_points = state_t.shape
+    largest = np.zeros(n_contact)
+    for pair in range(n_contact):
+        for i in range(n_points):
+            for j in range(i):
+                first = state_t[pair, 0, i] - state_t[pair, 0, j]
+                second = state_t[pair, 1, i] - state_t[pair, 1, j]
+                largest[pair] = max(largest[pair], first * first + second * second)
+    return np.sqrt(largest)
