@@ -40,23 +40,32 @@ class Balance:
     wear_depth: FloatArray
     wear_gain: FloatArray
 
+    def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
+        """Predicted force (n_rel, m), N, that gives a motion, m, and contact force, N, (n_contact, 3, m) of a state."""
+        motion = displacement_h.copy()
+        motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
+        held = self.joint.penalty.at_velocity
+        motion[held, 1:, 0] -= self.history[held]
+        return self.joint.to_relative(force_h + self.joint.surplus(motion))
+
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
         """Residual and everything that it passes through, for a predicted force (n_rel, 2H+1), N."""
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
         pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
         predicted_t = pairs @ joint.basis.synthesis
-        start = self.history * joint.penalty[:, 1:]
+        at_velocity = joint.penalty.at_velocity
+        start = np.where(at_velocity[:, None], 0.0, self.history * joint.penalty.tangential[:, None])
         limit = joint.friction_coefficient * max(float(predicted_t[:, 0].max(initial=0.0)), 0.0)
         force_t, state_t, status_t, passes, drift = march_period(
-            predicted_t, joint.friction_coefficient, start, CLOSURE * limit, MOST_PASSES
+            predicted_t, joint.friction_coefficient, start, at_velocity, CLOSURE * limit, MOST_PASSES
         )
-        slip_work = wear_integral(force_t, state_t) / joint.penalty[:, 1]
+        slip_work = wear_integral(force_t, state_t, at_velocity) / joint.state_stiffness
         wear_depth = self.wear_depth + self.wear_gain * slip_work
         force_h = force_t @ joint.basis.analysis
-        eps = joint.penalty[:, [0, 1, 1]]
-        displacement_h = (pairs - force_h) / eps[:, :, None]
+        displacement_h = joint.motion(pairs - force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
+        displacement_h[at_velocity, 1:, 0] += self.history[at_velocity]
         motion, force = joint.to_relative(displacement_h), joint.to_relative(force_h)
         reduced_force = joint.structure.force_h()
         residual = joint.structure.apply(motion) + force - reduced_force
@@ -65,6 +74,7 @@ class Balance:
             residual=residual,
             scale=_residual_scale(reduced_force, force),
             predicted_t=predicted_t,
+            history=self.history,
             start=start,
             force_t=force_t,
             state_t=state_t,
@@ -84,16 +94,16 @@ class Balance:
             at.predicted_t,
             joint.friction_coefficient,
             at.start,
+            joint.penalty.at_velocity,
             at.passes,
             joint.basis.synthesis,
             joint.basis.analysis,
             joint.has_normal,
         )
         m = joint.basis.synthesis.shape[0]
-        eps = np.repeat(joint.penalty[:, [0, 1, 1]], m, axis=1)
-        motion_tangent = (np.eye(3 * m) - force_tangent) / eps[:, :, None]
-        gain = self.wear_gain / joint.penalty[:, 1]
-        motion_tangent[:, 0, :] += gain[:, None] * wear_tangent
+        surplus = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
+        motion_tangent = joint.motion(surplus).reshape(-1, 3 * m, 3 * m)
+        motion_tangent[:, 0, :] += (self.wear_gain / joint.state_stiffness)[:, None] * wear_tangent
         return Linearisation(joint, force_tangent, motion_tangent)
 
 
@@ -109,6 +119,7 @@ class Evaluation:
     residual: FloatArray
     scale: tuple[float, float]
     predicted_t: FloatArray
+    history: FloatArray
     start: FloatArray
     force_t: FloatArray
     state_t: FloatArray
@@ -152,7 +163,7 @@ class Linearisation:
 
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return np.flatnonzero(np.abs(self.motion_tangent).max(axis=(1, 2)) > 1e-15 / self.joint.penalty.max(axis=1))
+        return np.flatnonzero(np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2)) > 1e-14)
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -29,8 +30,8 @@ def follow_branch(
     frequencies: FloatArray,
     sweep: Sweep,
     settings: SolverSettings,
-) -> tuple[StartState, ...]:
-    """Unworn periodic states at the frequencies (Hz, ascending), in their order.
+) -> Iterator[tuple[int, StartState]]:
+    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one as the sweep reaches them.
 
     "up" follows the branch from the lowest frequency, "down" from the highest, each from a little outside the range. At a
     fold the branch is followed by arc length until it reaches the next frequency, which is where a slow sweep of the
@@ -42,7 +43,6 @@ def follow_branch(
     penalty_omega = float(omegas.max())
     line = _Line(build_case(model, friction_coefficient, penalty_omega, settings), excitation_amplitude)
     started = time.thread_time()
-    found: dict[int, StartState] = {}
     for index in order:
         spent = line.effort.iterations
         outcome, point = line.advance(float(omegas[index]), sweep)
@@ -50,9 +50,8 @@ def follow_branch(
         state = None
         if point is not None:
             state = periodic_state(line.case.joint(float(omegas[index]), excitation_amplitude), point)
-        found[int(index)] = StartState(outcome, state, penalty_omega, line.effort.iterations - spent, now - started)
+        yield int(index), StartState(outcome, state, penalty_omega, line.effort.iterations - spent, now - started)
         started = now
-    return tuple(found[index] for index in range(frequencies.size))
 
 
 class _Line:

@@ -6,20 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.harmonics import FourierBasis, build_basis
-from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.harmonics import FourierBasis, build_basis, derivative
+from solver.model import BoolArray, ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.penalty import Penalty, build_penalty, static_penalty
 from solver.settings import SolverSettings
-from solver.structure import CondensedStructure, build_penalty, build_structure, relative_indices
-
-PENALTY_RATE = 10.0  # over the first harmonic left out
+from solver.structure import CondensedStructure, build_structure, relative_indices
 
 
 @dataclass(frozen=True)
 class Joint:
     """Everything that stays the same while a periodic state is sought.
 
-    slots (n_rel,): place `3 pair + component` of each relative displacement. penalty (n_contact, 2): normal and
-    tangential, N/m. has_normal (n_contact,) bool: False where the normal force is constant.
+    slots (n_rel,): place `3 pair + component` of each relative displacement. has_normal (n_contact,): False where the
+    normal force is constant. state_stiffness (n_contact,): N/m, what turns the tangential state of `kernels` into slip.
     """
 
     omega: float
@@ -29,8 +28,44 @@ class Joint:
     contact: ContactInterface
     basis: FourierBasis
     slots: IntArray
-    penalty: FloatArray
-    has_normal: FloatArray
+    penalty: Penalty
+    has_normal: BoolArray
+
+    @property
+    def state_stiffness(self) -> FloatArray:
+        """Tangential state over slip (n_contact,), N/m: at velocity level the state is a sum over the samples."""
+        samples_per_radian = self.basis.n_samples / (2.0 * np.pi)
+        return self.penalty.tangential * np.where(self.penalty.at_velocity, self.omega * samples_per_radian, 1.0)
+
+    def motion(self, surplus: FloatArray) -> FloatArray:
+        """Motion (n_contact, 3, m, ...), m, from the predicted force beyond the contact force, same shape, N.
+
+        Linear; Eq. (12) divided by the penalty, at velocity level integrated over time. The mean position of pairs at
+        velocity level is relative to their history.
+        """
+        shape = (-1,) + (1,) * (surplus.ndim - 2)
+        moved = np.empty_like(surplus)
+        moved[:, 0] = surplus[:, 0] / self.penalty.normal.reshape(shape)
+        moved[:, 1:] = surplus[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
+        fast = self.penalty.at_velocity
+        if fast.any() and surplus.shape[2] > 1:
+            n_harmonics = (surplus.shape[2] - 1) // 2
+            order = self.omega * np.arange(1, n_harmonics + 1).reshape((-1,) + (1,) * (surplus.ndim - 3))
+            rate = moved[fast, 1:]
+            moved[fast, 1:, 1::2] = -rate[:, :, 2::2] / order
+            moved[fast, 1:, 2::2] = rate[:, :, 1::2] / order
+        moved[fast, 1:, 0] = surplus[fast, 1:, 0] / self.penalty.mean[fast].reshape((-1,) + (1,) * (surplus.ndim - 2))
+        return moved
+
+    def surplus(self, motion: FloatArray) -> FloatArray:
+        """Predicted force beyond the contact force, N, from a motion (n_contact, 3, m), m: the inverse of `motion`."""
+        force = np.empty_like(motion)
+        force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
+        force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]
+        fast = self.penalty.at_velocity
+        force[fast, 1:] = derivative(motion[fast, 1:], self.omega) * self.penalty.tangential[fast, None, None]
+        force[fast, 1:, 0] = motion[fast, 1:, 0] * self.penalty.mean[fast, None]
+        return force
 
     def to_pairs(self, values: FloatArray) -> FloatArray:
         """(n_contact, 3, m) from (n_rel, m): zero where a pair has no such displacement."""
@@ -49,7 +84,7 @@ class Case:
 
     model: ReducedModel
     friction_coefficient: float
-    penalty: FloatArray
+    penalty: Penalty
     settings: SolverSettings
 
     def joint(self, omega: float, excitation_amplitude: float) -> Joint:
@@ -71,12 +106,9 @@ class Case:
         )
 
 
-def build_case(
-    model: ReducedModel, friction_coefficient: float, omega: float, settings: SolverSettings
-) -> Case:
+def build_case(model: ReducedModel, friction_coefficient: float, omega: float, settings: SolverSettings) -> Case:
     """Case of a scene; omega, rad/s, is where the penalty is taken and has to be the same for states that are compared."""
-    rate = PENALTY_RATE * (settings.harmonics + 1) * omega
-    return Case(model, friction_coefficient, build_penalty(model, rate), settings)
+    return Case(model, friction_coefficient, build_penalty(model, omega, settings.harmonics), settings)
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:
@@ -100,6 +132,7 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         contact=joint.contact,
         basis=build_basis(0, 1),
         slots=joint.slots,
-        penalty=joint.penalty,
+        # a static load has no velocity: every pair is held at displacement level
+        penalty=static_penalty(joint.penalty),
         has_normal=joint.has_normal,
     )

@@ -92,10 +92,7 @@ class _March:
         state = self.start.state
         assert state is not None
         balance = Balance(self.joint, state.start_history, state.wear_depth, self.still)
-        eps = self.joint.penalty[:, [0, 1, 1], None]
-        displacement = state.displacement_h.copy()
-        displacement[:, 0, 0] -= self.joint.contact.gap + state.wear_depth
-        predicted = self.joint.to_relative(state.contact_force_h + eps * displacement)
+        predicted = balance.predict(state.displacement_h, state.contact_force_h)
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
 

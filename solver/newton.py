@@ -11,6 +11,10 @@ import numpy as np
 from solver.model import FloatArray
 
 
+PATIENCE = 6  # full steps that may go by without a new lowest residual
+SHORTEST = 1.0 / 128.0
+
+
 class HasResidual(Protocol):
     """What an evaluation must offer: its residual norm, over scales that may be held fixed, and those scales."""
 
@@ -42,34 +46,35 @@ def solve_newton(
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` until the scaled residual is below the tolerance.
 
-    The residual has kinks where a contact sample changes its state, so a full step may raise it for a moment: a step is
-    accepted when it does not exceed the largest of the last three norms, and halved otherwise.
+    The residual is piecewise smooth: a full step that raises it often lands in the right piece, and a step that is cut
+    back at every kink crawls. So full steps come first, as long as the lowest norm so far is improved once in
+    `PATIENCE` iterations; then the iteration goes back to the best point and cuts its steps until the norm falls.
     """
-    unknown = start
-    current = evaluate(unknown)
-    recent: list[float] = []
+    unknown, current = start, evaluate(start)
+    best, best_norm, since_best = (unknown, current), np.inf, 0
+    cutting = False
     for iteration in range(most_iterations + 1):
-        scale = current.scale
         norm = current.scaled_residual()
         if norm <= tolerance:
             return NewtonResult(True, unknown, current, iteration)
-        if iteration == most_iterations or not np.isfinite(norm):
+        if norm < best_norm:
+            best, best_norm, since_best = (unknown, current), norm, 0
+        else:
+            since_best += 1
+        if iteration == most_iterations:
             break
-        recent = [*recent[-2:], norm]
+        lost = not np.isfinite(norm) or norm > 1e6 * best_norm
+        if not cutting and (lost or since_best > PATIENCE):
+            cutting = True
+            unknown, current = best
         step = direction(current)
         if not np.all(np.isfinite(step)):
             break
-        length = 1.0
-        best: tuple[float, FloatArray, EvaluationT] | None = None
-        while length > 1e-3:
-            trial = evaluate(unknown + length * step)
-            trial_norm = trial.scaled_residual(scale)
-            if best is None or trial_norm < best[0]:
-                best = (trial_norm, unknown + length * step, trial)
-            if trial_norm <= (1.0 - 1e-4 * length) * max(recent):
-                break
+        length, trial = 1.0, evaluate(unknown + step)
+        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual() and length > SHORTEST:
             length *= 0.5
-        if best is None or not best[0] < 10.0 * max(recent):
-            return NewtonResult(False, unknown, current, iteration)
-        _, unknown, current = best
-    return NewtonResult(False, unknown, current, most_iterations)
+            trial = evaluate(unknown + length * step)
+        if cutting and length <= SHORTEST:
+            break
+        unknown, current = unknown + length * step, trial
+    return NewtonResult(False, *best, most_iterations)

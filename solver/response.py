@@ -68,7 +68,11 @@ def solve_first_state(
         return Balance(case.joint(omega, share * excitation_amplitude), history, wear_depth, idle)
 
     still = balance_at(0.0, static.history)
-    start = pad_harmonics(static.evaluation.predicted_h, case.settings.harmonics)
+    displacement_h, force_h = (
+        pad_harmonics(part, case.settings.harmonics)
+        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
+    )
+    start = still.predict(displacement_h, force_h)
     result = solve_balance(still, start, solver, tolerance, effort)
     if not result.converged:
         return None
@@ -84,7 +88,7 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
         excitation_amplitude=joint.excitation_amplitude,
         displacement_h=point.evaluation.displacement_h,
         contact_force_h=point.evaluation.force_h,
-        start_history=point.evaluation.start / joint.penalty[:, 1:],
+        start_history=point.evaluation.history,
         wear_depth=point.evaluation.wear_depth,
     )
 
@@ -110,7 +114,7 @@ def report_state(joint: Joint, evaluation: Evaluation) -> StateReport:
         wear_depth=evaluation.wear_depth,
         slip_work=evaluation.slip_work,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
-        slip_range=largest_distance(evaluation.state_t) / joint.penalty[:, 1],
+        slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
         response_peak=np.abs(response_t).max(axis=1),

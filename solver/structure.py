@@ -68,7 +68,7 @@ def build_structure(
     """
     relative, _ = relative_indices(model.contact)
     linear, _ = model.harmonic_structure(0)
-    static, static_coupling, static_offset = _condense(np.real(linear.stiffness), relative, linear.load_static)
+    static, static_coupling, static_offset = condense(np.real(linear.stiffness), relative, linear.load_static)
     stiffness, force, response, offset = [], np.zeros(relative.size, complex), [], np.zeros(0, complex)
     offset = np.zeros(linear.response.shape[0], complex)
     for harmonic in range(1, n_harmonics + 1):
@@ -76,7 +76,7 @@ def build_structure(
         frequency = harmonic * omega
         full = linear.stiffness + 1j * frequency * linear.damping - frequency**2 * linear.mass
         load = excitation_amplitude * linear.load_harmonic if harmonic == 1 else np.zeros(full.shape[0], complex)
-        reduced, coupling, reaction = _condense(full, relative, load)
+        reduced, coupling, reaction = condense(full, relative, load)
         rows = _response_rows(linear, relative, coupling)
         stiffness.append(reduced.conj() if conjugate else reduced)
         response.append(rows.conj() if conjugate else rows)
@@ -97,9 +97,12 @@ def build_structure(
     )
 
 
-def _condense(full: Matrix, relative: IntArray, load: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Schur complement on `relative`, the motion (n, n_rel) that follows a unit u, and a vector (n,) that holds the
-    condensed load at `relative` and the internal displacement under the load, with u = 0, elsewhere."""
+def condense(full: Matrix, relative: IntArray, load: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Schur complement of `full` (n, n) on `relative`, and what it takes to come back.
+
+    Returns the reduced matrix (n_rel, n_rel); the motion (n, n_rel) that follows a unit relative displacement; and a
+    vector (n,) with the condensed load at `relative` and the displacement under the load with u = 0 elsewhere.
+    """
     n = full.shape[0]
     internal = np.setdiff1d(np.arange(n), relative)
     motion = np.zeros((n, relative.size), full.dtype)
@@ -125,29 +128,3 @@ def _held_displacement(both: Matrix, relative: IntArray) -> Matrix:
     held = both.copy()
     held[relative] = 0.0
     return held
-
-
-def build_penalty(model: ReducedModel, rate: float) -> FloatArray:
-    """Penalty eps of each pair, (n_contact, 2): normal and tangential, N/m, from the scene alone.
-
-    The displacement-level law is exact for any eps as the number of harmonics grows, but at a finite number it is as good
-    as eps is near the stiffness that the joint shows to the harmonics left out. That is taken as the condensed
-    `K + s^2 M` at the real rate s (`rate`, 1/s, that of the first harmonic left out): the stiffness of an elastic joint,
-    the inertia of a mass that sits directly on a slider, and free of resonances in between.
-    """
-    relative, slots = relative_indices(model.contact)
-    linear, _ = model.harmonic_structure(1)
-    reduced, _, _ = _condense(
-        np.asarray(linear.stiffness + rate**2 * linear.mass), relative, np.zeros(linear.mass.shape[0])
-    )
-    size = np.abs(reduced).sum(axis=1)
-    penalty = np.ones((model.contact.n_contact, 2))
-    for pair in range(model.contact.n_contact):
-        own = slots // 3 == pair
-        normal = size[own & (slots % 3 == 0)]
-        tangent = size[own & (slots % 3 > 0)]
-        if normal.size:
-            penalty[pair, 0] = normal[0]
-        if tangent.size:
-            penalty[pair, 1] = tangent.max()
-    return penalty

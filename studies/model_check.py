@@ -1,0 +1,236 @@
+"""Whether a reduced model describes a possible structure with contact pairs on it.
+
+Used for scene files and for the bundled scenes alike; so keys are named after the datasets of the scene file. What is
+legal and may surprise: a massless displacement that has stiffness, a rigid body motion that has mass and that a contact
+can hold, a negative gap (interference: the pair presses in the unloaded state), a stiffness matrix that is not positive
+definite (spin softening).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky, get_lapack_funcs
+
+from solver.model import ContactInterface, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
+from studies.scene_error import SceneError
+
+SYMMETRY_TOLERANCE = 1e-8
+"""Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
+entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
+
+_NEGATIVE_MASS = 1e-9  # of the largest entry: a negative eigenvalue of that size is round-off
+_REAL = 1e-9  # imaginary part at nodal diameter 0, relative to the largest entry, that is round-off
+
+
+def check_model(model: ReducedModel, n_harmonics: int = 1, *, grouped: bool | None = None) -> None:
+    """Raise SceneError for the first thing in the model that cannot be.
+
+    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the model. grouped: whether the datasets are
+    named `nd/<k>/...`; as `is_grouped` says if not given.
+    """
+    grouped = is_grouped(model) if grouped is None else grouped
+    check_sector(model.n_sectors, model.nodal_diameter)
+    _check_names(model.response_names, "response/names")
+    check_harmonics(model, n_harmonics)
+    for k, linear in model.linear.items():
+        if not 0 <= k <= model.n_sectors // 2:
+            raise SceneError(
+                f"nd/{k}",
+                f"there are {model.n_sectors} sectors",
+                f"give nodal diameters of 0 to {model.n_sectors // 2}",
+            )
+        _check_linear(linear, f"nd/{k}/" if grouped else "", len(model.response_names))
+    _check_contact(model.contact, min(len(linear.stiffness) for linear in model.linear.values()))
+    _check_static(model.linear[0], model.contact, "nd/0/" if grouped else "")
+
+
+def is_grouped(model: ReducedModel) -> bool:
+    """Whether a scene file holds the model in groups `nd/<k>/`: a travelling wave, or several nodal diameters."""
+    return model.nodal_diameter > 0 or len(model.linear) > 1
+
+
+def check_sector(n_sectors: int, nodal_diameter: int) -> None:
+    """Raise SceneError where there is no such number of sectors, or no such travelling wave on them.
+
+    A nodal diameter above half the number of sectors is a wave that travels backwards.
+    """
+    if n_sectors < 0:
+        raise SceneError(
+            "n_sectors", str(n_sectors), "give the number of sectors, or 0 for a structure that is no sector"
+        )
+    if not 0 <= nodal_diameter <= max(n_sectors - 1, 0):
+        raise SceneError("nodal_diameter", str(nodal_diameter), f"give 0 to {max(n_sectors - 1, 0)}")
+
+
+def check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
+    """Raise SceneError where one of the harmonics 0..n_harmonics sees a nodal diameter that the model does not hold."""
+    for harmonic in range(n_harmonics + 1):
+        for k in needed_nodal_diameters(model.nodal_diameter, model.n_sectors, harmonic):
+            if k not in model.linear:
+                few = f", or use fewer than {harmonic} harmonics" if harmonic > 1 else ""
+                wave = f"harmonic {harmonic} of a wave of nodal diameter {model.nodal_diameter}"
+                raise SceneError(f"nd/{k}", "missing", f"give this group, which {wave} needs{few}")
+
+
+def _check_names(names: tuple[str, ...], key: str) -> None:
+    if not names:
+        raise SceneError(key, "no name", "give at least one response")
+    for name in names:
+        if not name:
+            raise SceneError(key, "an empty name", "name every response")
+        if names.count(name) > 1:
+            raise SceneError(key, f'"{name}" stands there more than once', "give every response a name of its own")
+
+
+def _check_contact(contact: ContactInterface, n: int) -> None:
+    dofs = contact.dofs
+    if dofs.ndim != 2 or dofs.shape[1] != 3 or len(dofs) == 0:
+        raise SceneError(
+            "contact/dofs", f"shape {dofs.shape}", "give one row of 3 indices for each pair, at least one row"
+        )
+    n_contact = len(dofs)
+    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "area": (contact.area, (n_contact,)),
+        "gap": (contact.gap, (n_contact,)),
+        "normal_load": (contact.normal_load, (n_contact,)),
+        "position": (contact.position, (n_contact, 3)),
+    }
+    for name, (values, shape) in shapes.items():
+        _check_shape(f"contact/{name}", values, shape)
+        _check_finite(f"contact/{name}", values, nan_allowed=name == "position")
+    if len(contact.surface) != n_contact:
+        raise SceneError(
+            "contact/surface", f"{len(contact.surface)} labels", f"give one label for each of {n_contact} pairs"
+        )
+
+    outside = np.argwhere((dofs < -1) | (dofs >= n))
+    if len(outside):
+        pair, direction = outside[0]
+        raise SceneError(
+            "contact/dofs", f"{dofs[pair, direction]} at {_at(outside[0])}", f"give -1 or an index from 0 to {n - 1}"
+        )
+    used, counts = np.unique(dofs[dofs >= 0], return_counts=True)
+    if (counts > 1).any():
+        raise SceneError(
+            "contact/dofs",
+            f"index {used[counts > 1][0]} is used twice",
+            "give every direction a displacement of its own",
+        )
+    without = np.flatnonzero((dofs < 0).all(axis=1))
+    if len(without):
+        raise SceneError("contact/dofs", f"pair {without[0]} has no direction", "give it at least one, or leave it out")
+    flat = np.flatnonzero(contact.area <= 0)
+    if len(flat):
+        raise SceneError("contact/area", f"{contact.area[flat[0]]} at {_at(flat[:1])}", "give a positive area in m2")
+    loose = np.flatnonzero((dofs[:, 0] < 0) & (contact.normal_load <= 0))
+    if len(loose):
+        raise SceneError(
+            "contact/normal_load",
+            f"{contact.normal_load[loose[0]]} at {_at(loose[:1])}",
+            "give a positive normal force in N to a pair without closing displacement",
+        )
+
+
+def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
+    n = len(linear.stiffness) if linear.stiffness.ndim == 2 else 0
+    if n == 0 or linear.stiffness.shape != (n, n):
+        raise SceneError(f"{prefix}stiffness", f"shape {linear.stiffness.shape}", "give a square matrix")
+    matrices = {"stiffness": linear.stiffness, "mass": linear.mass, "damping": linear.damping}
+    for name, matrix in matrices.items():
+        _check_shape(prefix + name, matrix, (n, n))
+        _check_finite(prefix + name, matrix)
+        _check_hermitian(prefix + name, matrix)
+    vectors = {"load/static": linear.load_static, "load/harmonic": linear.load_harmonic}
+    for name, vector in vectors.items():
+        _check_shape(prefix + name, vector, (n,))
+        _check_finite(prefix + name, vector)
+    if np.iscomplexobj(linear.load_static):
+        raise SceneError(f"{prefix}load/static", "complex", "give real forces")
+    _check_shape(f"{prefix}response/dofs", linear.response, (n_response, n))
+    _check_finite(f"{prefix}response/dofs", linear.response)
+
+    try:
+        cholesky(linear.mass + _NEGATIVE_MASS * _largest(linear.mass) * np.eye(n))
+    except LinAlgError:
+        if _largest(linear.mass) > 0:
+            raise SceneError(f"{prefix}mass", "a negative eigenvalue", "give a positive semidefinite matrix") from None
+    # For a positive semidefinite mass, K + i M is singular only where a motion has neither stiffness nor mass.
+    singular = _singular(_scaled(linear.stiffness) + 1j * _scaled(linear.mass))
+    if singular:
+        raise SceneError(
+            f"{prefix}stiffness", f"singular together with mass: {singular}", "give every motion stiffness or mass"
+        )
+
+
+def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -> None:
+    """The model of the static harmonic: real, and no motion without stiffness that no contact can hold."""
+    for name in ("stiffness", "mass", "damping", "response"):
+        matrix = getattr(linear, name)
+        if np.abs(matrix.imag).max() > _REAL * _largest(matrix):
+            dataset = "response/dofs" if name == "response" else name
+            raise SceneError(f"{prefix}{dataset}", "complex", "give a real matrix: nodal diameter 0 has no phase")
+    away = np.setdiff1d(np.arange(len(linear.stiffness)), contact.dofs)
+    singular = _singular(linear.stiffness[np.ix_(away, away)])
+    if singular:
+        where = singular if len(away) == len(linear.stiffness) else f"{singular} among those without contact"
+        raise SceneError(
+            f"{prefix}stiffness", f"singular: {where}", "support every motion by stiffness or by a contact pair"
+        )
+
+
+def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
+    if values.shape != shape:
+        raise SceneError(key, f"shape {values.shape}", f"give shape {shape}")
+
+
+def _check_finite(key: str, values: NDArray[Any], *, nan_allowed: bool = False) -> None:
+    wrong = np.argwhere(np.isinf(values) if nan_allowed else ~np.isfinite(values))
+    if len(wrong):
+        raise SceneError(key, f"{values[tuple(wrong[0])]} at {_at(wrong[0])}", "give finite numbers")
+
+
+def _check_hermitian(key: str, matrix: Matrix) -> None:
+    diagonal = np.sqrt(np.abs(np.diag(matrix)))
+    allowed = SYMMETRY_TOLERANCE * np.outer(diagonal, diagonal) + 1e-12 * _largest(matrix)
+    difference = np.abs(matrix - matrix.conj().T)
+    if (difference > allowed).any():
+        row, column = np.unravel_index(int(np.argmax(difference - allowed)), matrix.shape)
+        word = "Hermitian" if np.iscomplexobj(matrix) else "symmetric"
+        entries = f"{matrix[row, column]} at {row}, {column} but {matrix[column, row]} at {column}, {row}"
+        raise SceneError(key, f"not {word}: {entries}", f"give a {word} matrix")
+
+
+def _singular(matrix: NDArray[Any]) -> str:
+    """Why a Hermitian (or complex symmetric) matrix is singular to round-off; empty where it is not."""
+    n = len(matrix)
+    if n == 0:
+        return ""
+    diagonal, rows = np.abs(np.diag(matrix)), np.abs(matrix).max(axis=1)
+    if (rows == 0).any():
+        return f"a row of zeros, the first of {np.count_nonzero(rows == 0)} such displacements"
+    # Displacements and modal coordinates have different units: make the diagonal 1 before judging.
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, rows))
+    balanced = matrix * np.outer(scale, scale)
+    factorise, estimate = get_lapack_funcs(("getrf", "gecon"), (balanced,))
+    factors, _, info = factorise(balanced)
+    if info == 0:
+        reciprocal, info = estimate(factors, np.abs(balanced).sum(axis=0).max())
+        if info == 0 and reciprocal > max(n, 10) * np.finfo(np.float64).eps:
+            return ""
+    return f"rank below {n}, the number of displacements"
+
+
+def _scaled(matrix: Matrix) -> Matrix:
+    largest = _largest(matrix)
+    return matrix / largest if largest > 0 else matrix
+
+
+def _largest(matrix: Matrix) -> float:
+    return float(np.abs(matrix).max())
+
+
+def _at(index: NDArray[np.intp]) -> str:
+    return "index " + ", ".join(str(int(i)) for i in index)

@@ -1,0 +1,141 @@
+"""Parameters of the scene `dovetail_sector`, and the checks that tie them together."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import cos, pi, radians, sin, tan
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from studies.scene_error import SceneError
+
+
+class Parameters(BaseModel):
+    """One sector of a bladed disk with a dovetail root. SI units but for rotation speed and angles.
+
+    The sector's centre line is x, the tangential direction y, the axis of rotation z (leading edge at negative z).
+    Radii of the dovetail and of the blade are measured along the centre line.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
+    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, rpm; it presses the flanks together")
+    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
+    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
+    mesh: int = Field(2, ge=1, le=3, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
+    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
+    stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction, -")
+
+    n_sectors: int = Field(47, ge=12, le=200, description="number of blades, -")
+    young_modulus: float = Field(114e9, gt=0, description="Young's modulus of disk and blade, Pa")
+    poisson_ratio: float = Field(0.32, ge=0, lt=0.5, description="Poisson's ratio of disk and blade, -")
+    density: float = Field(4430.0, gt=0, description="density of disk and blade, kg/m3")
+
+    bore_radius: float = Field(0.120, gt=0, description="radius of the clamped bore, m")
+    hub_radius: float = Field(0.125, gt=0, description="outer radius of the hub, m")
+    web_inner_radius: float = Field(0.147, gt=0, description="radius where the web has become thin, m")
+    web_outer_radius: float = Field(0.202, gt=0, description="radius where the web begins to widen to the rim, m")
+    rim_inner_radius: float = Field(0.212, gt=0, description="inner radius of the rim, m")
+    slot_bottom_radius: float = Field(0.234, gt=0, description="radius of the slot bottom, m")
+    rim_radius: float = Field(0.250, gt=0, description="outer radius of the disk, m")
+    hub_width: float = Field(0.036, gt=0, description="axial width of the hub, m")
+    web_width: float = Field(0.014, gt=0, description="axial width of the web, m")
+    rim_width: float = Field(0.040, gt=0, description="axial width of rim, root and platform, m")
+
+    flank_top_radius: float = Field(0.245, gt=0, description="radius of the outer end of the flanks, m")
+    flank_top_half_width: float = Field(0.0055, gt=0, description="half width of the root at that end, m")
+    flank_length: float = Field(0.007, gt=0, description="length of a flank in the cross-section, m")
+    flank_angle: float = Field(45.0, ge=15, le=75, description="angle between flank and radius, degrees")
+    root_clearance: float = Field(0.0012, gt=0, description="clearance of the root at bottom and sides, m")
+    mouth_clearance: float = Field(0.0006, gt=0, description="clearance of the neck at the rim radius, m")
+
+    platform_radius: float = Field(0.2525, gt=0, description="radius of the underside of the platform, m")
+    platform_thickness: float = Field(0.0025, gt=0, description="thickness of the platform, m")
+    platform_gap: float = Field(0.0006, gt=0, description="gap between neighbouring platforms, m")
+
+    blade_length: float = Field(0.160, gt=0, description="length of the blade above the platform, m")
+    root_chord: float = Field(0.042, gt=0, description="chord at the foot of the blade, m")
+    tip_chord: float = Field(0.040, gt=0, description="chord at the tip, m")
+    root_thickness: float = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade, m")
+    tip_thickness: float = Field(0.0026, gt=0, description="thickness in mid-chord at the tip, m")
+    edge_thickness: float = Field(
+        0.85, gt=0, le=1, description="thickness of the edges over that in mid-chord, parabolic between, -"
+    )
+    root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")
+    tip_stagger: float = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip, degrees")
+    fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angle of a sector, rad."""
+        return pi / self.n_sectors
+
+    @property
+    def angular_speed(self) -> float:
+        """Speed of rotation, rad/s."""
+        return 2.0 * pi * self.rotation_speed / 60.0
+
+    @property
+    def flank_bottom(self) -> tuple[float, float]:
+        """Radius along the centre line and half width, m, at the inner end of the flanks."""
+        angle = radians(self.flank_angle)
+        return (
+            self.flank_top_radius - self.flank_length * cos(angle),
+            self.flank_top_half_width + self.flank_length * sin(angle),
+        )
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius of the blade tip along the centre line, m."""
+        return self.platform_radius + self.platform_thickness + self.blade_length
+
+
+_ASCENDING = (
+    "bore_radius",
+    "hub_radius",
+    "web_inner_radius",
+    "web_outer_radius",
+    "rim_inner_radius",
+    "slot_bottom_radius",
+    "flank_top_radius",
+    "rim_radius",
+    "platform_radius",
+)
+
+
+def check_parameters(parameters: Parameters) -> None:
+    """Raises SceneError where parameters that are fine one by one do not go together."""
+    if parameters.nodal_diameter > parameters.n_sectors // 2:
+        raise SceneError(
+            "nodal_diameter",
+            str(parameters.nodal_diameter),
+            f"use at most n_sectors // 2 = {parameters.n_sectors // 2}; more is the same wave turning the other way",
+        )
+    for inner, outer in pairwise(_ASCENDING):
+        if getattr(parameters, inner) >= getattr(parameters, outer):
+            raise SceneError(
+                outer, str(getattr(parameters, outer)), f"make it larger than {inner} = {getattr(parameters, inner)}"
+            )
+    bottom_radius, bottom_half_width = parameters.flank_bottom
+    if bottom_radius <= parameters.slot_bottom_radius + parameters.root_clearance:
+        raise SceneError(
+            "flank_length",
+            str(parameters.flank_length),
+            "shorten the flanks or lower slot_bottom_radius, so that they end above the slot bottom",
+        )
+    if bottom_half_width <= parameters.root_clearance:
+        raise SceneError("root_clearance", str(parameters.root_clearance), "make it smaller than the root")
+    if bottom_half_width >= 0.9 * parameters.slot_bottom_radius * sin(parameters.half_pitch):
+        raise SceneError(
+            "flank_length",
+            str(parameters.flank_length),
+            "shorten the flanks or use fewer sectors, so that a post is left between two slots",
+        )
+    neck = parameters.flank_top_half_width
+    if neck + parameters.platform_gap >= parameters.platform_radius * tan(parameters.half_pitch):
+        raise SceneError("platform_gap", str(parameters.platform_gap), "make it smaller, the platform vanishes")
+    if neck + parameters.mouth_clearance >= parameters.rim_radius * sin(parameters.half_pitch):
+        raise SceneError("mouth_clearance", str(parameters.mouth_clearance), "make it smaller, the post vanishes")
+    if parameters.fillet_height >= parameters.blade_length:
+        raise SceneError("fillet_height", str(parameters.fillet_height), "make it smaller than blade_length")

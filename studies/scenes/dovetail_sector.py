@@ -1,0 +1,150 @@
+"""Scene `dovetail_sector`: one sector of a bladed disk with a dovetail root, from finite elements.
+
+Displacements of the reduced model: first the relative ones u_blade - u_disk, pair by pair in the order normal
+(positive when the pair closes), first tangent (axial, to the trailing edge), second tangent (along the flank,
+outwards); then modal coordinates of the glued sector. Pairs are numbered intrados (the flank at y > 0, the side that
+leads as the disk turns about +z), then extrados; from the leading to the trailing edge; from the inner to the outer
+end.
+
+The blade is excited and observed at mid-chord of its tip, perpendicular to the chord, positive to the intrados.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
+from studies.scene_error import SceneError
+from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
+from studies.scenes.dovetail_parameters import Parameters, check_parameters
+from studies.scenes.finite_element.assembly import SectorMatrices, assemble_geometric_stiffness, assemble_sector
+from studies.scenes.finite_element.contact_pairs import ContactPairs, build_contact_pairs, join_pairs
+from studies.scenes.finite_element.cyclic import CyclicSector, build_coordinates
+from studies.scenes.finite_element.hex_element import HexElements, elasticity_matrix
+from studies.scenes.finite_element.reduction import build_basis, project, solve_glued
+
+__all__ = ["Parameters", "build"]
+
+SURFACES = ("intrados", "extrados")
+
+
+def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
+    """Reduced model of the sector for the harmonics 0..n_harmonics of a travelling wave of `nodal_diameter`.
+
+    The centrifugal load enters the static harmonic only, the unit force of 1 N at the tip nodal diameter d only.
+    Stress stiffening takes the stress of the linear elastic sector with its flanks glued at the given speed, the usual
+    reference state of a modal analysis with prestress: in the blade it follows from equilibrium alone, and how the
+    flanks share the load matters only beside them. With spin softening, `-Omega^2` times the mass that moves across
+    the axis, it is part of every stiffness, the static one included. Coriolis forces are left out. The damping is
+    `loss_factor / omega_1` times the elastic stiffness, omega_1 the first frequency of the glued sector, rad/s, at
+    the nodal diameter of the excitation.
+
+    Raises SceneError where the parameters do not go together.
+    """
+    check_parameters(parameters)
+    mesh = build_dovetail_mesh(parameters)
+    pairs = build_pairs(mesh)
+    sector = build_sector(parameters, mesh)
+    matrices, stiffness = _sector_matrices(parameters, mesh, sector, pairs)
+    load = parameters.angular_speed**2 * matrices.load
+    tip = tip_row(parameters, mesh)
+    excited = parameters.nodal_diameter
+    wanted = needed_nodal_diameters(excited, parameters.n_sectors, n_harmonics)
+    linear: dict[int, LinearModel] = {}
+    damping = 0.0
+    # The excited nodal diameter first: the damping of all of them is scaled by its first frequency.
+    for k in sorted({excited, *wanted}, key=lambda k: (k != excited, k)):
+        try:
+            coordinates = build_coordinates(sector, pairs, k)
+            basis = build_basis(stiffness, matrices.mass, coordinates, parameters.stuck_modes)
+        except ValueError as error:
+            raise SceneError("rotation_speed", str(parameters.rotation_speed), f"reduce it: {error}") from error
+        if k == excited:
+            damping = parameters.loss_factor / basis.frequencies[0]
+        if k in wanted:
+            nodes = basis.nodal
+            linear[k] = LinearModel(
+                mass=project(matrices.mass, nodes),
+                damping=damping * project(matrices.stiffness, nodes),
+                stiffness=project(stiffness, nodes),
+                load_static=(nodes.real.T @ load) * (k == 0),
+                load_harmonic=(nodes.conj().T @ tip).astype(complex) * (k == excited),
+                response=(tip @ nodes)[None, :],
+            )
+    n_contact = len(pairs.area)
+    return ReducedModel(
+        linear={k: linear[k] for k in wanted},
+        contact=ContactInterface(
+            dofs=np.arange(3 * n_contact).reshape(n_contact, 3),
+            area=pairs.area,
+            gap=np.zeros(n_contact),
+            normal_load=np.zeros(n_contact),
+            position=pairs.position,
+            surface=tuple(np.repeat(SURFACES, n_contact // len(SURFACES)).tolist()),
+        ),
+        response_names=("tip",),
+        n_sectors=parameters.n_sectors,
+        nodal_diameter=parameters.nodal_diameter,
+    )
+
+
+def _sector_matrices(
+    parameters: Parameters, mesh: DovetailMesh, sector: CyclicSector, pairs: ContactPairs
+) -> tuple[SectorMatrices, sparse.csr_matrix]:
+    """Matrices at rest, and the stiffness (3 n_nodes, 3 n_nodes), N/m, with the effects of rotation if wanted."""
+    try:
+        hexes = build_elements(parameters, mesh)
+    except ValueError as error:
+        raise SceneError("mesh", str(parameters.mesh), f"change the geometry: {error}") from error
+    matrices = assemble_sector(mesh.mesh, hexes)
+    if not parameters.stress_stiffening:
+        return matrices, matrices.stiffness
+    rotation = parameters.angular_speed**2
+    glued = solve_glued(matrices.stiffness, rotation * matrices.load, build_coordinates(sector, pairs, 0))
+    geometric = assemble_geometric_stiffness(mesh.mesh, hexes, glued)
+    return matrices, matrices.stiffness + geometric - rotation * matrices.spin_mass
+
+
+def build_elements(parameters: Parameters, mesh: DovetailMesh) -> HexElements:
+    """Hexahedra of the sector with the material of the parameters."""
+    return HexElements(
+        coordinates=mesh.mesh.nodes[mesh.mesh.elements],
+        elasticity=elasticity_matrix(parameters.young_modulus, parameters.poisson_ratio),
+        density=parameters.density,
+    )
+
+
+def build_pairs(mesh: DovetailMesh) -> ContactPairs:
+    """Contact pairs of both flanks, intrados first; the blade moves, the disk is fixed."""
+    nodes = mesh.mesh.nodes
+    centre = nodes[mesh.blade_flanks].mean(axis=(0, 1, 2))
+    return join_pairs(
+        tuple(
+            build_contact_pairs(nodes, moving=blade, fixed=disk, inside=centre)
+            for blade, disk in zip(mesh.blade_flanks, mesh.disk_flanks, strict=True)
+        )
+    )
+
+
+def build_sector(parameters: Parameters, mesh: DovetailMesh) -> CyclicSector:
+    """Boundary conditions: bore clamped, cut faces tied to the neighbours."""
+    return CyclicSector(
+        n_nodes=len(mesh.mesh.nodes),
+        n_sectors=parameters.n_sectors,
+        clamped=mesh.bore_nodes,
+        left=mesh.left_nodes,
+        right=mesh.right_nodes,
+    )
+
+
+def tip_row(parameters: Parameters, mesh: DovetailMesh) -> FloatArray:
+    """Row (3 n_nodes,) that gives the displacement of the tip at mid-chord, perpendicular to the chord there.
+
+    The number of axial stations is even: mid-chord lies halfway between the two middle ones.
+    """
+    n_across, n_axial = mesh.tip_nodes.shape
+    middle = mesh.tip_nodes[n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
+    row = np.zeros((len(mesh.mesh.nodes), 3))
+    row[middle] = 0.5 * chord_directions(parameters.tip_stagger)[1]
+    return row.ravel()

@@ -1,0 +1,64 @@
+"""A spring-mounted mass that hits an elastic wall behind a gap: a bilinear spring as a unilateral contact.
+
+The wall is a spring to ground whose massless tip stands `gap` away from the resting mass. The closing displacement of
+the pair is `u_N = x - y` with x of the mass and y of the tip, so that in the coordinates (u_N, x) the energy of the
+wall spring is `wall_stiffness (x - u_N)^2 / 2`. Open, the tip rests (`u_N = x`); closed, `u_N = gap` and the contact
+takes up `wall_stiffness (x - gap)`: exactly the bilinear spring.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from solver.model import ContactInterface, LinearModel, ReducedModel
+
+
+class Parameters(BaseModel):
+    """Mass, mount and wall.
+
+    The defaults resonate at 0.159 Hz without the wall; made for excitations of about 0.02 N. There the response has two
+    stable branches, with and without impacts, between about 0.17 and 0.3 Hz.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    friction_coefficient: float = Field(
+        0.0, ge=0, description="Coulomb friction coefficient, 1; without influence: the pair has no tangent"
+    )
+    mass: float = Field(1.0, gt=0, description="mass, kg")
+    damping: float = Field(0.05, ge=0, description="viscous damping of the mount, N s/m")
+    stiffness: float = Field(1.0, gt=0, description="stiffness of the mount, N/m")
+    wall_stiffness: float = Field(100.0, gt=0, description="stiffness of the wall, N/m")
+    gap: float = Field(
+        0.1, description="distance between the resting mass and the wall, m; negative: they press on each other"
+    )
+    area: float = Field(1e-4, gt=0, description="contact area, m2")
+
+
+def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
+    """Reduced model in (closing displacement, displacement of the mass); the latter is the response.
+
+    `n_harmonics` has no influence: all harmonics see the same structure.
+    """
+    del n_harmonics
+    p = parameters
+    linear = LinearModel(
+        mass=np.diag([0.0, p.mass]),
+        damping=np.diag([0.0, p.damping]),
+        stiffness=np.array(
+            [[p.wall_stiffness, -p.wall_stiffness], [-p.wall_stiffness, p.wall_stiffness + p.stiffness]]
+        ),
+        load_static=np.zeros(2),
+        load_harmonic=np.array([0.0, 1.0], dtype=np.complex128),
+        response=np.array([[0.0, 1.0]]),
+    )
+    contact = ContactInterface(
+        dofs=np.array([[0, -1, -1]], dtype=np.int64),
+        area=np.array([p.area]),
+        gap=np.array([p.gap]),
+        normal_load=np.zeros(1),
+        position=np.full((1, 3), np.nan),
+        surface=("wall",),
+    )
+    return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass",))

@@ -1,0 +1,203 @@
+"""The command `run-study`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from studyrunner.ranks import LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
+from studyrunner.user_error import UserError
+
+if TYPE_CHECKING:
+    from studyrunner.study import Study
+
+CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+"""Exit statuses."""
+
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+_DESCRIPTION = """\
+Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
+
+Alone, under "mpiexec -n N run-study ..." or under "srun run-study ...": the result is the same."""
+
+_EPILOG = """\
+examples:
+  run-study                                              the bundled study "dovetail" -> dovetail.nc
+  run-study --plan                                       what that would compute, and how long it takes
+  mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
+  run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
+
+exit status:
+  0  all points were computed to tolerance
+  1  unexpected failure
+  2  bad input, nothing was computed: one line says what is wrong
+  3  finished and saved, but some points failed; their `outcome` says why"""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The command line. output: None for `<study name>.nc` in the current folder."""
+
+    study: str
+    output: Path | None
+    plan: bool
+    overrides: tuple[str, ...]
+    write_scene: Path | None
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports mistakes as UserError."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
+
+
+def parse_options(arguments: Sequence[str]) -> Options:
+    """The command line. Raises UserError; SystemExit after --help."""
+    parser = _Parser(
+        prog="run-study",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "study", nargs="?", default="dovetail", metavar="STUDY", help="TOML file or bundled study (default: dovetail)"
+    )
+    parser.add_argument("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)")
+    parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
+    )
+    parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
+    parser.add_argument(
+        "--fresh", action="store_true", help="start over; every run does so, as runs leave nothing to go on from"
+    )
+    found = parser.parse_args(list(arguments))
+    return Options(
+        study=found.study,
+        output=None if found.output is None else Path(found.output),
+        plan=found.plan,
+        overrides=tuple(found.overrides),
+        write_scene=None if found.write_scene is None else Path(found.write_scene),
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks."""
+    # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        ranks = start_ranks()
+    except LauncherError as error:
+        if launcher_rank() == 0:
+            print(f"run-study: launcher: {error}", file=sys.stderr)
+        return BAD_INPUT
+    try:
+        status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
+        ranks.close()
+    except BaseException as error:
+        # One rank's end must be the end of all: the others would wait for ever.
+        if isinstance(error, KeyboardInterrupt):
+            print("run-study: interrupted, nothing was written", file=sys.stderr)
+            status = INTERRUPTED
+        else:
+            print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
+            traceback.print_exc()
+            status = UNEXPECTED
+        ranks.abort(status)
+    return status
+
+
+def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
+    """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
+    try:
+        options = parse_options(arguments)
+        from studyrunner.study_file import read_study
+
+        study = read_study(options.study, options.overrides)
+        if options.plan:
+            status = _show_plan(study)
+        elif options.write_scene is not None:
+            status = _write_scene(study, options.write_scene)
+        else:
+            return _compute(ranks, study, options.output)
+    except UserError as error:
+        print(f"run-study: {error}", file=sys.stderr)
+        status = BAD_INPUT
+    except SystemExit:
+        status = CONVERGED
+    for rank in range(1, ranks.size):
+        ranks.send(None, rank)
+    return status
+
+
+def _follow(ranks: Ranks) -> int:
+    """Any other rank; rank 0 alone has an exit status to give."""
+    job = wait_for_message(ranks)
+    if job is not None:
+        from studyrunner.run import Job, work_on_job
+
+        if not isinstance(job, Job):
+            raise TypeError(f"rank 0 sent {job!r} instead of a job")
+        work_on_job(ranks, job)
+    return CONVERGED
+
+
+def _show_plan(study: Study) -> int:
+    from studyrunner.plan import format_plan
+    from studyrunner.scene import build_study_scene, describe_scene
+    from studyrunner.tasks import build_tasks
+
+    facts = describe_scene(build_study_scene(study))
+    print(format_plan(study, facts, build_tasks(study, facts.n_displacements)))
+    return CONVERGED
+
+
+def _write_scene(study: Study, path: Path) -> int:
+    from studyrunner.output import check_output
+    from studyrunner.scene import write_study_scene
+
+    target = check_output("--write-scene", path, study.files)
+    write_study_scene(study, target)
+    print(f"{path}: the scene of study {study.study.name}")
+    return CONVERGED
+
+
+def _compute(ranks: Ranks, study: Study, output: Path | None) -> int:
+    from studyrunner.output import check_output
+    from studyrunner.progress import RunProgress, format_seconds
+    from studyrunner.run import run_study
+    from studyrunner.scene import build_study_scene
+
+    path = Path(f"{study.study.name}.nc") if output is None else output
+    target = check_output("-o", path, study.files)
+    progress = RunProgress()
+    # Before anything is said: a wrong scene is bad input, which ends with one line.
+    model = build_study_scene(study)
+    with progress:
+        summary = run_study(ranks, study, model, target, progress)
+    failed = summary.n_points - summary.n_converged
+    print(
+        f"{path}: {summary.n_points} points, {summary.n_converged} computed to tolerance, {failed} failed,"
+        f" {format_seconds(progress.seconds)}"
+    )
+    for line in summary.failures:
+        print(f"  {line}")
+    return SOME_FAILED if failed else CONVERGED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

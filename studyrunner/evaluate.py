@@ -1,0 +1,131 @@
+"""Task -> result: the only importer of the solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.history import StartState, WearHistory
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from studyrunner.results import BranchResult, MarchResult
+from studyrunner.tasks import BranchTask, MarchTask, Settings
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """One way for a computation to end: its number and word in the result file and the sentence for the user."""
+
+    number: int
+    meaning: str
+    sentence: str
+
+
+CONVERGED = int(Outcome.CONVERGED)
+
+
+def endings() -> tuple[Ending, ...]:
+    """All ways for a computation to end, by number."""
+    return tuple(Ending(int(outcome), outcome.meaning, outcome.sentence) for outcome in sorted(Outcome))
+
+
+def build_evaluator(
+    model: ReducedModel, friction_coefficient: float
+) -> Callable[[BranchTask | MarchTask], BranchResult | MarchResult]:
+    """The function that does the tasks of a study on this model."""
+
+    def evaluate(task: BranchTask | MarchTask) -> BranchResult | MarchResult:
+        if isinstance(task, BranchTask):
+            return follow(model, friction_coefficient, task)
+        return march(model, friction_coefficient, task)
+
+    return evaluate
+
+
+def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -> BranchResult:
+    """Start states of one branch."""
+    # numba is loaded where a task runs, so that --plan and --help do without it.
+    from solver.continuation import follow_branch
+
+    starts = follow_branch(
+        model,
+        friction_coefficient,
+        task.excitation_amplitude,
+        np.array(task.frequencies),
+        cast("Literal['up', 'down']", task.sweep),
+        _solver_settings(task.settings),
+    )
+    return BranchResult(starts=starts, activity=tuple(_activity(start) for start in starts))
+
+
+def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> MarchResult:
+    """Wear history from the start state of the task."""
+    from solver.march import march_wear
+
+    if not isinstance(task.start, StartState):
+        raise TypeError(f"task without a start state: {task}")
+    wanted = (0.0,) if task.held else task.cycles
+    # The march begins at cycle 0, whether that count is kept or not.
+    counts = wanted if wanted[0] == 0.0 else (0.0, *wanted)
+    history = march_wear(
+        model,
+        friction_coefficient,
+        task.start,
+        task.wear_coefficient,
+        task.step,
+        cast("Literal['explicit', 'implicit']", task.scheme),
+        np.array(counts),
+        _solver_settings(task.settings),
+        largest_depth=task.largest_depth,
+    )
+    return build_result(task, history)
+
+
+def build_result(task: MarchTask, history: WearHistory) -> MarchResult:
+    """What the result file holds of a history: the output counts and variables that the task asks for."""
+    if task.held:
+        rows = np.zeros(len(task.cycles), dtype=np.int64)
+    else:
+        rows = np.arange(len(history.cycles) - len(task.cycles), len(history.cycles))
+    return MarchResult(
+        points=task.points,
+        outcome=int(history.outcome),
+        values={name: _variable(history, name)[rows] for name in task.variables},
+        jump_cycle=history.jump_cycle,
+        error_estimate=history.error_estimate,
+        newton_iterations=history.newton_iterations,
+        run_time=history.run_time,
+    )
+
+
+def _variable(history: WearHistory, name: str) -> FloatArray:
+    """A variable of the result, its first dimension the output counts of the history."""
+    if name == "response_amplitude":
+        return np.abs(history.response)
+    if name == "response_phase":
+        return np.angle(history.response)
+    return cast("FloatArray", getattr(history, name))
+
+
+def _activity(start: StartState) -> float:
+    """Size of the relative motion in the joint without its mean, m; 0 where there is no state."""
+    if start.state is None:
+        return 0.0
+    return float(np.linalg.norm(start.state.displacement_h[:, :, 1:]))
+
+
+def _solver_settings(settings: Settings) -> SolverSettings:
+    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance)
+
+
+def describe_failures(outcomes: Sequence[int]) -> tuple[str, ...]:
+    """One line for each way in which points failed: how many of them, and the sentence."""
+    counts = {ending: outcomes.count(ending.number) for ending in endings() if ending.number != CONVERGED}
+    return tuple(f"{count} x {ending.meaning}: {ending.sentence}" for ending, count in counts.items() if count)

@@ -1,0 +1,45 @@
+"""The files that a run writes: where they go, checked before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from studyrunner.user_error import UserError
+
+
+def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
+    """The file that `path` stands for, links followed, after a try whether it can be written.
+
+    option: the one on the command line that gave the path. inputs: files that the run reads and must not replace.
+    Nothing is changed. Raises UserError.
+    """
+
+    def wrong(remedy: str) -> UserError:
+        return UserError("command line", option, str(path), remedy)
+
+    target = Path(os.path.realpath(path))
+    try:
+        if target.is_dir():
+            raise wrong("give the name of a file: this is a folder")
+        if not target.parent.is_dir():
+            raise wrong(f"give a file in a folder that exists: there is no folder {path.parent}")
+        if target.exists():
+            if not target.is_file():
+                raise wrong("give the name of an ordinary file")
+            if not os.access(target, os.W_OK):
+                raise wrong("give a file that may be written: this one is write-protected")
+            if any(source.exists() and target.samefile(source) for source in inputs):
+                raise wrong("give another file: this one is read by the run")
+        trial = partial_path(target)
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise wrong(f"give a file that can be written: {error.strerror}") from None
+    return target
+
+
+def partial_path(path: Path) -> Path:
+    """Where the file `path` is written before it is renamed: in the same folder, one name for each process."""
+    return path.with_name(f".{path.name}.{os.getpid()}.partial")

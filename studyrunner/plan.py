@@ -1,0 +1,55 @@
+"""What `--plan` prints: what would be computed, what is left out and why, how long it takes and how large it gets."""
+
+from __future__ import annotations
+
+import math
+
+from studyrunner.estimate import memory_a_rank
+from studyrunner.progress import count, format_seconds
+from studyrunner.scene import SceneFacts
+from studyrunner.study import Study
+from studyrunner.tasks import TaskPlan
+from studyrunner.variables import ASKED, KEPT
+
+
+def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
+    """The plan of a study in lines for a reader."""
+    marches = [task for line in plan.marches for task in line]
+    n_tasks = len(plan.branches) + len(marches)
+    n_values = _result_values(study, facts, plan.n_points)
+    shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
+    contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
+    branches = f"{count(len(plan.branches), 'branch', 'branches')} along the frequency"
+    left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or ["nothing"]
+    size = n_values * 8 / 1e6
+    memory = memory_a_rank(plan.n_unknowns, n_values) / 1e9
+    rows = [
+        ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
+        ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
+        ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
+        (
+            "cycles",
+            f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept",
+        ),
+        ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
+        ("unknowns", f"{plan.n_unknowns} at most in one task"),
+        *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
+        ("time", f"about {format_seconds(plan.cost)} on one rank, {_on_two(plan)} on two (rough estimate)"),
+        ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
+    ]
+    return "\n".join(f"{label:<10} {text}" for label, text in rows)
+
+
+def _on_two(plan: TaskPlan) -> str:
+    """Estimated time on two ranks: the longest way through a branch and a march bounds it."""
+    longest = max(
+        branch.cost + max((task.cost for task in line), default=0.0)
+        for branch, line in zip(plan.branches, plan.marches, strict=True)
+    )
+    return format_seconds(max(longest, plan.cost / 2.0))
+
+
+def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
+    sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    asked = (ASKED[name] for name in study.outputs.variables)
+    return n_points * (len(KEPT) + sum(math.prod(sizes[name] for name in entry.dimensions) for entry in asked))

@@ -1,0 +1,197 @@
+"""The ranks of a run: processes that a launcher started together, or one process alone.
+
+The only importer of mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All calls of
+MPI come from the main thread, so that any MPI library will do (MPI_THREAD_FUNNELED).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import sys
+import time
+import warnings
+from collections.abc import Mapping
+from importlib import metadata
+from typing import Protocol
+
+POLL_SECONDS = 1e-3
+"""How long a rank sleeps between two looks for a message: a blocking receive would keep a core busy."""
+
+_SECONDS_TO_PRINT = 1.0
+
+_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
+_SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
+_REMEDY = (
+    "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
+    " the site's MPI"
+)
+
+
+_PACKAGED_LIBRARIES = (
+    *("libucm.so.0", "libucs.so.0", "libuct.so.0", "libucp.so.0", "libfabric.so.1"),
+    "libmpi.so.12",
+)
+"""Files of the package mpich, each after those that it depends on."""
+
+
+class LauncherError(Exception):
+    """The launcher started several processes that cannot talk to each other: each would compute the whole study."""
+
+
+class Ranks(Protocol):
+    """Processes that send each other Python objects. Messages between two ranks arrive in the order of sending."""
+
+    @property
+    def rank(self) -> int:
+        """Number of this process, 0 for the one that hands out the work."""
+
+    @property
+    def size(self) -> int:
+        """Number of processes."""
+
+    def send(self, message: object, rank: int) -> None:
+        """Sends without waiting for the receiver."""
+
+    def receive(self) -> tuple[int, object] | None:
+        """The rank that sent the next message and the message, or None where there is none yet."""
+
+    def close(self) -> None:
+        """Ends the communication in good order; called once, by every rank."""
+
+    def abort(self, status: int) -> None:
+        """Ends all ranks at once; returns only where there is no other one."""
+
+
+class Alone:
+    """A run of one process, without MPI."""
+
+    rank = 0
+    size = 1
+
+    def send(self, message: object, rank: int) -> None:
+        """There is nobody to send to: a call is a bug."""
+        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
+
+    def receive(self) -> tuple[int, object] | None:
+        """Nobody sends."""
+        return None
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+    def abort(self, status: int) -> None:
+        """Nobody waits."""
+
+
+class MpiRanks:
+    """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
+
+    def __init__(self) -> None:
+        import mpi4py
+
+        _load_packaged_library()
+        # Started and ended here rather than by the import: the launcher is compared with the library before.
+        mpi4py.rc(initialize=False, finalize=False)
+        from mpi4py import MPI
+
+        library = MPI.get_vendor()[0]
+        if "OMPI_COMM_WORLD_SIZE" in os.environ and library != "Open MPI":
+            raise LauncherError(f"the launcher is that of Open MPI, the library is {library}")
+        with warnings.catch_warnings():
+            # start_ranks says the same with the remedy.
+            warnings.filterwarnings("ignore", "suspicious MPI execution environment", RuntimeWarning)
+            MPI.Init_thread(MPI.THREAD_FUNNELED)
+        self._mpi = MPI
+        self._world = MPI.COMM_WORLD
+        self._sent: list[MPI.Request] = []
+        self.rank: int = self._world.Get_rank()
+        self.size: int = self._world.Get_size()
+
+    def send(self, message: object, rank: int) -> None:
+        """As in Ranks."""
+        self._sent = [request for request in self._sent if not request.Test()]
+        self._sent.append(self._world.isend(message, dest=rank))
+
+    def receive(self) -> tuple[int, object] | None:
+        """As in Ranks."""
+        status = self._mpi.Status()
+        # The matched probe takes the message out at once: a receive after it gets this one and no other.
+        matched = self._world.improbe(status=status)
+        return None if matched is None else (status.Get_source(), matched.recv())
+
+    def close(self) -> None:
+        """As in Ranks."""
+        self._mpi.Request.Waitall(self._sent)
+        self._mpi.Finalize()
+
+    def abort(self, status: int) -> None:
+        """As in Ranks."""
+        # The launcher passes on what a rank prints; what it has not passed on when it is told to end all is lost.
+        sys.stderr.flush()
+        time.sleep(_SECONDS_TO_PRINT)
+        self._world.Abort(status)
+
+
+def start_ranks() -> Ranks:
+    """The ranks that the launcher started, or this process alone where there is no launcher.
+
+    Raises LauncherError where the launcher started more processes than the MPI library knows of.
+    """
+    if not any(name in os.environ for name in _SIGNS):
+        return Alone()
+    announced = launcher_size()
+    try:
+        ranks = MpiRanks()
+    except (ImportError, RuntimeError, LauncherError) as error:
+        if announced <= 1:
+            return Alone()
+        raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
+    if announced > ranks.size:
+        ranks.close()
+        raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
+    return ranks
+
+
+def _load_packaged_library() -> None:
+    """Loads the MPI library that is installed as a Python package, where there is one, with what it depends on.
+
+    mpi4py looks for that library first. Its own dependencies, however, are searched in LD_LIBRARY_PATH first, which may
+    lead to those of another MPI on the machine; loaded from their places before, they are taken from there.
+    """
+    if "MPI4PY_LIBMPI" in os.environ or sys.platform != "linux":
+        return
+    try:
+        files = metadata.files("mpich") or []
+    except metadata.PackageNotFoundError:
+        return
+    for name in _PACKAGED_LIBRARIES:
+        for file in files:
+            if file.name == name:
+                # Where this fails, mpi4py looks for a library on its own, and says so where it finds none.
+                with contextlib.suppress(OSError):
+                    ctypes.CDLL(str(file.locate()), mode=os.RTLD_LAZY | os.RTLD_LOCAL)
+
+
+def wait_for_message(ranks: Ranks) -> object:
+    """The next message, whenever it comes; for ranks that have nothing else to do."""
+    while (received := ranks.receive()) is None:
+        time.sleep(POLL_SECONDS)
+    return received[1]
+
+
+def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of this process as the launcher counts, 0 without one; known without MPI."""
+    return max(_count(environment, name) for name in _RANKS)
+
+
+def launcher_size(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of processes that the launcher says it started, 0 where none says so."""
+    return max(_count(environment, name) for name in _SIZES)
+
+
+def _count(environment: Mapping[str, str], name: str) -> int:
+    text = environment.get(name, "")
+    return int(text) if text.isdecimal() else 0

@@ -1,0 +1,39 @@
+"""What a task hands back: plain arrays, ready to be sent between ranks and put into the result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.tasks import Index
+
+
+@dataclass(frozen=True)
+class BranchResult:
+    """Start states of a branch, one per frequency.
+
+    starts: what a march starts from. activity: for each, how much moves in the joint, in arbitrary units: points that
+    move more wear more and take longer.
+    """
+
+    starts: tuple[object, ...]
+    activity: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class MarchResult:
+    """History of the points of one task.
+
+    values: variable -> array with the dimensions of that variable after the axes; NaN where there is no result.
+    """
+
+    points: tuple[Index, ...]
+    outcome: int
+    values: Mapping[str, NDArray[np.float64]]
+    jump_cycle: float
+    error_estimate: float
+    newton_iterations: int
+    run_time: float

@@ -1,0 +1,251 @@
+"""The study: what a study file says, checked, frozen and with every default filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
+
+from studyrunner.user_error import WrongValueError
+from studyrunner.values import (
+    axis_of,
+    one_of,
+    read_fraction,
+    read_not_negative,
+    read_number,
+    read_positive,
+    refuse_later,
+    whole_number,
+)
+from studyrunner.variables import ASKED, KEPT
+
+SOLVER_AXES = ("harmonics", "samples", "tolerance")
+AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
+
+_AUTO = 'give a number: "auto" is not part of this version'
+_read_harmonics = refuse_later("auto", _AUTO, whole_number(1))
+_read_samples = refuse_later("auto", _AUTO, whole_number(4))
+_read_scheme = refuse_later(
+    "adaptive", 'give "implicit" or "explicit": "adaptive" is not part of this version', one_of("explicit", "implicit")
+)
+
+PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
+NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
+HarmonicsAxis = Annotated[tuple[int, ...], BeforeValidator(axis_of(_read_harmonics))]
+SamplesAxis = Annotated[tuple[int, ...], BeforeValidator(axis_of(_read_samples))]
+ToleranceAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
+Scheme = Literal["explicit", "implicit"]
+Sweep = Literal["up", "down"]
+
+
+def _read_name(value: object) -> str:
+    if not isinstance(value, str) or not value.strip() or value.startswith(".") or not value.isprintable():
+        raise WrongValueError(value, "give a name that can be a file name")
+    if "/" in value or "\\" in value or len(value) > 100:
+        raise WrongValueError(value, "give a name of at most 100 characters without a slash")
+    return value
+
+
+def _read_text(value: object) -> str:
+    if not isinstance(value, str):
+        raise WrongValueError(value, "give a text in quotes")
+    return value
+
+
+def _read_outputs(value: object) -> int | tuple[float, ...]:
+    if not isinstance(value, list | tuple):
+        return whole_number(1)(value)
+    counts = tuple(read_not_negative(item) for item in value)
+    if not counts or any(later <= earlier for earlier, later in pairwise(counts)):
+        raise WrongValueError(value, "give a number of outputs or an ascending list of cycle counts")
+    return counts
+
+
+def _read_variables(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise WrongValueError(value, "give a list of names of result variables")
+    known = (*ASKED, *KEPT)
+    for name in value:
+        if name not in known:
+            raise WrongValueError(name, f"give names out of {', '.join(known)}")
+        if list(value).count(name) > 1:
+            raise WrongValueError(name, "give every name once")
+    return tuple(name for name in ASKED if name in value)
+
+
+def _read_loops(value: object) -> tuple[int, ...]:
+    if value not in ([], ()):
+        raise WrongValueError(value, "give [] or leave the key out: fretting loops are not part of this version")
+    return ()
+
+
+class Section(BaseModel):
+    """A table of the study file: frozen, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class StudySection(Section):
+    """[study]: how the study is called."""
+
+    name: Annotated[str, BeforeValidator(_read_name)] = Field(description="name of the study and of its result file")
+    title: Annotated[str, BeforeValidator(_read_text)] = Field("", description="goes into the result")
+
+
+class AxesSection(Section):
+    """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
+
+    frequency: PositiveAxis = Field(description="Hz; a number, a list or {start, stop, num}")
+    wear_coefficient: NotNegativeAxis = Field((1.1e-11,), description="1/Pa")
+    excitation_amplitude: PositiveAxis = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
+    step: PositiveAxis = Field((1000.0,), description="h, cycles")
+    scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
+        ("implicit",), description="of the wear steps"
+    )
+    sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down")))] = Field(
+        ("up",), description="the branch followed at cycle 0"
+    )
+    harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
+    samples: SamplesAxis | None = Field(None, description="time samples in a period")
+    tolerance: ToleranceAxis | None = Field(None, description="of the scaled residual")
+
+
+class SlowTimeSection(Section):
+    """[slow_time]: how far, and which cycle counts are kept."""
+
+    cycles: Annotated[float, BeforeValidator(read_not_negative)] = Field(
+        100_000.0, description="cycles; 0 for the unworn states only"
+    )
+    outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
+        101, description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts"
+    )
+    largest_depth: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+        None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
+    )
+
+
+class SolverSection(Section):
+    """[solver]: how finely and how exactly. A key that stands under [axes] is not used from here."""
+
+    harmonics: Annotated[int, BeforeValidator(_read_harmonics)] = Field(5, description="harmonics above the static one")
+    samples: Annotated[int, BeforeValidator(_read_samples)] = Field(128, description="time samples in a period")
+    tolerance: Annotated[float, BeforeValidator(read_fraction)] = Field(1e-8, description="of the scaled residual")
+    rtol: Annotated[float, BeforeValidator(read_fraction)] = Field(
+        1e-2, description="relative error that automatic settings aim at"
+    )
+
+
+class OutputsSection(Section):
+    """[outputs]: which variables the result holds; `outcome` and the totals of a point are always there."""
+
+    variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
+        tuple(ASKED), description="names of result variables"
+    )
+    loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field((), description="contact indices")
+
+
+class SceneFileParameters(Section):
+    """[scene] of a scene file: the file says all the rest."""
+
+    friction_coefficient: Annotated[float, BeforeValidator(read_not_negative)] = Field(
+        description="a number, 0 or more"
+    )
+
+
+class SceneSection(Section):
+    """[scene]: which model, and the parameters that this model knows.
+
+    parameters: checked object of the class that the scene names, with at least `friction_coefficient`.
+    """
+
+    model: Annotated[str, BeforeValidator(_read_text)]
+    parameters: SerializeAsAny[BaseModel]
+
+    @property
+    def is_file(self) -> bool:
+        """Whether the model is a scene file rather than a bundled scene."""
+        return names_file(self.model)
+
+
+class Study(Section):
+    """A whole study.
+
+    source: the file that it was read from, as the user named it. folder: the one that this file stands in.
+    """
+
+    study: StudySection
+    scene: SceneSection
+    axes: AxesSection
+    slow_time: SlowTimeSection = SlowTimeSection()
+    solver: SolverSection = SolverSection()
+    outputs: OutputsSection = OutputsSection()
+    source: str = Field(exclude=True)
+    folder: Path = Field(exclude=True)
+
+    @model_validator(mode="after")
+    def _check_samples(self) -> Study:
+        most, fewest = max(self.solver_values("harmonics")), min(self.solver_values("samples"))
+        if fewest <= 2 * most:
+            table = "solver" if self.axes.samples is None else "axes"
+            raise WrongValueError(
+                int(fewest),
+                f"give more than twice the {int(most)} harmonics, at least {2 * int(most) + 1}",
+                f"{table}.samples",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_outputs(self) -> Study:
+        cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
+        if isinstance(outputs, tuple):
+            if outputs[-1] > cycles:
+                remedy = f"give cycle counts of at most slow_time.cycles = {cycles:g}"
+                raise WrongValueError(outputs[-1], remedy, "slow_time.outputs")
+        elif outputs < 2 and cycles > 0.0:
+            raise WrongValueError(outputs, "give at least 2: cycle 0 and the last one", "slow_time.outputs")
+        return self
+
+    @property
+    def scene_path(self) -> Path:
+        """Path of the scene file; only where the scene is one."""
+        return self.folder / self.scene.model
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files that a run of the study reads."""
+        study_file = self.folder / Path(self.source).name
+        return (study_file, self.scene_path) if self.scene.is_file else (study_file,)
+
+    @property
+    def friction_coefficient(self) -> float:
+        """Coulomb's coefficient of the scene."""
+        return read_number(dict(self.scene.parameters)["friction_coefficient"])
+
+    @property
+    def cycles_kept(self) -> tuple[float, ...]:
+        """Cycle counts of the result, ascending."""
+        cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
+        if isinstance(outputs, tuple):
+            return outputs
+        if cycles == 0.0:
+            return (0.0,)
+        return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
+
+    def solver_values(self, key: str) -> tuple[float, ...]:
+        """Values of a solver key, from its axis or the one under [solver]."""
+        values: tuple[float, ...] | None = getattr(self.axes, key)
+        return (getattr(self.solver, key),) if values is None else values
+
+    @property
+    def dimensions(self) -> Mapping[str, tuple[float, ...] | tuple[str, ...]]:
+        """Name and values of the axes of the result, in its order; solver keys only where they are axes."""
+        names = (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        return {name: getattr(self.axes, name) for name in names}
+
+
+def names_file(model: str) -> bool:
+    """Whether the text under `scene.model` names a scene file: a path, or a name with an HDF5 ending."""
+    return "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")

@@ -1,0 +1,201 @@
+"""Study -> tasks: the branches to follow and the points to march from them, and what is left out and why."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from studyrunner.estimate import ITERATIONS_A_STATE, ITERATIONS_A_STEP, seconds_an_iteration
+from studyrunner.study import SOLVER_AXES, Study
+
+Index = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Solver keys of a task."""
+
+    harmonics: int
+    samples: int
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class BranchTask:
+    """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N).
+
+    number: of the branch in the study. cost: estimated seconds.
+    """
+
+    number: int
+    excitation_amplitude: float
+    sweep: str
+    settings: Settings
+    frequencies: tuple[float, ...]
+    cost: float
+
+
+@dataclass(frozen=True)
+class MarchTask:
+    """One wear history from a start state on a branch.
+
+    branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
+    cycle 0 holds for all cycles; wear_coefficient, step and scheme are then those of the first point.
+    cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
+    variables: what is kept. start: start state, None until its branch is done. cost: estimated seconds.
+    """
+
+    branch: int
+    position: int
+    settings: Settings
+    wear_coefficient: float
+    step: float
+    scheme: str
+    largest_depth: float | None
+    held: bool
+    cycles: tuple[float, ...]
+    points: tuple[Index, ...]
+    variables: tuple[str, ...]
+    cost: float
+    start: object = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Points that are not computed on their own, and why."""
+
+    n_points: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """All tasks of a study. marches: for each branch, the tasks that start from it. n_unknowns: in the largest task."""
+
+    branches: tuple[BranchTask, ...]
+    marches: tuple[tuple[MarchTask, ...], ...]
+    left_out: tuple[LeftOut, ...]
+    n_points: int
+    n_unknowns: int
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one rank."""
+        marches = itertools.chain.from_iterable(self.marches)
+        return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
+
+
+_HELD_FOR = {
+    "cycles": "slow_time.cycles = 0 asks for the unworn states, the same for every wear coefficient, step and scheme",
+    "wear_coefficient": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
+    "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
+}
+
+
+def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
+    """Tasks of a study whose scene has `n_displacements` relative displacements.
+
+    Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
+    their own never do. The order and the numbers of the tasks depend on the study alone.
+    """
+    sizes = [len(values) for values in study.dimensions.values()]
+    ascending = sorted(range(sizes[0]), key=lambda place: study.axes.frequency[place])
+    branches: list[BranchTask] = []
+    marches: list[tuple[MarchTask, ...]] = []
+    counts = dict.fromkeys(_HELD_FOR, 0)
+    for line in _lines(study):
+        settings = _settings(study, line)
+        seconds = seconds_an_iteration(n_displacements * (2 * settings.harmonics + 1))
+        branches.append(
+            BranchTask(
+                number=len(branches),
+                excitation_amplitude=study.axes.excitation_amplitude[line[0]],
+                sweep=study.axes.sweep[line[1]],
+                settings=settings,
+                frequencies=tuple(study.axes.frequency[place] for place in ascending),
+                cost=seconds * ITERATIONS_A_STATE * len(ascending),
+            )
+        )
+        marches.append(
+            tuple(
+                task
+                for position, place in enumerate(ascending)
+                for task in _marches(study, (len(marches), position), place, line, seconds, counts)
+            )
+        )
+    most_harmonics = int(max(study.solver_values("harmonics")))
+    return TaskPlan(
+        branches=tuple(branches),
+        marches=tuple(marches),
+        left_out=tuple(LeftOut(count, _HELD_FOR[cause]) for cause, count in counts.items() if count),
+        n_points=math.prod(sizes),
+        n_unknowns=n_displacements * (2 * most_harmonics + 1),
+    )
+
+
+def _lines(study: Study) -> Iterator[Index]:
+    """Indices of excitation amplitude, sweep and solver keys: what a branch along the frequency is followed for."""
+    solver = [len(study.solver_values(key)) for key in SOLVER_AXES]
+    sizes = (len(study.axes.excitation_amplitude), len(study.axes.sweep), *solver)
+    return itertools.product(*(range(size) for size in sizes))
+
+
+def _settings(study: Study, line: Index) -> Settings:
+    harmonics, samples, tolerance = (
+        study.solver_values(key)[place] for key, place in zip(SOLVER_AXES, line[2:], strict=True)
+    )
+    return Settings(int(harmonics), int(samples), float(tolerance))
+
+
+def _marches(
+    study: Study, branch: tuple[int, int], frequency: int, line: Index, seconds: float, counts: dict[str, int]
+) -> list[MarchTask]:
+    """Tasks of all points at one frequency of one branch; adds the points that share one to `counts`, by cause."""
+    axes, slow_time = study.axes, study.slow_time
+    shared: dict[tuple[object, ...], list[Index]] = {}
+    for wear, step, scheme in itertools.product(
+        range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme))
+    ):
+        cause: str | None = None
+        key: tuple[object, ...] = (wear, step, scheme)
+        if slow_time.cycles == 0.0:
+            cause, key = "cycles", ("held",)
+        elif axes.wear_coefficient[wear] == 0.0:
+            cause, key = "wear_coefficient", ("held",)
+        elif slow_time.largest_depth is not None and axes.scheme[scheme] == "explicit":
+            cause, key = "largest_depth", (wear, "explicit")
+        if key in shared and cause is not None:
+            counts[cause] += 1
+        shared.setdefault(key, []).append((wear, step, scheme))
+    tasks = []
+    for key, members in shared.items():
+        wear, step, scheme = members[0]
+        held = key == ("held",)
+        n_steps = 1 if held else max(study.cycles_kept[-1] / axes.step[step], len(study.cycles_kept))
+        tasks.append(
+            MarchTask(
+                branch=branch[0],
+                position=branch[1],
+                settings=_settings(study, line),
+                wear_coefficient=axes.wear_coefficient[wear],
+                step=axes.step[step],
+                scheme=axes.scheme[scheme],
+                largest_depth=slow_time.largest_depth if axes.scheme[scheme] == "explicit" else None,
+                held=held,
+                cycles=study.cycles_kept,
+                points=tuple(_point(study, frequency, line, member) for member in members),
+                variables=study.outputs.variables,
+                cost=seconds * ITERATIONS_A_STEP * n_steps,
+            )
+        )
+    return tasks
+
+
+def _point(study: Study, frequency: int, line: Index, member: Index) -> Index:
+    """Index of a point along the dimensions of the study."""
+    places = dict(zip(("excitation_amplitude", "sweep", *SOLVER_AXES), line, strict=True))
+    places.update(zip(("wear_coefficient", "step", "scheme"), member, strict=True))
+    places["frequency"] = frequency
+    return tuple(places[name] for name in study.dimensions)

@@ -1,0 +1,127 @@
+"""run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+FAKED = str(Path(__file__).with_name("run_faked.py"))
+GRID = [
+    "sdof_slider",
+    *("--set", "axes.frequency={start = 100, stop = 160, num = 13}"),
+    *("--set", "axes.sweep=['up', 'down']"),
+    *("--set", "axes.step=[500, 1000]"),
+    *("--set", "axes.wear_coefficient=[0, 1e-11]"),
+]
+
+
+def mpiexec() -> str:
+    """The launcher of the environment that the tests run in; the one on the path where it has none."""
+    own = Path(sys.executable).with_name("mpiexec")
+    found = str(own) if own.exists() else shutil.which("mpiexec")
+    if found is None:
+        pytest.fail("the tests need the extra mpi: there is no mpiexec")
+    return found
+
+
+def start(
+    n_ranks: int, arguments: list[str], folder: Path, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Runs under mpiexec, or alone for 0 ranks; never hangs."""
+    launcher = [mpiexec(), "-n", str(n_ranks)] if n_ranks else []
+    command = [*launcher, sys.executable, *arguments]
+    variables = {**os.environ, **(environment or {})}
+    return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
+    results = {}
+    for n_ranks in (0, 1, 2, 4):
+        done = start(n_ranks, [FAKED, *GRID, "-o", f"{n_ranks}.nc"], tmp_path)
+        assert done.returncode == 0, done.stderr
+        (summary,) = done.stdout.splitlines()
+        assert summary.startswith(f"{n_ranks}.nc: 208 points, 208 computed to tolerance, 0 failed")
+        with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
+            results[n_ranks] = result.load().drop_vars("run_time")
+    for n_ranks in (1, 2, 4):
+        xr.testing.assert_identical(results[n_ranks], results[0])
+
+
+def test_real_tasks_give_the_same_on_one_and_on_two_ranks(tmp_path: Path) -> None:
+    arguments = [
+        *("-m", "studyrunner.cli", "sdof_slider"),
+        *("--set", "axes.frequency=[150, 165, 180]"),
+        *("--set", "solver.harmonics=3"),
+        *("--set", "solver.samples=64"),
+        *("--set", "slow_time.cycles=2000"),
+        *("--set", "slow_time.outputs=3"),
+    ]
+    root = Path(__file__).parents[2]
+    results = []
+    for n_ranks in (0, 2):
+        done = start(n_ranks, [*arguments, "-o", f"{n_ranks}.nc"], tmp_path, {"PYTHONPATH": str(root)})
+        assert done.returncode in (0, 3), done.stderr
+        with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
+            results.append(result.load().drop_vars("run_time"))
+    xr.testing.assert_identical(*results)
+
+
+@pytest.mark.parametrize("n_ranks", [2, 4])
+def test_uneven_tasks_are_balanced_while_running(n_ranks: int, tmp_path: Path) -> None:
+    done = start(n_ranks, [FAKED, *GRID], tmp_path, {"FAKE_SECONDS": "0.08"})
+    assert done.returncode == 0, done.stderr
+    loads = [sum(map(float, path.read_text().split())) for path in tmp_path.glob("rank*.txt")]
+    assert len(loads) == n_ranks
+    assert max(loads) < 1.25 * sum(loads) / n_ranks
+
+
+@pytest.mark.parametrize("failing", [0, 1])
+def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None:
+    done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": str(failing)})
+    assert done.returncode == 1
+    assert f"unexpected failure on rank {failing} of 2" in done.stderr
+    assert "ZeroDivisionError: a task that fails" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("n_ranks", [0, 2])
+def test_bad_input_is_said_once(n_ranks: int, tmp_path: Path) -> None:
+    done = start(n_ranks, [FAKED, "sdof_slider", "--set", "axes.frequency=-1"], tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "sdof_slider: axes.frequency = -1: " in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--plan", "--help"])
+def test_printed_once(option: str, tmp_path: Path) -> None:
+    assert start(2, [FAKED, option], tmp_path).stdout == start(0, [FAKED, option], tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [{"PMI_SIZE": "3"}, {"SLURM_STEP_NUM_TASKS": "3"}, {"OMPI_COMM_WORLD_SIZE": "3"}],
+    ids=["more than MPI knows of", "srun without MPI", "launcher of Open MPI"],
+)
+@pytest.mark.parametrize("rank", [0, 1])
+def test_launcher_of_another_mpi(environment: dict[str, str], rank: int, tmp_path: Path) -> None:
+    """Processes that do not find each other say so once and compute nothing."""
+    done = start(0, [FAKED, *GRID], tmp_path, {**environment, "SLURM_PROCID": str(rank)})
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert len(lines) == (1 if rank == 0 else 0)
+    assert all("3 processes were started" in line and "mpiexec" in line for line in lines)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_more_ranks_than_tasks(tmp_path: Path) -> None:
+    done = start(4, [FAKED, "two_masses", "--set", "axes.frequency=0.1"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "two_masses.nc").exists()

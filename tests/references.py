@@ -1,0 +1,297 @@
+"""References with exact or closed answers, for tests of everything above them.
+
+All of them are general in their parameters, in SI units, and share no code with the solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+
+from tests.event_driven import (
+    FloatArray,
+    NoPeriodicMotionError,
+    Orbit,
+    Phase,
+    PiecewiseLinear,
+    close_orbit,
+    solve_orbit,
+)
+
+__all__ = [
+    "NoPeriodicMotionError",
+    "Orbit",
+    "StopsOccurError",
+    "coulomb_orbit",
+    "den_hartog_amplitude",
+    "slider_amplitude",
+    "slider_orbit",
+    "slider_wear_depth",
+    "vibro_impact_orbit",
+]
+
+
+class StopsOccurError(ValueError):
+    """Den Hartog's closed form does not hold: the mass stops, or its amplitude has no bound."""
+
+
+def den_hartog_amplitude(mass: float, stiffness: float, force: float, friction_force: float, omega: float) -> float:
+    """Amplitude, m, of a mass on a spring under force cos(omega t) with rigid Coulomb friction alone, without stops.
+
+    Den Hartog (1931): `X = sqrt(V^2 - (F_f/F)^2 G^2) F/k`, `V = 1/(1 - r^2)`,
+    `G = sin(pi/r) / (r (1 + cos(pi/r))) = tan(pi/(2 r)) / r`, `r = omega/omega_0`.
+
+    From the turn at x = X on (tau = omega_0 t), the solution of `x'' + x = (F/k) cos(r tau + phi) + F_f/k` has
+    `x'(tau) = -r X sin(r tau) + (F_f/k) (sin tau + r G (cos(r tau) - cos tau))`, which must stay negative until the
+    next turn at tau = pi/r: `X > S F_f/k`, S the largest `(sin tau + r G (cos(r tau) - cos tau)) / (r sin(r tau))`.
+    Its value 1/r^2 at tau = 0 says that the spring and the force overcome the friction at the turn.
+
+    Raises StopsOccurError where that fails, and at r = 1, 1/3, 1/5, ..., where the closed form is singular.
+    """
+    r = omega / np.sqrt(stiffness / mass)
+    if (friction_force > 0 and abs((1 / r) % 2 - 1) < 1e-9) or r == 1:
+        raise StopsOccurError(f"Den Hartog's form is singular at a frequency ratio of {r}")
+    v = 1 / (1 - r**2)
+    g = np.tan(np.pi / (2 * r)) / r
+    square = v**2 - (friction_force / force) ** 2 * g**2
+    if square <= 0:
+        raise StopsOccurError(f"no motion without stops: friction {friction_force} N, force {force} N, ratio {r}")
+    amplitude = float(np.sqrt(square) * force / stiffness)
+
+    def needed(tau: FloatArray) -> FloatArray:
+        ratio: FloatArray = (np.sin(tau) + r * g * (np.cos(r * tau) - np.cos(tau))) / (r * np.sin(r * tau))
+        return ratio
+
+    taus = np.linspace(0, np.pi / r, 4001)[1:-1]
+    best = int(np.argmax(needed(taus)))
+    around = (taus[max(best - 1, 0)], taus[min(best + 1, len(taus) - 1)])
+    inside = minimize_scalar(lambda tau: -needed(tau), bounds=around, method="bounded", options={"xatol": 1e-12})
+    largest = max(1 / r**2, float(-inside.fun))
+    if amplitude <= largest * friction_force / stiffness:
+        raise StopsOccurError(f"the mass stops: friction {friction_force} N, force {force} N, ratio {r}")
+    return amplitude
+
+
+def coulomb_orbit(
+    mass: ArrayLike,
+    damping: ArrayLike,
+    stiffness: ArrayLike,
+    load: ArrayLike,
+    friction_dof: int,
+    friction_force: float,
+    omega: float,
+    *,
+    transient: int = 30,
+) -> Orbit:
+    """Periodic motion of `M x'' + C x' + K x + lambda = Re(load exp(i omega t))` from rest.
+
+    mass (regular), damping, stiffness (n, n); load (n,), N, may be complex. lambda acts on `friction_dof` alone: rigid
+    Coulomb friction to ground, |lambda| <= friction_force (positive), N, with sticking. The phases of the orbit are
+    "stick", "forward" and "backward".
+
+    Raises NoPeriodicMotionError.
+    """
+    mass, damping, stiffness = (np.array(matrix, dtype=np.float64) for matrix in (mass, damping, stiffness))
+    load = np.array(load, dtype=np.complex128)
+    n, j = len(load), friction_dof
+    force_rows = np.hstack(
+        [-stiffness, -damping, load.real[:, np.newaxis], -load.imag[:, np.newaxis], np.zeros((n, 1))]
+    )
+
+    def phase_flow(acceleration: FloatArray, velocity: FloatArray) -> FloatArray:
+        flow = np.zeros((2 * n + 3, 2 * n + 3))
+        flow[:n], flow[n : 2 * n] = velocity, acceleration
+        flow[2 * n, 2 * n + 1], flow[2 * n + 1, 2 * n] = -omega, omega
+        return flow
+
+    velocity = np.hstack([np.zeros((n, n)), np.eye(n), np.zeros((n, 3))])
+    phases = {}
+    for name, sign in (("forward", 1.0), ("backward", -1.0)):
+        pushed = force_rows.copy()
+        pushed[j, -1] -= sign * friction_force
+        phases[name] = Phase(phase_flow(np.linalg.solve(mass, pushed), velocity), sign * velocity[[j]])
+
+    others = [index for index in range(n) if index != j]
+    acceleration = np.zeros_like(force_rows)
+    acceleration[others] = np.linalg.solve(mass[np.ix_(others, others)], force_rows[others])
+    still = velocity.copy()
+    still[j] = 0
+    held = force_rows[j] - mass[j] @ acceleration  # what the contact takes up while it sticks
+    limit = np.zeros(2 * n + 3)
+    limit[-1] = friction_force
+    phases["stick"] = Phase(phase_flow(acceleration, still), np.array([limit - held, limit + held]))
+
+    def next_phase(name: str, y: FloatArray) -> tuple[str, FloatArray]:
+        y = y.copy()
+        y[n + j] = 0.0
+        taken_up = held @ y
+        if name != "stick" and abs(taken_up) < friction_force:
+            return "stick", y
+        return ("forward" if taken_up > 0 else "backward"), y
+
+    def phase_at(name: str, y: FloatArray) -> str:
+        if name == "stick":
+            return name
+        return "forward" if y[n + j] > 0 else "backward"
+
+    system = PiecewiseLinear(n, omega, phases, next_phase, phase_at)
+    start = system.extended(np.zeros(n), np.zeros(n))
+    return solve_orbit(
+        system,
+        *next_phase("forward", start),
+        moving=("forward", "backward"),
+        transient=transient,
+        fixed=lambda name: [n + j] if name == "stick" else [],
+    )
+
+
+def slider_orbit(
+    mass: float, damping: float, stiffness: float, force: float, friction_force: float, omega: float
+) -> Orbit:
+    """Periodic motion of one mass under force cos(omega t) with rigid Coulomb friction, sticking allowed.
+
+    Raises NoPeriodicMotionError.
+    """
+    return coulomb_orbit([[mass]], [[damping]], [[stiffness]], [force], 0, friction_force, omega)
+
+
+def slider_amplitude(
+    mass: float, damping: float, stiffness: float, force: float, friction_force: float, omega: float
+) -> float:
+    """A quarter of the distance, m, that the mass of `slider_orbit` slides in a period: its amplitude.
+
+    Closed where Den Hartog's form holds, from the events elsewhere. Raises NoPeriodicMotionError.
+    """
+    if friction_force == 0:
+        return float(force / abs(stiffness - mass * omega**2 + 1j * omega * damping))
+    if damping == 0:
+        try:
+            return den_hartog_amplitude(mass, stiffness, force, friction_force, omega)
+        except StopsOccurError:
+            pass
+    orbit = slider_orbit(mass, damping, stiffness, force, friction_force, omega)
+    return orbit.path(0, ("forward", "backward")) / 4
+
+
+def slider_wear_depth(
+    cycles: ArrayLike,
+    *,
+    wear_coefficient: float,
+    area: float,
+    friction_coefficient: float,
+    normal_load: float,
+    normal_stiffness: float,
+    amplitude: Callable[[float], float],
+) -> FloatArray:
+    """Wear depth W, m, at cycle counts (ascending, the first 0) of a slider that a spring presses.
+
+    Integrates `dW/dcycle = (k_w / alpha) N 4 X(mu N)`, `N = N_0 - k_N W`, where `amplitude(friction_force)` is X, m.
+    """
+
+    def rate(_: float, depth: FloatArray) -> FloatArray:
+        normal = max(normal_load - normal_stiffness * float(depth[0]), 0.0)
+        if normal == 0.0:
+            return np.zeros(1)
+        return np.array([wear_coefficient / area * normal * 4 * amplitude(friction_coefficient * normal)])
+
+    counts = np.asarray(cycles, dtype=np.float64)
+    depth_scale = rate(0.0, np.zeros(1))[0] * counts[-1]
+    solution = solve_ivp(
+        rate, (counts[0], counts[-1]), [0.0], method="DOP853", t_eval=counts, rtol=1e-11, atol=1e-13 * depth_scale
+    )
+    if not solution.success:
+        raise RuntimeError(solution.message)
+    depths: FloatArray = solution.y[0]
+    return depths
+
+
+def vibro_impact_orbit(
+    mass: float,
+    damping: float,
+    stiffness: float,
+    force: float,
+    wall_stiffness: float,
+    gap: float,
+    omega: float,
+    *,
+    sweep: Literal["up", "down"] = "up",
+    sweep_start: float | None = None,
+    sweep_step: float = 0.02,
+) -> Orbit:
+    """Periodic motion of a mass on a spring that meets an elastic wall at the distance `gap`, under force cos(omega t).
+
+    gap < 0: the wall presses on the resting mass. The branch is the one that a sweep up (down) reaches, from rest at
+    `sweep_start`, rad/s, which is half (four times) the undamped frequency without wall if not given, in steps of
+    `sweep_step` times that frequency. The phases of the orbit are "open" and "closed". damping must be positive: a
+    transient has to die out.
+
+    Raises NoPeriodicMotionError.
+    """
+    natural = float(np.sqrt(stiffness / mass))
+    if sweep_start is None:
+        sweep_start = min(0.5 * natural, omega) if sweep == "up" else max(4.0 * natural, omega)
+
+    def system_at(frequency: float) -> PiecewiseLinear:
+        return _bilinear(mass, damping, stiffness, force, wall_stiffness, gap, frequency)
+
+    start = system_at(sweep_start)
+    at_rest = np.array([min(wall_stiffness * gap / (stiffness + wall_stiffness), 0.0), 0.0])
+    orbit = _land(start, at_rest)
+    state, here, largest, previous = _state(orbit, at_rest), sweep_start, sweep_step * natural, None
+    step = largest
+    while here != omega:
+        there = omega if abs(omega - here) <= step else here + np.copysign(step, omega - here)
+        slope = np.zeros(2) if previous is None else (state - previous[1]) / (here - previous[0])
+        guess = state + slope * (there - here)
+        system = system_at(there)
+        orbit = close_orbit(system, "open", system.extended(guess[:1], guess[1:]))
+        if orbit is not None:
+            previous, step = (here, state), min(1.5 * step, largest)
+        elif step > 1e-4 * largest:
+            step /= 2
+            continue
+        else:  # the branch has ended: the motion falls on another one
+            orbit, previous, step = _land(system, state), None, largest
+        state, here = _state(orbit, state), there
+    if orbit is None:
+        raise NoPeriodicMotionError(f"no periodic motion at {omega} rad/s on a sweep {sweep} from {sweep_start} rad/s")
+    return orbit
+
+
+def _land(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
+    y = system.extended(state[:1], state[1:])
+    try:
+        return solve_orbit(system, system.phase_at("open", y), y, attempts=5)
+    except NoPeriodicMotionError:
+        return None  # chaos, or a period of several forces: the sweep goes on behind it
+
+
+def _state(orbit: Orbit | None, otherwise: FloatArray) -> FloatArray:
+    return otherwise if orbit is None else orbit.sample(1)[:, 0]
+
+
+def _bilinear(
+    mass: float, damping: float, stiffness: float, force: float, wall_stiffness: float, gap: float, omega: float
+) -> PiecewiseLinear:
+    def phase(wall: float, side: float) -> Phase:
+        flow = np.zeros((5, 5))
+        flow[0, 1] = 1
+        flow[1] = np.array([-(stiffness + wall), -damping, force, 0, wall * gap]) / mass
+        flow[2, 3], flow[3, 2] = -omega, omega
+        return Phase(flow, side * np.array([[1.0, 0, 0, 0, -gap]]))
+
+    def next_phase(name: str, y: FloatArray) -> tuple[str, FloatArray]:
+        y = y.copy()
+        y[0] = gap
+        return ("closed" if name == "open" else "open"), y
+
+    def phase_at(_: str, y: FloatArray) -> str:
+        return "closed" if y[0] > gap else "open"
+
+    phases = {"open": phase(0.0, -1.0), "closed": phase(wall_stiffness, 1.0)}
+    return PiecewiseLinear(1, omega, phases, next_phase, phase_at)

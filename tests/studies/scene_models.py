@@ -1,0 +1,97 @@
+"""Small random reduced models, and scene files made from them by changing single datasets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from solver.model import ContactInterface, LinearModel, Matrix, ReducedModel
+from studies.scene_file import write_scene
+
+Change = Callable[[h5py.File], None]
+
+
+def linear_model(n: int, *, hermitian: bool, seed: int) -> LinearModel:
+    """Random structure with a massless first displacement."""
+    random = np.random.default_rng(seed)
+
+    def definite(size: int) -> np.ndarray:
+        root = random.normal(size=(size, size)) + (1j * random.normal(size=(size, size)) if hermitian else 0)
+        matrix = root @ root.conj().T + np.eye(size)
+        return (matrix + matrix.conj().T) / 2
+
+    mass = np.zeros((n, n), dtype=complex if hermitian else float)
+    mass[1:, 1:] = definite(n - 1)
+    response: Matrix = random.normal(size=(2, n))
+    if hermitian:
+        response = np.asarray(response + 1j * random.normal(size=(2, n)), dtype=np.complex128)
+    return LinearModel(
+        mass=mass,
+        damping=0.01 * definite(n),
+        stiffness=1e6 * definite(n),
+        load_static=random.normal(size=n),
+        load_harmonic=random.normal(size=n) + 1j * random.normal(size=n),
+        response=response,
+    )
+
+
+def general_model(linear: dict[int, LinearModel], n_sectors: int = 0, nodal_diameter: int = 0) -> ReducedModel:
+    """Three pairs: 3D, without normal direction, with a normal direction only."""
+    contact = ContactInterface(
+        dofs=np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]]),
+        area=np.array([1e-4, 2e-4, 0.1 + 0.2]),
+        gap=np.array([0.0, 0.0, -1e-6]),
+        normal_load=np.array([0.0, 12.5, 0.0]),
+        position=np.array([[0.1, 0.2, 0.3], [np.nan] * 3, [1.0, 2.0, 3.0]]),
+        surface=("intrados", "extrados", "Spitze ü"),
+    )
+    return ReducedModel(linear, contact, ("tip", "root"), n_sectors, nodal_diameter)
+
+
+def plain() -> ReducedModel:
+    return general_model({0: linear_model(7, hermitian=False, seed=1)})
+
+
+def sector() -> ReducedModel:
+    """6 sectors, nodal diameter 2: harmonics see 0 and 2."""
+    models = {0: linear_model(8, hermitian=False, seed=2), 2: linear_model(7, hermitian=True, seed=3)}
+    return general_model(models, n_sectors=6, nodal_diameter=2)
+
+
+def changed(tmp_path: Path, model: ReducedModel, change: Change) -> Path:
+    path = tmp_path / "scene.h5"
+    write_scene(model, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def put(key: str, values: object, **options: object) -> Change:
+    """Replace a dataset."""
+
+    def change(file: h5py.File) -> None:
+        if key in file:
+            del file[key]
+        file.create_dataset(key, data=values, **options)
+
+    return change
+
+
+def poke(key: str, index: object, value: object) -> Change:
+    """Replace entries of a dataset."""
+
+    def change(file: h5py.File) -> None:
+        file[key][index] = value
+
+    return change
+
+
+def drop(*keys: str) -> Change:
+    def change(file: h5py.File) -> None:
+        for key in keys:
+            del file[key]
+
+    return change

@@ -1,0 +1,248 @@
+"""The bundled scene `dovetail_sector`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy import linalg
+
+from solver.model import needed_nodal_diameters
+from studies.scene_error import SceneError
+from studies.scenes.dovetail_mesh import build_dovetail_mesh
+from studies.scenes.dovetail_sector import Parameters, build, build_elements, build_pairs
+from studies.scenes.finite_element.assembly import HexMesh, assemble, assemble_sector
+from studies.scenes.finite_element.hex_element import HexElements
+from tests.studies.static_contact import solve_static_contact
+
+# Glued, nodal diameter 0, Hz: 20-node elements without, 8-node ones with the effects of 3000 rpm.
+AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])
+TURNING = np.array([210.65, 394.3, 808.0, 1296.0])
+N_PAIRS = 48
+N_RELATIVE = 3 * N_PAIRS
+
+
+@pytest.fixture(scope="module")
+def default():
+    return build(Parameters(), 5)
+
+
+@pytest.fixture(scope="module")
+def at_rest():
+    return build(Parameters(stress_stiffening=False), 5)
+
+
+def frequencies(linear, n_relative=N_RELATIVE):
+    return np.sqrt(np.diag(linear.stiffness).real[n_relative:]) / (2.0 * np.pi)
+
+
+def test_frequencies_of_the_glued_sector_at_rest(at_rest):
+    assert np.abs(frequencies(at_rest.linear[0])[:6] / AT_REST - 1.0).max() < 0.03
+
+
+def test_frequencies_of_the_glued_turning_sector(default):
+    assert np.abs(frequencies(default.linear[0])[:3] / TURNING[:3] - 1.0).max() < 0.02
+
+
+def test_a_finer_mesh_changes_the_frequencies_little(at_rest):
+    fine = build(Parameters(mesh=3, stress_stiffening=False), 0)
+    assert fine.contact.n_contact == 2 * 12 * 4
+    assert fine.contact.area.sum() == pytest.approx(560e-6)
+    change = frequencies(fine.linear[0], 3 * 96)[:6] / frequencies(at_rest.linear[0])[:6] - 1.0
+    assert np.abs(change).max() < 0.02
+
+
+def test_a_coarse_mesh_has_fewer_pairs():
+    coarse = build(Parameters(mesh=1), 0)
+    assert coarse.contact.n_contact == 2 * 4 * 2
+    assert coarse.linear[0].mass.shape == (3 * 16 + 20,) * 2
+    assert coarse.contact.area.sum() == pytest.approx(560e-6)
+
+
+def test_contact_pairs(default):
+    contact = default.contact
+    assert np.array_equal(contact.dofs, np.arange(N_RELATIVE).reshape(N_PAIRS, 3))
+    assert contact.surface == ("intrados",) * 24 + ("extrados",) * 24
+    assert contact.area.reshape(2, 24).sum(axis=1) == pytest.approx([280e-6, 280e-6], rel=1e-9)
+    assert np.all(contact.gap == 0.0)
+    intrados, extrados = contact.position.reshape(2, 8, 3, 3)
+    assert np.all(intrados[..., 1] > 0.0)
+    assert np.allclose(intrados * [1.0, -1.0, 1.0], extrados, atol=1e-12)
+    assert np.all(np.diff(intrados[..., 2], axis=0) > 0.0)
+    assert np.all(np.diff(intrados[..., 0], axis=1) > 0.0)
+    assert intrados[:, -1, 0] == pytest.approx(0.245)
+
+
+def test_frames_close_outwards_and_mirror_each_other():
+    frames = build_pairs(build_dovetail_mesh(Parameters())).frames
+    half = np.sqrt(0.5)
+    assert np.allclose(frames[:24], [[half, half, 0.0], [0.0, 0.0, 1.0], [half, -half, 0.0]], atol=1e-9)
+    assert np.allclose(frames[24:], frames[:24] * [1.0, -1.0, 1.0], atol=1e-9)
+
+
+def test_free_blade_has_six_rigid_modes():
+    parameters = Parameters()
+    mesh = build_dovetail_mesh(parameters)
+    hexes = build_elements(parameters, mesh)
+    blade = HexElements(hexes.coordinates[mesh.blade_elements], hexes.elasticity, hexes.density)
+    used, elements = np.unique(mesh.mesh.elements[mesh.blade_elements], return_inverse=True)
+    nodes = mesh.mesh.nodes[used]
+    stiffness = assemble(blade.stiffness(), elements.reshape(-1, 8), len(nodes))
+    x, y, z = nodes.T
+    o = np.zeros_like(x)
+    shifts = [np.tile(direction, (len(nodes), 1)) for direction in np.eye(3)]
+    turns = [np.stack(turn, axis=1) for turn in ([o, -z, y], [z, o, -x], [-y, x, o])]
+    largest = np.abs(stiffness.data).max()
+    for motion in (*shifts, *turns):
+        assert np.abs(stiffness @ motion.ravel()).max() < 1e-12 * largest * np.abs(motion).max()
+
+
+def test_reduced_blade_is_free_without_contact(at_rest):
+    linear = at_rest.linear[0]
+    values = linalg.eigh(linear.stiffness, linear.mass, eigvals_only=True)
+    assert np.abs(values[:6]).max() < 1e-6 * values[6]
+
+
+def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest):
+    linear, dofs = at_rest.linear[0], at_rest.contact.dofs
+    kept = np.setdiff1d(np.arange(len(linear.mass)), dofs[:, 0])
+    stiffness = linear.stiffness[np.ix_(kept, kept)]
+    values, vectors = linalg.eigh(stiffness, linear.mass[np.ix_(kept, kept)])
+    assert abs(values[0]) < 1e-6 * values[1]
+    sliding = np.zeros(len(linear.mass))
+    sliding[kept] = vectors[:, 0]
+    axial, radial = sliding[dofs[:, 1]], sliding[dofs[:, 2]]
+    assert np.allclose(axial, axial[0], rtol=1e-6)
+    assert np.abs(radial).max() < 1e-6 * abs(axial[0])
+
+
+def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
+    parameters = Parameters(stress_stiffening=False)
+    mesh = build_dovetail_mesh(parameters)
+    hexes = build_elements(parameters, mesh)
+    blade = HexElements(hexes.coordinates[mesh.blade_elements], hexes.elasticity, hexes.density)
+    matrices = assemble_sector(HexMesh(mesh.mesh.nodes, mesh.mesh.elements[mesh.blade_elements]), blade)
+    pull = parameters.angular_speed**2 * matrices.load.reshape(-1, 3).sum(axis=0)[0]
+    for friction_coefficient in (0.5, 1e-6):
+        force = solve_static_contact(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
+        assert np.all(force[:, 0] > 0.0)
+        assert np.sqrt(0.5) * (force[:, 0] + force[:, 2]).sum() == pytest.approx(pull, rel=1e-6)
+
+
+def test_centrifugal_load_grows_with_the_square_of_speed(at_rest):
+    half = build(Parameters(stress_stiffening=False, rotation_speed=1500.0), 0)
+    assert np.allclose(4.0 * half.linear[0].load_static, at_rest.linear[0].load_static, rtol=1e-9)
+
+
+def test_stiffening_grows_with_the_square_of_speed_and_softening_shows():
+    squares = [
+        frequencies(build(Parameters(mesh=1, rotation_speed=rpm), 0).linear[0], 48)[0] ** 2
+        for rpm in (1e-3, 2000.0, 4000.0)
+    ]
+    assert (squares[2] - squares[0]) / (squares[1] - squares[0]) == pytest.approx(4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("nodal_diameter", [1, 16, 23])
+def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter):
+    model = build(Parameters(mesh=1, nodal_diameter=nodal_diameter), 5)
+    assert tuple(model.linear) == needed_nodal_diameters(nodal_diameter, 47, 5)
+    assert model.n_sectors == 47
+    assert model.nodal_diameter == nodal_diameter
+    for k, linear in model.linear.items():
+        for matrix in (linear.mass, linear.damping, linear.stiffness):
+            assert np.iscomplexobj(matrix) == (k != 0)
+            assert np.array_equal(matrix, matrix.conj().T)
+        assert linalg.eigvalsh(linear.mass)[0] > 0.0
+        damping = linalg.eigvalsh(linear.damping)
+        assert damping[0] > -1e-10 * damping[-1]
+        assert np.any(linear.load_static != 0.0) == (k == 0)
+        assert np.any(linear.load_harmonic != 0.0) == (k == nodal_diameter)
+    excited = model.linear[nodal_diameter]
+    # Force and response are one and the same point and direction.
+    assert np.allclose(excited.load_harmonic, excited.response[0].conj())
+
+
+def test_half_the_sectors_is_a_real_nodal_diameter():
+    model = build(Parameters(mesh=1, n_sectors=46, nodal_diameter=23), 3)
+    assert tuple(model.linear) == (0, 23)
+    assert np.isrealobj(model.linear[23].stiffness)
+
+
+def test_high_nodal_diameters_stiffen_the_disk():
+    first, second = (frequencies(build(Parameters(mesh=1, nodal_diameter=k), 1).linear[k], 48)[:2] for k in (2, 20))
+    assert second[1] > 1.3 * first[1]
+    assert second[0] == pytest.approx(first[0], rel=0.02)
+
+
+def test_same_parameters_give_the_same_bits():
+    one, two = (build(Parameters(mesh=1, nodal_diameter=3), 3) for _ in range(2))
+    for k in one.linear:
+        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
+            assert np.array_equal(getattr(one.linear[k], name), getattr(two.linear[k], name))
+
+
+def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
+    linear = at_rest.linear[0]
+    omega = 2.0 * np.pi * frequencies(linear)[0]
+    assert np.allclose(omega * linear.damping, 1e-3 * linear.stiffness, rtol=1e-9, atol=1e-6)
+    modes = slice(N_RELATIVE, None)
+    dynamic = (linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping)[modes, modes]
+    tip = (linear.response[:, modes] @ np.linalg.solve(dynamic, linear.load_harmonic[modes]))[0]
+    shape = linear.response[0, N_RELATIVE]
+    assert abs(tip) == pytest.approx(shape**2 / (1e-3 * omega**2), rel=1e-3)
+    assert 0.01 < abs(tip) < 0.1
+
+
+def test_twenty_stuck_modes_are_enough(at_rest):
+    many = build(Parameters(stress_stiffening=False, stuck_modes=60), 0)
+    free = [
+        np.sqrt(linalg.eigh(model.linear[0].stiffness, model.linear[0].mass, eigvals_only=True)[6:10])
+        for model in (at_rest, many)
+    ]
+    assert np.allclose(free[0], free[1], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("nodal_diameter", 24),
+        ("rim_radius", 0.230),
+        ("flank_length", 0.016),
+        ("flank_top_half_width", 0.02),
+        ("platform_gap", 0.03),
+        ("fillet_height", 0.2),
+        ("n_sectors", 80),
+        ("mouth_clearance", 0.02),
+        ("root_clearance", 0.011),
+        ("rotation_speed", 1e6),
+    ],
+)
+def test_parameters_that_do_not_go_together(key, value):
+    with pytest.raises(SceneError) as caught:
+        build(Parameters(mesh=1, **{key: value}), 1)
+    assert caught.value.key in Parameters.model_fields
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("friction_coefficient", -0.1),
+        ("rotation_speed", float("nan")),
+        ("loss_factor", float("inf")),
+        ("mesh", 0),
+        ("poisson_ratio", 0.5),
+        ("nodal_diameter", 1.5),
+        ("no_such_key", 1.0),
+    ],
+)
+def test_parameters_out_of_range(key, value):
+    with pytest.raises(ValidationError):
+        Parameters(**{key: value})
+
+
+def test_every_parameter_is_described_with_a_unit():
+    fields = Parameters.model_fields
+    assert next(iter(fields)) == "friction_coefficient"
+    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees"}
+    assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units

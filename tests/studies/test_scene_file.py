@@ -1,0 +1,168 @@
+"""Scene files: bitwise round trip and other writers' habits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from solver.model import ContactInterface, LinearModel, ReducedModel
+from studies.model_check import check_model
+from studies.scene_error import SceneError
+from studies.scene_file import read_scene, write_scene
+from studies.scenes import build_scene, scene_parameters
+from tests.studies.scene_models import changed, drop, general_model, linear_model, plain, put, sector
+
+
+def assert_same_bits(one: ReducedModel, other: ReducedModel) -> None:
+    assert (one.response_names, one.n_sectors, one.nodal_diameter) == (
+        other.response_names,
+        other.n_sectors,
+        other.nodal_diameter,
+    )
+    assert one.contact.surface == other.contact.surface
+    assert set(one.linear) == set(other.linear)
+    pairs: list[tuple[object, object, str]] = [
+        (one.contact, other.contact, name.name) for name in fields(ContactInterface) if name.name != "surface"
+    ]
+    pairs += [(one.linear[k], other.linear[k], name.name) for k in one.linear for name in fields(LinearModel)]
+    for left, right, name in pairs:
+        first, second = getattr(left, name), getattr(right, name)
+        assert first.dtype == second.dtype, name
+        assert first.shape == second.shape, name
+        assert first.tobytes() == second.tobytes(), name
+
+
+@pytest.mark.parametrize("build", [plain, sector])
+def test_round_trip_is_bitwise(tmp_path: Path, build: Callable[[], ReducedModel]) -> None:
+    model = build()
+    write_scene(model, tmp_path / "scene.h5")
+    assert_same_bits(read_scene(tmp_path / "scene.h5", 5), model)
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
+
+
+@pytest.mark.parametrize("name", ["sdof_slider", "two_masses", "vibro_impact"])
+def test_textbook_scenes_survive_the_round_trip(tmp_path: Path, name: str) -> None:
+    model = build_scene(name, scene_parameters(name)(), 3)
+    write_scene(model, tmp_path / "scene.h5")
+    assert_same_bits(read_scene(tmp_path / "scene.h5"), model)
+
+
+def test_a_sector_at_nodal_diameter_0_keeps_its_sectors(tmp_path: Path) -> None:
+    model = general_model({0: linear_model(7, hermitian=False, seed=1)}, n_sectors=47)
+    write_scene(model, tmp_path / "scene.h5")
+    with h5py.File(tmp_path / "scene.h5") as file:
+        assert "stiffness" in file
+    assert_same_bits(read_scene(tmp_path / "scene.h5", 21), model)
+
+
+def test_writing_twice_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.h5", "b.h5"):
+        write_scene(sector(), tmp_path / name)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_an_impossible_model_is_not_written(tmp_path: Path) -> None:
+    model = plain()
+    with pytest.raises(SceneError, match="contact/area"):
+        write_scene(replace(model, contact=replace(model.contact, area=-model.contact.area)), tmp_path / "scene.h5")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unwritable_file_leaves_the_old_one(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="no_such_folder"):
+        write_scene(plain(), tmp_path / "no_such_folder" / "scene.h5")
+    (tmp_path / "folder.h5").mkdir()
+    with pytest.raises(OSError, match="folder"):
+        write_scene(plain(), tmp_path / "folder.h5")
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.h5"]
+
+
+def test_optional_datasets_have_defaults(tmp_path: Path) -> None:
+    def change(file: h5py.File) -> None:
+        drop("damping", "contact/gap", "contact/position", "contact/surface", "contact/normal_load")(file)
+        file["contact/dofs"][1, 0] = 6
+
+    model = read_scene(changed(tmp_path, plain(), change))
+    assert not model.linear[0].damping.any()
+    assert not model.contact.gap.any()
+    assert not model.contact.normal_load.any()
+    assert np.isnan(model.contact.position).all()
+    assert model.contact.surface == ("", "", "")
+
+
+def test_responses_can_be_indices(tmp_path: Path) -> None:
+    model = read_scene(changed(tmp_path, plain(), put("response/dofs", np.array([6, 2], dtype=np.int32))))
+    assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
+
+
+def test_other_types_of_numbers_are_read(tmp_path: Path) -> None:
+    def change(file: h5py.File) -> None:
+        put("contact/dofs", np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]], dtype=np.float64))(file)
+        put("mass", np.eye(7, dtype=np.float32))(file)
+        put("damping", np.eye(7, dtype=np.int16))(file)
+        put("load/harmonic", np.arange(7, dtype=np.uint8))(file)
+        put("stiffness", file["stiffness"][()].astype(complex))(file)
+        put("load/static", np.arange(7.0), dtype=">f8")(file)
+
+    linear = read_scene(changed(tmp_path, plain(), change)).linear[0]
+    assert linear.mass.dtype == linear.damping.dtype == linear.load_static.dtype == np.float64
+    assert linear.load_harmonic.dtype == np.complex128
+    assert linear.load_harmonic.tolist() == list(range(7))
+    # Zero imaginary parts at nodal diameter 0 say nothing.
+    assert linear.stiffness.dtype == np.float64
+    assert linear.stiffness.tobytes() == plain().linear[0].stiffness.tobytes()
+
+
+def test_complex_numbers_of_octave_are_read(tmp_path: Path) -> None:
+    values = plain().linear[0].load_harmonic
+    compound = np.empty(7, dtype=[("real", "f8"), ("imag", "f8")])
+    compound["real"], compound["imag"] = values.real, values.imag
+    model = read_scene(changed(tmp_path, plain(), put("load/harmonic", compound)))
+    assert model.linear[0].load_harmonic.tobytes() == values.tobytes()
+
+
+def test_text_of_fixed_length_is_read(tmp_path: Path) -> None:
+    model = read_scene(changed(tmp_path, plain(), put("response/names", np.array([b"tip", b"middle"]))))
+    assert model.response_names == ("tip", "middle")
+
+
+def test_names_can_be_shared_by_the_nodal_diameters(tmp_path: Path) -> None:
+    def change(file: h5py.File) -> None:
+        drop("nd/0/response/names", "nd/2/response/names")(file)
+        file["response/names"] = ["a", "b"]
+
+    assert read_scene(changed(tmp_path, sector(), change)).response_names == ("a", "b")
+
+
+def test_the_users_own_attributes_are_left_alone(tmp_path: Path) -> None:
+    def change(file: h5py.File) -> None:
+        file.attrs["code"] = "CalculiX"
+        file["mass"].attrs["unit"] = "kg"
+
+    assert_same_bits(read_scene(changed(tmp_path, plain(), change)), plain())
+
+
+def test_a_backward_wave_is_a_nodal_diameter_above_half(tmp_path: Path) -> None:
+    model = replace(sector(), nodal_diameter=4)
+    write_scene(model, tmp_path / "scene.h5")
+    assert_same_bits(read_scene(tmp_path / "scene.h5", 7), model)
+
+
+def test_what_is_unusual_but_possible_passes() -> None:
+    model = plain()
+    # A rigid body motion with mass that contact pairs can hold.
+    free = model.linear[0].stiffness.copy()
+    motion = np.zeros(7)
+    motion[:2] = np.sqrt(0.5)
+    keep = np.eye(7) - np.outer(motion, motion)
+    free = keep @ free @ keep
+    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=(free + free.T) / 2)}))
+    # Round-off in a symmetric matrix, and displacements in very different units.
+    scale = np.diag(10.0 ** np.arange(-6, 8, 2))
+    noisy = scale @ model.linear[0].stiffness @ scale * (1 + 1e-13 * np.random.default_rng(0).normal(size=(7, 7)))
+    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=noisy, mass=np.zeros((7, 7)))}))

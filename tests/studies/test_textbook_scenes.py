@@ -1,0 +1,191 @@
+"""The registry of scenes and the three textbook scenes against their equations and exact motions."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from pydantic import BaseModel, ValidationError
+
+from solver.model import ReducedModel
+from studies.model_check import check_model
+from studies.scene_error import SceneError
+from studies.scenes import BUNDLED, build_scene, scene_parameters
+from tests.references import (
+    coulomb_orbit,
+    den_hartog_amplitude,
+    slider_amplitude,
+    slider_wear_depth,
+    vibro_impact_orbit,
+)
+
+TEXTBOOK = ("sdof_slider", "two_masses", "vibro_impact")
+
+
+def build(model: str, **values: float) -> ReducedModel:
+    return build_scene(model, scene_parameters(model)(**values), n_harmonics=3)
+
+
+def dynamic_stiffness(model: ReducedModel, omega: float) -> np.ndarray:
+    linear = model.linear[0]
+    return linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping
+
+
+@pytest.mark.parametrize("model", TEXTBOOK)
+def test_textbook_scenes_are_possible_structures(model: str) -> None:
+    check_model(build(model), n_harmonics=21)
+
+
+@pytest.mark.parametrize("model", TEXTBOOK)
+def test_parameters_are_frozen_strict_and_have_units(model: str) -> None:
+    parameters = scene_parameters(model)
+    first = next(iter(parameters.model_fields))
+    assert first == "friction_coefficient"
+    for field in parameters.model_fields.values():
+        assert field.description is not None
+        assert "," in field.description
+    with pytest.raises(ValidationError, match="frozen"):
+        setattr(parameters(), first, 0.1)
+    for wrong in (
+        {"friction_coefficient": -0.1},
+        {"friction_coefficient": float("nan")},
+        {"area": float("inf")},
+        {"area": 0.0},
+        {"area": "1e-4"},
+        {"area": True},
+        {"no_such_key": 1.0},
+    ):
+        with pytest.raises(ValidationError):
+            parameters(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("model", "wrong"),
+    [
+        ("sdof_slider", {"mass": 0.0}),
+        ("sdof_slider", {"stiffness": -1.0}),
+        ("sdof_slider", {"normal_load": 0.0}),
+        ("two_masses", {"mass_2": -1.0}),
+        ("two_masses", {"damping_1": -0.1}),
+        ("vibro_impact", {"wall_stiffness": 0.0}),
+        ("vibro_impact", {"gap": float("-inf")}),
+    ],
+)
+def test_impossible_parameters_are_refused(model: str, wrong: dict[str, float]) -> None:
+    with pytest.raises(ValidationError):
+        scene_parameters(model)(**wrong)
+
+
+def test_an_unknown_scene_is_named_with_the_known_ones() -> None:
+    with pytest.raises(SceneError, match="bladeless") as caught:
+        scene_parameters("bladeless")
+    assert caught.value.key == "model"
+    assert all(name in caught.value.remedy for name in BUNDLED)
+
+
+def test_parameters_of_another_scene_are_a_bug() -> None:
+    with pytest.raises(TypeError, match="two_masses"):
+        build_scene("two_masses", scene_parameters("sdof_slider")(), 1)
+
+
+def test_a_scene_error_survives_the_way_between_ranks_and_is_one_sentence() -> None:
+    error = pickle.loads(pickle.dumps(SceneError("contact/area", "-1.0 at index 3", "give a positive area in m2")))
+    assert (error.key, error.value, error.remedy) == ("contact/area", "-1.0 at index 3", "give a positive area in m2")
+    assert str(error) == "contact/area: -1.0 at index 3; give a positive area in m2."
+
+
+def test_listing_the_scenes_imports_nothing_heavy() -> None:
+    code = "import sys, studies.scenes; sys.exit(bool({'numpy', 'scipy', 'pydantic', 'h5py'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_slider_can_be_pressed_by_a_constant_force() -> None:
+    model = build("sdof_slider", normal_stiffness=0.0, mass=2.0, damping=3.0, stiffness=4.0, normal_load=5.0)
+    linear = model.linear[0]
+    assert [linear.mass.tolist(), linear.damping.tolist(), linear.stiffness.tolist()] == [[[2.0]], [[3.0]], [[4.0]]]
+    assert model.contact.dofs.tolist() == [[-1, 0, -1]]
+    assert model.contact.normal_load.tolist() == [5.0]
+    assert linear.load_static.tolist() == [0.0]
+    check_model(model)
+
+
+def test_the_slider_on_a_spring_has_the_normal_force_of_the_wear_equation() -> None:
+    model = build("sdof_slider", normal_load=8.0, normal_stiffness=2e4)
+    linear, depth = model.linear[0], 1e-4
+    assert model.contact.dofs.tolist() == [[0, 1, -1]]
+    # Closed, u_N = W: the rest of the static equilibrium is the contact force.
+    assert linear.load_static - linear.stiffness @ [depth, 0.0] == pytest.approx([8.0 - 2e4 * depth, 0.0])
+
+
+def test_the_default_slider_wears_as_its_description_says() -> None:
+    defaults = scene_parameters("sdof_slider")()
+    assert isinstance(defaults, BaseModel)
+    values = defaults.model_dump()
+    omega, force = 2 * np.pi * 160, 10.0
+    assert np.sqrt(values["stiffness"] / values["mass"]) / (2 * np.pi) == pytest.approx(201.3, abs=0.05)
+
+    def amplitude(friction_force: float) -> float:  # raises where the mass stops
+        return den_hartog_amplitude(values["mass"], values["stiffness"], force, friction_force, omega)
+
+    depth = slider_wear_depth(
+        [0.0, 1e5],
+        wear_coefficient=1.1e-11,
+        area=values["area"],
+        friction_coefficient=values["friction_coefficient"],
+        normal_load=values["normal_load"],
+        normal_stiffness=values["normal_stiffness"],
+        amplitude=amplitude,
+    )[-1]
+    assert depth * values["normal_stiffness"] / values["normal_load"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_slider_moves_like_its_exact_reference() -> None:
+    model = build("sdof_slider", normal_stiffness=0.0)
+    omega, force, friction = 2 * np.pi * 160, 10.0, 0.5 * 10.0
+    orbit = coulomb_orbit([[0.1]], [[0.0]], [[1.6e5]], [force], 0, friction, omega)
+    assert slider_amplitude(0.1, 0.0, 1.6e5, force, friction, omega) == pytest.approx(
+        orbit.sample(4096)[0].max(), rel=1e-6
+    )
+    taken_up = force * model.linear[0].load_harmonic - dynamic_stiffness(model, omega) @ [orbit.harmonic(0)]
+    # Without stops the friction is a square wave of half period.
+    assert np.abs(taken_up) == pytest.approx(4 / np.pi * friction, rel=1e-9)
+
+
+def test_two_masses_are_those_of_the_reference() -> None:
+    model = build("two_masses")
+    linear = model.linear[0]
+    assert linear.mass.tolist() == [[1, 0], [0, 1]]
+    assert linear.damping.tolist() == [[0.04, -0.02], [-0.02, 0.02]]
+    assert linear.stiffness.tolist() == [[2, -1], [-1, 1]]
+    assert linear.load_harmonic.tolist() == [1, 0]
+    assert 0.5 * model.contact.normal_load[0] == pytest.approx(7.2, rel=1e-15)
+    assert model.response_names == ("mass_1", "mass_2")
+    assert linear.response.tolist() == [[1, 0], [0, 1]]
+
+    orbit = coulomb_orbit(linear.mass, linear.damping, linear.stiffness, 20 * linear.load_harmonic, 1, 7.2, 0.4)
+    taken_up = 20 * linear.load_harmonic - dynamic_stiffness(model, 0.4) @ [orbit.harmonic(0), orbit.harmonic(1)]
+    assert abs(taken_up[0]) < 1e-9
+    assert 7.2 < abs(taken_up[1]) <= 7.2 * 4 / np.pi
+
+
+@pytest.mark.parametrize("gap", [0.1, -0.02])
+def test_the_vibro_impact_scene_is_the_bilinear_spring(gap: float) -> None:
+    model = build("vibro_impact", gap=gap)
+    omega, n_samples = 1.1, 2048
+    orbit = vibro_impact_orbit(1.0, 0.05, 1.0, 0.02, 100.0, gap, omega, sweep_start=1.05)
+    displacement = orbit.sample(n_samples)[0]
+    closing = np.minimum(displacement, gap)
+    contact_force = 100 * np.maximum(displacement - gap, 0)
+    assert contact_force.max() > 0
+    spectra = [np.fft.rfft(values) / n_samples for values in (closing, displacement, contact_force)]
+    load = 0.02 * model.linear[0].load_harmonic / 2
+    for harmonic in range(6):
+        closing_h, displacement_h, contact_h = (spectrum[harmonic] for spectrum in spectra)
+        balance = dynamic_stiffness(model, harmonic * omega) @ [closing_h, displacement_h]
+        balance[0] += contact_h
+        balance -= load if harmonic == 1 else 0
+        # The kinks of the sampled contact force alias; everything else is exact.
+        assert np.abs(balance).max() < 1e-5 * np.abs(contact_force).max()

@@ -1,0 +1,233 @@
+"""Every wrong scene file is refused and named by its dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from solver.model import ReducedModel
+from studies.scene_error import SceneError
+from studies.scene_file import read_scene, write_scene
+from tests.studies.scene_models import Change, changed, drop, general_model, linear_model, plain, poke, put, sector
+
+
+def asymmetric(file: h5py.File) -> None:
+    file["stiffness"][0, 1] *= 1 + 1e-6
+
+
+def not_hermitian(file: h5py.File) -> None:
+    file["nd/2/stiffness"][0, 1] = np.conj(file["nd/2/stiffness"][0, 1])
+
+
+def without_stiffness_and_mass(file: h5py.File) -> None:
+    for key in ("stiffness", "mass"):
+        file[key][0, :] = 0
+        file[key][:, 0] = 0
+
+
+def rank_deficient(file: h5py.File) -> None:
+    # The motion (1, 1, 0, ...) gets neither stiffness nor mass.
+    motion = np.zeros(7)
+    motion[:2] = np.sqrt(0.5)
+    keep = np.eye(7) - np.outer(motion, motion)
+    for key in ("stiffness", "mass"):
+        matrix = keep @ file[key][()] @ keep
+        file[key][...] = (matrix + matrix.T) / 2
+
+
+def free_where_no_contact_is(file: h5py.File) -> None:
+    file["stiffness"][6, :] = 0
+    file["stiffness"][:, 6] = 0
+
+
+def external(file: h5py.File) -> None:
+    del file["mass"]
+    file["mass"] = h5py.ExternalLink("other.h5", "/mass")
+
+
+def soft(file: h5py.File) -> None:
+    del file["mass"]
+    file["mass"] = h5py.SoftLink("/stiffness")
+
+
+def external_storage(file: h5py.File) -> None:
+    del file["mass"]
+    file.create_dataset("mass", (7, 7), "f8", external=[("/dev/zero", 0, 392)])
+
+
+def virtual(file: h5py.File) -> None:
+    del file["mass"]
+    layout = h5py.VirtualLayout((7, 7), "f8")
+    layout[...] = h5py.VirtualSource("other.h5", "mass", (7, 7))
+    file.create_virtual_dataset("mass", layout)
+
+
+def circle(file: h5py.File) -> None:
+    file["contact/again"] = file["/"]
+
+
+def huge(file: h5py.File) -> None:
+    del file["mass"]
+    file.create_dataset("mass", (10**6, 10**6), "f8", chunks=True)
+
+
+def attribute(name: str, value: object) -> Change:
+    def change(file: h5py.File) -> None:
+        if value is None:
+            del file.attrs[name]
+        else:
+            file.attrs[name] = value
+
+    return change
+
+
+WRONG_PLAIN: list[tuple[Change, str, str]] = [
+    (drop("stiffness"), "stiffness", "missing"),
+    (drop("mass"), "mass", "missing"),
+    (drop("contact/dofs"), "contact/dofs", "missing"),
+    (drop("contact/area"), "contact/area", "missing"),
+    (drop("load/static"), "load/static", "missing"),
+    (drop("load/harmonic"), "load/harmonic", "missing"),
+    (drop("response"), "response/dofs", "missing"),
+    (drop("response/names"), "response/names", "missing"),
+    (drop("contact/normal_load"), "contact/normal_load", "0.0 at index 1"),
+    (put("contact/areas", np.ones(3)), "contact/areas", "unknown dataset"),
+    (put("inertia", np.eye(7)), "inertia", "unknown dataset"),
+    (put("nd", np.eye(7)), "nd", "unknown dataset"),
+    (put("stiffness", np.eye(7)[:, :6]), "stiffness", "shape (7, 6)"),
+    (put("stiffness", np.ones(7)), "stiffness", "shape (7,)"),
+    (put("stiffness", 1.0), "stiffness", "single value"),
+    (put("stiffness", np.zeros((0, 0))), "stiffness", "shape (0, 0)"),
+    (put("mass", np.eye(6)), "mass", "shape (6, 6)"),
+    (put("damping", np.eye(8)), "damping", "shape (8, 8)"),
+    (put("load/static", np.ones(6)), "load/static", "shape (6,)"),
+    (put("load/static", np.ones(7, dtype=complex)), "load/static", "complex"),
+    (put("load/harmonic", np.ones((7, 1))), "load/harmonic", "shape (7, 1)"),
+    (put("mass", np.eye(7) == 1), "mass", "type"),
+    (put("mass", ["text"]), "mass", "type"),
+    (put("mass", h5py.Empty("f8")), "mass", "single value or nothing"),
+    (poke("stiffness", (2, 3), np.nan), "stiffness", "nan at index 2, 3"),
+    (poke("mass", (4, 4), np.inf), "mass", "inf at index 4, 4"),
+    (poke("damping", (0, 0), np.nan), "damping", "nan"),
+    (poke("load/harmonic", 3, complex(0, np.nan)), "load/harmonic", "index 3"),
+    (poke("load/static", 6, np.nan), "load/static", "index 6"),
+    (poke("response/dofs", (1, 2), np.nan), "response/dofs", "index 1, 2"),
+    (poke("contact/gap", 2, np.nan), "contact/gap", "index 2"),
+    (poke("contact/normal_load", 1, np.nan), "contact/normal_load", "index 1"),
+    (poke("contact/position", (0, 0), np.inf), "contact/position", "inf"),
+    (asymmetric, "stiffness", "not symmetric"),
+    (poke("mass", (2, 1), 7.0), "mass", "not symmetric"),
+    (poke("damping", (2, 1), 7.0), "damping", "not symmetric"),
+    (put("stiffness", plain().linear[0].stiffness * (1 + 0.1j)), "stiffness", "not Hermitian"),
+    (put("stiffness", linear_model(7, hermitian=True, seed=5).stiffness), "stiffness", "complex"),
+    (poke("mass", (6, 6), -5.0), "mass", "negative eigenvalue"),
+    (without_stiffness_and_mass, "stiffness", "row of zeros"),
+    (rank_deficient, "stiffness", "rank"),
+    (free_where_no_contact_is, "stiffness", "row of zeros"),
+    (poke("contact/area", 1, -1e-4), "contact/area", "-0.0001 at index 1"),
+    (poke("contact/area", 2, 0.0), "contact/area", "0.0 at index 2"),
+    (poke("contact/area", 0, np.nan), "contact/area", "nan"),
+    (put("contact/area", np.ones(4)), "contact/area", "shape (4,)"),
+    (put("contact/position", np.ones((3, 2))), "contact/position", "shape (3, 2)"),
+    (put("contact/dofs", np.array([0, 1, 2])), "contact/dofs", "shape (3,)"),
+    (put("contact/dofs", np.zeros((0, 3), dtype=int)), "contact/dofs", "shape (0, 3)"),
+    (put("contact/dofs", np.array([[0, 1.5, 2]] * 3)), "contact/dofs", "1.5"),
+    (put("contact/dofs", np.array([[0, np.nan, 2]] * 3)), "contact/dofs", "nan"),
+    (poke("contact/dofs", (0, 1), 7), "contact/dofs", "7 at index 0, 1"),
+    (poke("contact/dofs", (0, 1), -2), "contact/dofs", "-2 at index 0, 1"),
+    (poke("contact/dofs", (0, 1), 4), "contact/dofs", "index 4 is used twice"),
+    (poke("contact/dofs", (2, 0), -1), "contact/dofs", "pair 2 has no direction"),
+    (poke("contact/normal_load", 1, -3.0), "contact/normal_load", "-3.0 at index 1"),
+    (put("contact/surface", ["a", "b"]), "contact/surface", "2 labels"),
+    (put("contact/surface", np.arange(3)), "contact/surface", "type"),
+    (put("contact/surface", np.array([b"\xff\xfe", b"a", b"b"])), "contact/surface", "UTF-8"),
+    (put("response/names", ["a", "b", "c"]), "response/dofs", "shape (2, 7)"),
+    (put("response/names", ["a", "a"]), "response/names", "more than once"),
+    (put("response/names", ["a", ""]), "response/names", "empty name"),
+    (put("response/names", np.array([], dtype="S1")), "response/names", "no name"),
+    (put("response/dofs", np.array([0, 7])), "response/dofs", "7"),
+    (put("response/dofs", np.array([0, -1])), "response/dofs", "-1"),
+    (put("response/dofs", np.array([0, 0.5])), "response/dofs", "0.5"),
+    (put("response/dofs", np.ones((2, 6))), "response/dofs", "shape (2, 6)"),
+    (external, "mass", "link"),
+    (soft, "mass", "link"),
+    (external_storage, "mass", "another file"),
+    (virtual, "mass", "another file"),
+    (circle, "contact/again/contact/again", "unknown"),
+    (huge, "mass", "1000000"),
+    (attribute("nodal_diameter", 1), "nodal_diameter", "1"),
+]
+
+WRONG_SECTOR: list[tuple[Change, str, str]] = [
+    (not_hermitian, "nd/2/stiffness", "not Hermitian"),
+    (drop("nd/2/mass"), "nd/2/mass", "missing"),
+    (drop("nd/2"), "nd/2", "missing"),
+    (drop("nd/0"), "nd/0", "missing"),
+    (drop("nd/0/response/names"), "response/names", "missing"),
+    (put("nd/2/response/names", ["tip", "other"]), "nd/2/response/names", "tip, other"),
+    (put("mass", np.eye(7)), "mass", "unknown dataset"),
+    (put("nd/02/mass", np.eye(7)), "nd/02/mass", "unknown dataset"),
+    (put("nd/two", np.eye(7)), "nd/two", "unknown dataset"),
+    (put("nd/2/inertia", np.eye(7)), "nd/2/inertia", "unknown dataset"),
+    (poke("nd/2/load/harmonic", 0, np.nan), "nd/2/load/harmonic", "nan"),
+    (poke("contact/dofs", (0, 0), 7), "contact/dofs", "7"),
+    (put("nd/0/stiffness", linear_model(8, hermitian=True, seed=4).stiffness), "nd/0/stiffness", "complex"),
+    (lambda file: file.copy("nd/2", "nd/4"), "nd/4", "6 sectors"),
+    (attribute("n_sectors", None), "n_sectors", "missing"),
+    (attribute("nodal_diameter", None), "nodal_diameter", "missing"),
+    (attribute("n_sectors", -6), "n_sectors", "-6"),
+    (attribute("n_sectors", 6.5), "n_sectors", "6.5"),
+    (attribute("n_sectors", "six"), "n_sectors", "six"),
+    (attribute("nodal_diameter", 6), "nodal_diameter", "6"),
+    (attribute("nodal_diameter", 1), "nd/1", "missing"),
+]
+
+
+@pytest.mark.parametrize(
+    ("build", "change", "key", "value"),
+    [(plain, *case) for case in WRONG_PLAIN] + [(sector, *case) for case in WRONG_SECTOR],
+)
+def test_a_wrong_file_is_named_by_its_dataset(
+    tmp_path: Path, build: Callable[[], ReducedModel], change: Change, key: str, value: str
+) -> None:
+    path = changed(tmp_path, build(), change)
+    with pytest.raises(SceneError) as caught:
+        read_scene(path)
+    assert caught.value.key == key
+    assert value in caught.value.value
+    assert "\n" not in str(caught.value)
+
+
+def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path: Path) -> None:
+    # Nodal diameter 1 of 6 sectors: harmonics see 0, 1, 2, 3, 2, 1, 0, ...
+    linear = linear_model(7, hermitian=True, seed=3)
+    models = {0: linear_model(7, hermitian=False, seed=2), 1: linear, 2: linear}
+    path = tmp_path / "scene.h5"
+    write_scene(general_model(models, n_sectors=6, nodal_diameter=1), path)
+    read_scene(path, 2)
+    with pytest.raises(SceneError) as caught:
+        read_scene(path, 3)
+    assert caught.value.key == "nd/3"
+    assert "fewer than 3 harmonics" in caught.value.remedy
+
+
+def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path: Path) -> None:
+    path = tmp_path / "scene.h5"
+    write_scene(plain(), path)
+    content = path.read_bytes()
+    for wrong in (b"", b"[study]\nname = 1\n", content[: len(content) // 2]):
+        path.write_bytes(wrong)
+        with pytest.raises(SceneError, match=r"scene\.h5") as caught:
+            read_scene(path)
+        assert caught.value.key == "model"
+
+
+def test_a_missing_file_and_a_folder_are_the_systems_errors(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_scene(tmp_path / "none.h5")
+    with pytest.raises(IsADirectoryError):
+        read_scene(tmp_path)

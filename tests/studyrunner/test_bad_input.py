@@ -1,0 +1,180 @@
+"""Bad input: exit status 2 and one line that names the file, the key, the value and what would be right."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from studyrunner.cli import main
+
+STUDY = """
+[study]
+name = "s"
+[scene]
+model = "sdof_slider"
+[axes]
+frequency = [150.0]
+[slow_time]
+cycles = 0
+"""
+
+WRONG_KEYS = {
+    "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
+    "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
+    "unknown scene key": ("scene.masss=1", "scene.masss", "1", "mass"),
+    "key in place of a table": ("slow_time=3", "slow_time", "3", "table"),
+    "wrong type": ("axes.frequency=fast", "axes.frequency", '"fast"', "number"),
+    "boolean": ("axes.step=true", "axes.step", "true", "number"),
+    "text for a scene's number": ("scene.mass='1'", "scene.mass", '"1"', "number"),
+    "NaN": ("axes.wear_coefficient=nan", "axes.wear_coefficient", "nan", "finite"),
+    "infinity": ("axes.excitation_amplitude=[1.0, inf]", "axes.excitation_amplitude", "inf", "finite"),
+    "NaN in the scene": ("scene.stiffness=nan", "scene.stiffness", "nan", "finite"),
+    "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "greater than 0"),
+    "negative friction": ("scene.friction_coefficient=-0.1", "scene.friction_coefficient", "-0.1", "or equal to 0"),
+    "frequency 0": ("axes.frequency=0", "axes.frequency", "0", "above 0"),
+    "negative frequency": ("axes.frequency=[1, -2]", "axes.frequency", "-2", "above 0"),
+    "empty axis": ("axes.frequency=[]", "axes.frequency", "[]", "at least one"),
+    "empty word axis": ("axes.scheme=[]", "axes.scheme", "[]", "at least one"),
+    "duplicates": ("axes.frequency=[1, 2, 1.0]", "axes.frequency", "1.0", "once"),
+    "duplicate words": ("axes.sweep=['up', 'up']", "axes.sweep", '"up"', "once"),
+    "unfinished range": ("axes.frequency={start = 1, stop = 2}", "axes.frequency", "start", "{start, stop, num}"),
+    "empty range": ("axes.frequency={start = 1, stop = 2, num = 0}", "axes.frequency", "0", "at least 1"),
+    "huge range": ("axes.frequency={start = 1, stop = 2, num = 1e9}", "axes.frequency", "1000000000.0", "at most"),
+    "unknown word": ("axes.scheme=euler", "axes.scheme", '"euler"', "explicit"),
+    "adaptive": ("axes.scheme=adaptive", "axes.scheme", '"adaptive"', "implicit"),
+    "automatic harmonics": ("solver.harmonics=auto", "solver.harmonics", '"auto"', "number"),
+    "automatic samples": ("solver.samples=auto", "solver.samples", '"auto"', "number"),
+    "half a harmonic": ("solver.harmonics=1.5", "solver.harmonics", "1.5", "whole"),
+    "no harmonic": ("solver.harmonics=0", "solver.harmonics", "0", "at least 1"),
+    "too few samples": ("solver.samples=10", "solver.samples", "10", "at least 11"),
+    "too few samples on an axis": ("axes.samples=[8, 64]", "axes.samples", "8", "at least 11"),
+    "tolerance 0": ("solver.tolerance=0", "solver.tolerance", "0", "between 0 and 1"),
+    "rtol": ("solver.rtol=2", "solver.rtol", "2", "between 0 and 1"),
+    "step 0": ("axes.step=0.0", "axes.step", "0.0", "above 0"),
+    "negative cycles": ("slow_time.cycles=-1", "slow_time.cycles", "-1", "0 or more"),
+    "descending outputs": ("slow_time.outputs=[2, 1]", "slow_time.outputs", "[2, 1]", "ascending"),
+    "outputs beyond the end": ("slow_time.outputs=[0, 10]", "slow_time.outputs", "10.0", "at most"),
+    "no outputs": ("slow_time.outputs=[]", "slow_time.outputs", "[]", "ascending"),
+    "half an output": ("slow_time.outputs=2.5", "slow_time.outputs", "2.5", "whole"),
+    "depth 0": ("slow_time.largest_depth=0", "slow_time.largest_depth", "0", "above 0"),
+    "unknown variable": ("outputs.variables=['wear']", "outputs.variables", '"wear"', "wear_depth"),
+    "loops": ("outputs.loops=[0]", "outputs.loops", "[0]", "[]"),
+    "unknown scene": ("scene.model=turbine", "scene.model", "turbine", "dovetail_sector"),
+    "missing scene file": ("scene.model=missing.h5", "scene.model", "missing.h5", "no such file"),
+    "scene is a number": ("scene.model=3", "scene.model", "3", "in quotes"),
+    "name with a slash": ("study.name='a/b'", "study.name", "a/b", "slash"),
+    "empty name": ("study.name=''", "study.name", '""', "file name"),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "s.nc").write_text("an earlier result", encoding="utf-8")
+    return tmp_path
+
+
+def line_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line that bad input ends with; nothing else is said, nothing is written."""
+    before = {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()}
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    said = captured.err.splitlines()
+    assert len(said) == 1
+    assert {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()} == before
+    return said[0]
+
+
+@pytest.mark.parametrize("case", WRONG_KEYS)
+def test_wrong_key(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    override, key, value, remedy = WRONG_KEYS[case]
+    line = line_of(["s.toml", "--set", override], capsys)
+    start, _, rest = line.partition(f"s.toml: {key} = ")
+    assert start == "run-study: "
+    shown, _, advice = rest.partition(": ")
+    assert value in shown
+    assert remedy in advice
+
+
+@pytest.mark.parametrize(
+    ("removed", "key"),
+    [
+        ("[study]\nname", "study"),
+        ('model = "sdof_slider"\n', "scene.model"),
+        ("frequency = [150.0]\n", "axes.frequency"),
+    ],
+)
+def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "s.toml").write_text(
+        STUDY.replace(removed, "[other]\nname" if "name" in removed else ""), encoding="utf-8"
+    )
+    line = line_of(["s.toml"], capsys)
+    assert "s.toml" in line
+    assert key in line
+
+
+def test_solver_key_given_twice(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[solver]\nharmonics = 5\n[slow_time]")
+    (folder / "s.toml").write_text(text, encoding="utf-8")
+    line = line_of(["s.toml"], capsys)
+    assert "solver.harmonics = 5" in line
+    assert "axes.harmonics" in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("[study\n", "valid TOML"), ("\xff", "UTF-8"), ("a = 1\n", "unknown table")]
+)
+def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "s.toml").write_bytes(text.encode("latin-1"))
+    line = line_of(["s.toml"], capsys)
+    assert "s.toml" in line
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["missing.toml"], ("missing.toml", "no such file")),
+        (["unheard_of"], ("unheard_of", "dovetail")),
+        (["."], (".", "folder")),
+        (["s.toml", "--bogus"], ("command line", "--bogus", "--help")),
+        (["s.toml", "-o"], ("command line", "-o", "--help")),
+        (["s.toml", "more.toml"], ("command line", "more.toml")),
+        (["s.toml", "--set", "axes.step"], ("command line", "--set", "axes.step", "KEY=VALUE")),
+        (["s.toml", "--set", "axes.step=[1,"], ("command line", "axes.step", "[1,", "TOML")),
+        (["s.toml", "--set", "axes.step=1\nb=2"], ("command line", "axes.step", "one TOML value")),
+        (["s.toml", "--set", "study.name.first=a"], ("command line", "study.name.first", "name holds a value")),
+        (["s.toml", "-o", "."], ("command line", "-o", "folder")),
+        (["s.toml", "-o", "nowhere/out.nc"], ("command line", "nowhere/out.nc", "folder that exists")),
+        (["s.toml", "-o", "/dev/null"], ("command line", "/dev/null", "ordinary file")),
+        (["s.toml", "-o", "/proc/out.nc"], ("command line", "/proc/out.nc", "can be written")),
+        (["s.toml", "-o", "x" * 300], ("command line", "-o", "can be written")),
+        (["s.toml", "-o", "s.toml"], ("command line", "s.toml", "read by the run")),
+        (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),
+    ],
+)
+def test_command_line(
+    arguments: list[str], words: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = line_of(arguments, capsys)
+    for word in words:
+        assert word in line
+
+
+def test_write_protected_output(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "write-protected" in line_of(["s.toml"], capsys)
+
+
+def test_scene_file_that_is_none(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "text.h5").write_text("no HDF5", encoding="utf-8")
+    (folder / "s.toml").write_text(STUDY.replace("sdof_slider", "text.h5"), encoding="utf-8")
+    line = line_of(["s.toml", "--set", "scene.friction_coefficient=0.1"], capsys)
+    assert "text.h5" in line
+    assert "HDF5" in line

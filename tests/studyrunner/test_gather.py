@@ -1,0 +1,175 @@
+"""The result file: dimensions, units, attributes, and that it appears whole or not at all."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner import gather
+from studyrunner.evaluate import endings
+from studyrunner.gather import build_dataset, write_dataset
+from studyrunner.results import MarchResult
+from studyrunner.run import start_marches
+from studyrunner.study_file import read_study
+from studyrunner.tasks import MarchTask, build_tasks
+from tests.studyrunner.fakes import FACTS, fake_evaluate
+
+OVERRIDES = (
+    "axes.frequency=[160.0, 150.0]",
+    "axes.scheme=['implicit', 'explicit']",
+    "axes.harmonics=[1, 3]",
+    "slow_time.outputs=[0, 100, 1000]",
+)
+AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep", "harmonics")
+SHAPE = (2, 1, 1, 1, 2, 1, 2)
+
+
+def fake_results(*overrides: str) -> list[MarchResult]:
+    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
+    plan = build_tasks(study, FACTS.n_displacements)
+    results = []
+    for branch, line in zip(plan.branches, plan.marches, strict=True):
+        for task in start_marches(line, fake_evaluate(branch)):
+            results.append(fake_evaluate(task))
+    return results
+
+
+@pytest.fixture
+def dataset() -> xr.Dataset:
+    return build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, fake_results())
+
+
+@pytest.fixture
+def opened(dataset: xr.Dataset, tmp_path: Path) -> xr.Dataset:
+    write_dataset(dataset, tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as result:
+        return result.load()
+
+
+CONTRACT = {
+    "worn_volume": (("cycle",), "m3"),
+    "wear_rate": (("cycle",), "m3 per cycle"),
+    "wear_depth": (("cycle", "contact"), "m"),
+    "mean_pressure": (("cycle", "contact"), "Pa"),
+    "response_amplitude": (("cycle", "response"), "m"),
+    "response_phase": (("cycle", "response"), "rad"),
+    "response_peak": (("cycle", "response"), "m"),
+    "slip_range": (("cycle", "contact"), "m"),
+    "open_fraction": (("cycle", "contact"), "1"),
+    "outcome": ((), "1"),
+    "jump_cycle": ((), "1"),
+    "newton_iterations": ((), "1"),
+    "run_time": ((), "s"),
+    "error_estimate": ((), "1"),
+}
+
+
+def test_all_variables_with_their_dimensions_and_units(opened: xr.Dataset) -> None:
+    assert set(opened.data_vars) == set(CONTRACT)
+    for name, (dimensions, units) in CONTRACT.items():
+        assert opened[name].dims == (*AXES, *dimensions)
+        assert opened[name].shape[:7] == SHAPE
+        assert opened[name].attrs["units"] == units
+    assert all(opened[name].attrs["long_name"] for name in opened.variables)
+    assert all(opened[name].attrs["units"] for name in opened.variables)
+
+
+def test_coordinates(opened: xr.Dataset) -> None:
+    assert opened.frequency.values.tolist() == [160.0, 150.0]
+    assert opened.scheme.values.tolist() == ["implicit", "explicit"]
+    assert opened.sweep.values.tolist() == ["up"]
+    assert opened.harmonics.dtype == np.int32
+    assert opened.cycle.values.tolist() == [0.0, 100.0, 1000.0]
+    assert opened.contact.dtype == np.int32
+    assert opened.response.values.tolist() == ["tip"]
+    assert opened.contact_surface.values.tolist() == ["intrados", "extrados"]
+    assert opened.contact_area.values.tolist() == [1e-4, 2e-4]
+    assert opened.contact_z.values.tolist() == [0.3, 0.6]
+    assert all("_FillValue" not in opened[name].encoding for name in opened.coords)
+
+
+def test_every_point_is_where_it_belongs(opened: xr.Dataset) -> None:
+    study = read_study("sdof_slider", OVERRIDES)
+    plan = build_tasks(study, FACTS.n_displacements)
+    branch = plan.branches[1]
+    task = next(task for task in plan.marches[1] if task.scheme == "explicit" and task.position == 1)
+    (started,) = [
+        t for t in start_marches(plan.marches[1], fake_evaluate(branch)) if t == task or t.points == task.points
+    ]
+    expected = fake_evaluate(started)
+    assert isinstance(expected, MarchResult)
+    there = opened.sel(frequency=160.0, scheme="explicit", harmonics=3).squeeze()
+    assert there.wear_depth.dims == ("cycle", "contact")
+    assert np.array_equal(there.wear_depth, expected.values["wear_depth"])
+    assert there.newton_iterations == expected.newton_iterations
+
+
+def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
+    attributes = opened.outcome.attrs
+    assert opened.outcome.dtype == np.int8
+    assert attributes["flag_values"].dtype == np.int8
+    assert attributes["flag_values"].tolist() == [ending.number for ending in endings()]
+    assert attributes["flag_meanings"].split()[0] == "converged"
+    assert len(attributes["flag_meanings"].split()) == len(endings())
+
+
+def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
+    attributes = opened.attrs
+    assert attributes["Conventions"] == "CF-1.11 ACDD-1.3"
+    assert attributes["title"] == read_study("sdof_slider").study.title
+    assert attributes["history"]
+    assert attributes["source"].startswith("fretwear ")
+    assert "numpy" in attributes["versions"]
+    assert attributes["scene_sha256"] == FACTS.digest
+    (tmp_path / "again.toml").write_text(attributes["study"], encoding="utf-8")
+    assert read_study(str(tmp_path / "again.toml")).model_dump() == read_study("sdof_slider", OVERRIDES).model_dump()
+
+
+def test_only_the_variables_asked_for() -> None:
+    override = "outputs.variables=['wear_rate', 'outcome']"
+    study = read_study("sdof_slider", (*OVERRIDES, override))
+    dataset = build_dataset(study, FACTS, fake_results(override))
+    assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
+
+
+def test_a_point_that_is_missing_is_a_bug() -> None:
+    with pytest.raises(ValueError, match="1 points were not computed"):
+        build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, fake_results()[1:])
+
+
+def test_a_failed_write_leaves_the_old_file(
+    dataset: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "out.nc"
+    path.write_text("an earlier result", encoding="utf-8")
+
+    def fail(*_: object) -> None:
+        raise OSError("disk full")
+
+    monkeypatch.setattr(gather.os, "replace", fail)
+    with pytest.raises(OSError, match="disk full"):
+        write_dataset(dataset, path)
+    assert path.read_text(encoding="utf-8") == "an earlier result"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    readme = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+    study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
+    plan = build_tasks(study, FACTS.n_displacements)
+    tasks: list[MarchTask] = list(start_marches(plan.marches[0], fake_evaluate(plan.branches[0])))
+    write_dataset(build_dataset(study, FACTS, [fake_evaluate(task) for task in tasks]), tmp_path / "dovetail.nc")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "README.md", "exec"), {})
+
+
+def test_readme_and_ci_have_the_same_test_command() -> None:
+    root = Path(__file__).parents[2]
+    readme, script = (root.joinpath(name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
+    (command,) = [line for line in readme.splitlines() if line.endswith("-m pytest")]
+    assert command in script.splitlines()

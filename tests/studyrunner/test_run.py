@@ -1,0 +1,166 @@
+"""A whole run in this process: exit status, what is printed, and what the solver's histories become."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver.history import WearHistory
+from solver.outcome import Outcome
+from studyrunner import run
+from studyrunner.cli import main
+from studyrunner.evaluate import build_result
+from studyrunner.progress import RunProgress, format_seconds
+from studyrunner.results import BranchResult, MarchResult
+from studyrunner.scene import describe_scene
+from studyrunner.study_file import read_study
+from studyrunner.tasks import BranchTask, MarchTask, build_tasks
+from tests.studyrunner.fakes import fake_evaluate
+
+SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axes.scheme=implicit", "-o", "out.nc"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, MarchResult], MarchResult]) -> None:
+    """Puts the stand-in in place of the solver; `change` has the last word on every history."""
+
+    def build_fake(model: object, friction_coefficient: float) -> Callable[..., BranchResult | MarchResult]:
+        facts = describe_scene(model)
+
+        def evaluate(task: BranchTask | MarchTask) -> BranchResult | MarchResult:
+            result = fake_evaluate(task, facts)
+            return result if isinstance(result, BranchResult) else change(task, result)
+
+        return evaluate
+
+    monkeypatch.setattr(run, "build_evaluator", build_fake)
+
+
+def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    use_fake(monkeypatch, lambda _, result: result)
+    assert main(SMALL) == 0
+    assert capsys.readouterr().out.startswith("out.nc: 3 points, 3 computed to tolerance, 0 failed, ")
+
+
+def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def fail_one(task: MarchTask, result: MarchResult) -> MarchResult:
+        if task.position != 1:
+            return result
+        values = {name: np.full_like(array, np.nan) for name, array in result.values.items()}
+        return replace(result, outcome=int(Outcome.MARCH_FAILED), values=values)
+
+    use_fake(monkeypatch, fail_one)
+    assert main(SMALL) == 3
+    first, second = capsys.readouterr().out.splitlines()
+    assert "2 computed to tolerance, 1 failed" in first
+    assert second.strip() == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    with xr.open_dataset("out.nc") as result:
+        assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
+        assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]
+
+
+def test_unexpected_failure_keeps_the_old_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(task: MarchTask, result: MarchResult) -> MarchResult:
+        raise ZeroDivisionError("a bug")
+
+    (folder / "out.nc").write_text("an earlier result", encoding="utf-8")
+    use_fake(monkeypatch, fail)
+    assert main(SMALL) == 1
+    assert "ZeroDivisionError: a bug" in capsys.readouterr().err
+    assert (folder / "out.nc").read_text(encoding="utf-8") == "an earlier result"
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    use_fake(monkeypatch, lambda _, result: result)
+    assert main(SMALL) == 0
+    assert main([*SMALL[:-2], "--write-scene", "scene.h5"]) == 0
+    frequency = "[study]\nname = 'file'\n[axes]\nfrequency = [100, 110, 120]\nexcitation_amplitude = 10\n"
+    slow_time = "[slow_time]\ncycles = 20000\noutputs = 21\n[solver]\nharmonics = 21\nsamples = 256\n"
+    scene = "[scene]\nmodel = 'scene.h5'\nfriction_coefficient = 0.5\n"
+    (folder / "sub").mkdir()
+    (folder / "scene.h5").rename(folder / "sub" / "scene.h5")
+    (folder / "sub" / "file.toml").write_text(frequency + slow_time + scene, encoding="utf-8")
+    assert main(["sub/file.toml"]) == 0
+    with xr.open_dataset("out.nc") as bundled, xr.open_dataset("file.nc") as from_file:
+        xr.testing.assert_equal(bundled.drop_vars("run_time"), from_file.drop_vars("run_time"))
+        assert bundled.attrs["scene_sha256"] == from_file.attrs["scene_sha256"]
+
+
+def history(cycles: list[float]) -> WearHistory:
+    n = len(cycles)
+    line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
+    return WearHistory(
+        outcome=Outcome.CONVERGED,
+        cycles=np.array(cycles),
+        worn_volume=line,
+        wear_rate=line,
+        wear_depth=pair,
+        mean_pressure=pair,
+        slip_range=pair,
+        open_fraction=pair,
+        response=(1.0 + pair) * 1j,
+        response_peak=pair,
+        jump_cycle=np.nan,
+        error_estimate=0.0,
+        newton_iterations=7,
+        run_time=0.5,
+    )
+
+
+def march_task(*overrides: str) -> MarchTask:
+    study = read_study("sdof_slider", ["axes.frequency=100", "axes.scheme=implicit", *overrides])
+    return build_tasks(study, 2).marches[0][0]
+
+
+def test_cycle_0_is_left_out_where_it_was_not_asked_for() -> None:
+    result = build_result(march_task("slow_time.outputs=[10, 20]"), history([0.0, 10.0, 20.0]))
+    assert result.values["worn_volume"].tolist() == [1.0, 2.0]
+    assert result.values["wear_depth"].tolist() == [[1.0], [2.0]]
+
+
+def test_without_wear_the_first_state_holds() -> None:
+    result = build_result(march_task("axes.wear_coefficient=0", "slow_time.outputs=3"), history([0.0]))
+    assert result.values["worn_volume"].tolist() == [0.0, 0.0, 0.0]
+    assert result.values["response_amplitude"].tolist() == [[1.0], [1.0], [1.0]]
+
+
+def test_response_is_amplitude_and_phase() -> None:
+    result = build_result(march_task("slow_time.outputs=2"), history([0.0, 1e5]))
+    assert result.values["response_amplitude"].tolist() == [[1.0], [2.0]]
+    assert np.allclose(result.values["response_phase"], np.pi / 2)
+    assert (result.newton_iterations, result.run_time) == (7, 0.5)
+
+
+def test_plain_lines_come_less_and_less_often(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = 0.0
+    monkeypatch.setattr("studyrunner.progress.time.monotonic", lambda: now)
+    with RunProgress() as progress:
+        progress.say("marching")
+        progress.report(25.0, 100.0, 5, 20)
+        for second in range(1, 1000):
+            now = float(second)
+            progress.tick()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "[    0 s] marching"
+    assert lines[1] == "[    2 s] marching: 5 of 20 points, about 6 s left"
+    assert 15 < len(lines) < 30
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(3.4, "3 s"), (90.0, "1.5 min"), (7200.0, "2.0 h")])
+def test_times(seconds: float, text: str) -> None:
+    assert format_seconds(seconds) == text

@@ -1,0 +1,80 @@
+"""The schedule on one rank, and the ranks without MPI."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+from studyrunner.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
+from studyrunner.schedule import serve_tasks
+
+
+@dataclass(frozen=True)
+class Job:
+    name: str
+    cost: float
+
+
+def take_nothing(job: Job, result: object) -> list[Job]:
+    return []
+
+
+def test_expensive_tasks_go_first_and_results_make_new_ones() -> None:
+    done: list[tuple[str, str]] = []
+
+    def take(job: Job, result: str) -> list[Job]:
+        done.append((job.name, result))
+        return [Job("a1", 2.0), Job("a2", 5.0)] if job.name == "a" else []
+
+    serve_tasks(Alone(), [Job("b", 1.0), Job("a", 3.0)], lambda job: job.name.upper(), take)
+    order = [name for name, _ in done]
+    assert sorted(order) == ["a", "a1", "a2", "b"]
+    assert order.index("a") == 0
+    assert order.index("a2") < order.index("a1")
+    assert all(result == name.upper() for name, result in done)
+
+
+def test_no_tasks() -> None:
+    serve_tasks(Alone(), [], lambda job: job, take_nothing)
+
+
+def test_an_exception_in_a_task_is_raised() -> None:
+    def fail(job: Job) -> None:
+        raise ZeroDivisionError(job.name)
+
+    with pytest.raises(ZeroDivisionError, match="a"):
+        serve_tasks(Alone(), [Job("a", 1.0)], fail, take_nothing)
+
+
+@pytest.mark.parametrize(
+    ("environment", "size", "rank"),
+    [
+        ({}, 0, 0),
+        ({"PMI_SIZE": "4", "PMI_RANK": "3"}, 4, 3),
+        ({"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "1"}, 2, 1),
+        ({"SLURM_NTASKS": "8", "SLURM_PROCID": "0"}, 0, 0),
+        ({"SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "5"}, 8, 5),
+        ({"PMI_SIZE": "two"}, 0, 0),
+    ],
+)
+def test_what_the_launcher_says(environment: dict[str, str], size: int, rank: int) -> None:
+    assert (launcher_size(environment), launcher_rank(environment)) == (size, rank)
+
+
+def test_without_a_launcher_a_process_is_alone() -> None:
+    assert isinstance(start_ranks(), Alone)
+
+
+def test_several_processes_without_mpi_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PMI_SIZE", "2")
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    with pytest.raises(LauncherError, match="2 processes were started that cannot talk"):
+        start_ranks()
+
+
+def test_one_process_of_a_launcher_needs_no_mpi(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PMI_SIZE", "1")
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    assert isinstance(start_ranks(), Alone)

@@ -1,0 +1,126 @@
+"""Which tasks a study has, which points share one, and what the plan says of it."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from studyrunner.cli import main
+from studyrunner.results import BranchResult
+from studyrunner.run import start_marches
+from studyrunner.study import Study
+from studyrunner.study_file import read_study
+from studyrunner.tasks import TaskPlan, build_tasks
+
+GRID = (
+    "axes.frequency=[160, 150, 155]",
+    "axes.wear_coefficient=[1e-11, 0]",
+    "axes.excitation_amplitude=[1, 2]",
+    "axes.step=[100, 1000]",
+    "axes.scheme=['implicit', 'explicit']",
+    "axes.sweep=['up', 'down']",
+    "axes.harmonics=[1, 5]",
+)
+
+
+def plan_of(*overrides: str) -> tuple[Study, TaskPlan]:
+    study = read_study("sdof_slider", overrides)
+    return study, build_tasks(study, 2)
+
+
+def assert_every_point_once(study: Study, plan: TaskPlan) -> None:
+    points = Counter(point for line in plan.marches for task in line for point in task.points)
+    sizes = [len(values) for values in study.dimensions.values()]
+    assert points == Counter(itertools.product(*(range(size) for size in sizes)))
+    assert plan.n_points == len(points)
+
+
+def test_one_branch_a_line_of_frequencies() -> None:
+    study, plan = plan_of(*GRID)
+    assert len(plan.branches) == 2 * 2 * 2
+    assert {branch.frequencies for branch in plan.branches} == {(150.0, 155.0, 160.0)}
+    lines = {(task.excitation_amplitude, task.sweep, task.settings.harmonics) for task in plan.branches}
+    assert lines == set(itertools.product((1.0, 2.0), ("up", "down"), (1, 5)))
+    assert_every_point_once(study, plan)
+
+
+def test_points_know_their_task() -> None:
+    """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
+    study, plan = plan_of(*GRID)
+    for branch, line in zip(plan.branches, plan.marches, strict=True):
+        for task in line:
+            assert task.branch == branch.number
+            for point in task.points:
+                values = {
+                    name: axis[place] for place, (name, axis) in zip(point, study.dimensions.items(), strict=True)
+                }
+                assert values["frequency"] == branch.frequencies[task.position]
+                assert values["excitation_amplitude"] == branch.excitation_amplitude
+                assert values["sweep"] == branch.sweep
+                assert values["harmonics"] == task.settings.harmonics == branch.settings.harmonics
+                assert values["wear_coefficient"] == task.wear_coefficient
+                if not task.held:
+                    assert (values["step"], values["scheme"]) == (task.step, task.scheme)
+
+
+def test_nothing_wears_without_a_wear_coefficient() -> None:
+    _, plan = plan_of(*GRID)
+    held = [task for line in plan.marches for task in line if task.held]
+    assert len(held) == 3 * 8
+    assert all(len(task.points) == 4 and task.wear_coefficient == 0.0 for task in held)
+    assert [(item.n_points, item.reason.split(" ")[0]) for item in plan.left_out] == [(3 * 3 * 8, "wear_coefficient")]
+
+
+def test_unworn_states_are_computed_once() -> None:
+    study, plan = plan_of(*GRID, "slow_time.cycles=0")
+    assert all(task.held and task.cycles == (0.0,) for line in plan.marches for task in line)
+    assert sum(len(line) for line in plan.marches) == 3 * 8
+    assert [item.n_points for item in plan.left_out] == [7 * 3 * 8]
+    assert_every_point_once(study, plan)
+
+
+def test_largest_depth_makes_the_step_axis_idle_for_the_explicit_scheme() -> None:
+    study, plan = plan_of(
+        "axes.frequency=150",
+        "axes.step=[100, 1000, 5000]",
+        "axes.scheme=['implicit', 'explicit']",
+        "slow_time.largest_depth=1e-6",
+    )
+    tasks = {(task.scheme, task.largest_depth): len(task.points) for task in plan.marches[0]}
+    assert tasks == {("implicit", None): 1, ("explicit", 1e-6): 3}
+    assert len(plan.marches[0]) == 4
+    assert [item.n_points for item in plan.left_out] == [2]
+    assert_every_point_once(study, plan)
+
+
+def test_marches_cost_more_where_the_joint_moves_more() -> None:
+    _, plan = plan_of("axes.frequency=[1, 2, 3]", "axes.scheme=implicit")
+    starts = start_marches(plan.marches[0], BranchResult(starts=("a", "b", "c"), activity=(0.0, 4.0, 2.0)))
+    assert [task.start for task in starts] == ["a", "b", "c"]
+    assert starts[0].cost < starts[2].cost < starts[1].cost
+    assert np.isclose(starts[1].cost, plan.marches[0][1].cost)
+
+
+def test_marches_of_a_branch_that_was_not_found_have_a_cost() -> None:
+    _, plan = plan_of("axes.frequency=[1, 2]", "axes.scheme=implicit")
+    starts = start_marches(plan.marches[0], BranchResult(starts=(None, None), activity=(0.0, 0.0)))
+    assert all(task.cost > 0.0 for task in starts)
+
+
+def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["sdof_slider", "--plan"]
+    for override in GRID:
+        arguments += ["--set", override]
+    assert main(arguments) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    lines = {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
+    assert lines["points"].startswith("192 = 3 frequency x 2 wear_coefficient")
+    assert lines["tasks"].startswith("128: 8 branches")
+    assert lines["unknowns"].startswith("22 ")
+    assert lines["left out"].startswith("72 points: wear_coefficient = 0")
+    assert "on one rank" in lines["time"]
+    assert "GB a rank" in lines["memory"]

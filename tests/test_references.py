@@ -1,0 +1,208 @@
+"""The references against each other, against closed forms and against a general integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.references import (
+    NoPeriodicMotionError,
+    Orbit,
+    StopsOccurError,
+    coulomb_orbit,
+    den_hartog_amplitude,
+    slider_amplitude,
+    slider_orbit,
+    slider_wear_depth,
+    vibro_impact_orbit,
+)
+
+TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
+VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
+
+
+def phases(orbit: Orbit) -> set[str]:
+    return {segment.phase for segment in orbit.segments}
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.55, 0.8, 0.95, 1.05, 1.5, 2.3])
+@pytest.mark.parametrize("friction", [0.05, 0.3, 0.6, 0.9])
+def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(ratio: float, friction: float) -> None:
+    mass, stiffness, force = 0.1, 1.6e5, 10.0
+    omega = ratio * np.sqrt(stiffness / mass)
+    orbit = slider_orbit(mass, 0.0, stiffness, force, friction * force, omega)
+    if "stick" in phases(orbit):
+        with pytest.raises(StopsOccurError):
+            den_hartog_amplitude(mass, stiffness, force, friction * force, omega)
+    else:
+        amplitude = den_hartog_amplitude(mass, stiffness, force, friction * force, omega)
+        assert orbit.path(0, ("forward", "backward")) / 4 == pytest.approx(amplitude, rel=1e-10)
+        assert np.abs(orbit.sample(64)[0]).max() <= amplitude * (1 + 1e-10)
+
+
+def test_both_cases_occur_among_the_compared_sliders() -> None:
+    assert "stick" in phases(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 9.0, 0.8 * np.sqrt(1.6e6)))
+    assert "stick" not in phases(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 3.0, 0.8 * np.sqrt(1.6e6)))
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1 / 3, 0.2])
+def test_den_hartog_refuses_singular_frequencies(ratio: float) -> None:
+    with pytest.raises(StopsOccurError, match="singular"):
+        den_hartog_amplitude(1.0, 1.0, 1.0, 0.1, ratio)
+
+
+def test_without_friction_the_slider_is_a_linear_oscillator() -> None:
+    linear = slider_amplitude(2.0, 0.3, 5.0, 1.5, 0.0, 1.3)
+    assert linear == pytest.approx(1.5 / abs(5.0 - 2.0 * 1.3**2 + 0.39j))
+    assert slider_amplitude(2.0, 0.3, 5.0, 1.5, 1e-9, 1.3) == pytest.approx(linear, rel=1e-8)
+
+
+def test_a_force_below_the_friction_never_moves_the_slider() -> None:
+    orbit = slider_orbit(1.0, 0.1, 1.0, 1.0, 1.1, 0.9)
+    assert phases(orbit) == {"stick"}
+    assert orbit.harmonic(0) == 0
+
+
+@pytest.mark.parametrize("case", [(0.7, 0.1, 0.6), (0.4, 0.02, 0.5), (1.2, 0.3, 0.3)])
+def test_slider_with_damping_balances_its_energy(case: tuple[float, float, float]) -> None:
+    omega, damping, friction = case
+    orbit = slider_orbit(1.0, damping, 1.0, 1.0, friction, omega)
+    # Work of cos(omega t) on Re(X exp(i omega t)) in a period is -pi Im X.
+    work = -np.pi * orbit.harmonic(0).imag
+    speed = orbit.sample(4096)[1]
+    viscous = damping * np.mean(speed**2) * orbit.system.period
+    assert work == pytest.approx(viscous + friction * orbit.path(0, ("forward", "backward")), rel=1e-6)
+
+
+@pytest.mark.parametrize(("omega", "first", "second"), [(0.4, 25.21813, 31.60782), (0.6, 139.0437, 217.1278)])
+def test_two_masses_have_the_known_first_harmonics(omega: float, first: float, second: float) -> None:
+    orbit = coulomb_orbit(*TWO_MASSES, omega)
+    assert orbit.residual <= 1e-12
+    assert abs(orbit.harmonic(0)) == pytest.approx(first, rel=3e-7)
+    assert abs(orbit.harmonic(1)) == pytest.approx(second, rel=3e-7)
+    assert abs(orbit.harmonic(1, 0)) < 1e-9 * second
+
+
+def test_two_masses_agree_with_friction_that_is_nearly_rigid() -> None:
+    # A steep but smooth friction law in a general integrator; its slope bounds the difference.
+    omega, slope = 0.4, 2e3
+    orbit = coulomb_orbit(*TWO_MASSES, omega)
+    mass, damping, stiffness = (np.array(matrix, dtype=float) for matrix in TWO_MASSES[:3])
+    assert np.array_equal(mass, np.eye(2))
+
+    def rate(time: float, y: np.ndarray) -> np.ndarray:
+        force = np.array([20 * np.cos(omega * time), -7.2 * np.tanh(slope * y[3])])
+        return np.concatenate([y[2:], force - stiffness @ y[:2] - damping @ y[2:]])
+
+    period = orbit.system.period
+    solution = solve_ivp(
+        rate, (0, period), orbit.sample(1)[:, 0], method="LSODA", rtol=1e-9, atol=1e-9, t_eval=[period]
+    )
+    assert solution.y[:, -1] == pytest.approx(orbit.sample(1)[:, 0], rel=1e-3, abs=1e-2)
+
+
+def test_harmonics_are_those_of_the_samples() -> None:
+    orbit = coulomb_orbit(*TWO_MASSES, 0.4)
+    spectrum = np.fft.rfft(orbit.sample(1024)[:2]) * 2 / 1024
+    for dof in (0, 1):
+        for order in (1, 2, 3, 5):
+            assert orbit.harmonic(dof, order) == pytest.approx(spectrum[dof, order], abs=1e-4)
+
+
+def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase() -> None:
+    mass = np.diag([1.0, 2.0, 1.5])
+    stiffness = np.array([[3.0, -1, 0], [-1, 2, -1], [0, -1, 2]])
+    damping = 0.02 * stiffness + 0.01 * mass
+    load = np.array([1.0, 0.5j, 0])
+    for dof in range(3):
+        orbit = coulomb_orbit(mass, damping, stiffness, load, dof, 0.3, 1.1)
+        motion = np.array([orbit.harmonic(index) for index in range(3)])
+        taken_up = load - (stiffness - 1.1**2 * mass + 1.1j * damping) @ motion
+        assert np.delete(taken_up, dof) == pytest.approx(0, abs=1e-10)
+        # The first harmonic of a force that slip switches between +-0.3 N is at most 4/pi of that.
+        assert 0.3 < abs(taken_up[dof]) <= 0.3 * 4 / np.pi * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(("omega", "known"), [(1.2, 0.1146716), (1.5, 0.1889205)])
+def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega: float, known: float) -> None:
+    orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85)
+    assert phases(orbit) == {"open", "closed"}
+    assert abs(orbit.harmonic(0)) == pytest.approx(known, rel=3e-7)
+
+    def rate(time: float, y: np.ndarray) -> list[float]:
+        return [y[1], 0.02 * np.cos(omega * time) - 0.05 * y[1] - y[0] - 100 * max(y[0] - 0.1, 0.0)]
+
+    start = orbit.sample(1)[:, 0]
+    period = orbit.system.period
+    end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-11, atol=1e-13, max_step=period / 400).y[:, -1]
+    assert end == pytest.approx(start, rel=1e-7)
+
+
+def test_vibro_impact_is_linear_on_the_lower_branch() -> None:
+    orbit = vibro_impact_orbit(*VIBRO_IMPACT, 1.2, sweep="down", sweep_start=1.6, sweep_step=0.1)
+    assert phases(orbit) == {"open"}
+    assert abs(orbit.harmonic(0)) == pytest.approx(0.02 / abs(1 - 1.2**2 + 0.06j), rel=1e-10)
+
+
+def test_vibro_impact_with_interference_oscillates_about_its_static_state() -> None:
+    # Wall pressed by 0.02 m; the force is too small to open it: k x + k_w (x + 0.02) = 0 in the mean.
+    orbit = vibro_impact_orbit(2.0, 0.1, 3.0, 0.05, 500.0, -0.02, 1.7, sweep_start=1.6)
+    assert phases(orbit) == {"closed"}
+    assert orbit.harmonic(0, 0).real == pytest.approx(-500 * 0.02 / 503, rel=1e-10)
+    assert abs(orbit.harmonic(0)) == pytest.approx(0.05 / abs(503 - 2 * 1.7**2 + 0.17j), rel=1e-10)
+
+
+def test_wear_under_a_constant_force_is_linear() -> None:
+    depth = slider_wear_depth(
+        [0, 10, 100],
+        wear_coefficient=1e-11,
+        area=1e-4,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=0.0,
+        amplitude=lambda _: 1e-4,
+    )
+    assert depth == pytest.approx(np.array([0, 10, 100]) * 1e-11 / 1e-4 * 10 * 4e-4, rel=1e-10)
+
+
+def test_wear_under_a_spring_has_its_closed_solution_at_constant_amplitude() -> None:
+    cycles = np.array([0.0, 1e4, 1e5, 1e6])
+    rate = 1.1e-11 / 1e-4 * 4 * 1.5e-4
+    depth = slider_wear_depth(
+        cycles,
+        wear_coefficient=1.1e-11,
+        area=1e-4,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda _: 1.5e-4,
+    )
+    assert depth == pytest.approx(1e-4 * -np.expm1(-1e5 * rate * cycles), rel=1e-9)
+
+
+def test_wear_with_den_hartog_has_its_closed_solution() -> None:
+    # X = A sqrt(1 - b^2 N^2) makes N' = -c N sqrt(1 - b^2 N^2): artanh(sqrt(1 - b^2 N^2)) grows linearly in cycles.
+    mass, stiffness, force, friction = 0.1, 1.6e5, 10.0, 0.5
+    omega = 2 * np.pi * 160
+    ratio = omega / np.sqrt(stiffness / mass)
+    full = force / stiffness / (1 - ratio**2)
+    b = friction / force * np.tan(np.pi / (2 * ratio)) / ratio * (1 - ratio**2)
+    cycles = np.linspace(0, 1e5, 6)
+    depth = slider_wear_depth(
+        cycles,
+        wear_coefficient=1.1e-11,
+        area=1e-4,
+        friction_coefficient=friction,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda friction_force: slider_amplitude(mass, 0.0, stiffness, force, friction_force, omega),
+    )
+    grown = np.arctanh(np.sqrt(1 - (10 * b) ** 2)) + 1.1e-11 / 1e-4 * 1e5 * 4 * full * cycles
+    assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)
+
+
+def test_no_periodic_motion_is_said() -> None:
+    # At resonance without damping, friction below pi/4 of the force cannot bound the motion.
+    with pytest.raises(NoPeriodicMotionError):
+        slider_orbit(1.0, 0.0, 1.0, 1.0, 0.3, 1.0)
