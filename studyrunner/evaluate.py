@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -13,7 +13,7 @@ from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from studyrunner.results import BranchResult, MarchResult
+from studyrunner.results import MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask, Settings
 
 FloatArray = NDArray[np.float64]
@@ -38,23 +38,24 @@ def endings() -> tuple[Ending, ...]:
 
 def build_evaluator(
     model: ReducedModel, friction_coefficient: float
-) -> Callable[[BranchTask | MarchTask], BranchResult | MarchResult]:
-    """The function that does the tasks of a study on this model."""
+) -> Callable[[BranchTask | MarchTask], Iterator[StartResult | MarchResult]]:
+    """The function that does the tasks of a study on this model and gives their results one by one."""
 
-    def evaluate(task: BranchTask | MarchTask) -> BranchResult | MarchResult:
+    def evaluate(task: BranchTask | MarchTask) -> Iterator[StartResult | MarchResult]:
         if isinstance(task, BranchTask):
-            return follow(model, friction_coefficient, task)
-        return march(model, friction_coefficient, task)
+            yield from follow(model, friction_coefficient, task)
+        else:
+            yield march(model, friction_coefficient, task)
 
     return evaluate
 
 
-def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -> BranchResult:
-    """Start states of one branch."""
+def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -> Iterator[StartResult]:
+    """Start states of one branch, as the sweep reaches them."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.continuation import follow_branch
 
-    starts = follow_branch(
+    branch = follow_branch(
         model,
         friction_coefficient,
         task.excitation_amplitude,
@@ -62,7 +63,8 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -
         cast("Literal['up', 'down']", task.sweep),
         _solver_settings(task.settings),
     )
-    return BranchResult(starts=starts, activity=tuple(_activity(start) for start in starts))
+    for position, start in branch:
+        yield StartResult(position, start, _activity(start))
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> MarchResult:

@@ -55,6 +55,12 @@ class Ranks(Protocol):
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
 
+    def flush(self) -> None:
+        """Waits until all that was sent is received or on its way by itself; before a rank goes on computing.
+
+        The receiver has to be looking for messages: a large one moves only while its sender is in the MPI library.
+        """
+
     def receive(self) -> tuple[int, object] | None:
         """The rank that sent the next message and the message, or None where there is none yet."""
 
@@ -74,6 +80,9 @@ class Alone:
     def send(self, message: object, rank: int) -> None:
         """There is nobody to send to: a call is a bug."""
         raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
+
+    def flush(self) -> None:
+        """Nothing was sent."""
 
     def receive(self) -> tuple[int, object] | None:
         """Nobody sends."""
@@ -114,6 +123,12 @@ class MpiRanks:
         """As in Ranks."""
         self._sent = [request for request in self._sent if not request.Test()]
         self._sent.append(self._world.isend(message, dest=rank))
+
+    def flush(self) -> None:
+        """As in Ranks."""
+        while not self._mpi.Request.Testall(self._sent):
+            time.sleep(POLL_SECONDS)
+        self._sent = []
 
     def receive(self) -> tuple[int, object] | None:
         """As in Ranks."""

@@ -12,15 +12,16 @@ from studyrunner.tasks import Index
 
 
 @dataclass(frozen=True)
-class BranchResult:
-    """Start states of a branch, one per frequency.
+class StartResult:
+    """Start state at one frequency of a branch; a branch gives one after the other.
 
-    starts: what a march starts from. activity: for each, how much moves in the joint, in arbitrary units: points that
-    move more wear more and take longer.
+    position: place of the frequency in the branch. start: what a march starts from. activity: how much moves in the
+    joint, in arbitrary units: points that move more wear more and take longer.
     """
 
-    starts: tuple[object, ...]
-    activity: tuple[float, ...]
+    position: int
+    start: object
+    activity: float
 
 
 @dataclass(frozen=True)

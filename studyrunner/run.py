@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from studyrunner.evaluate import CONVERGED, build_evaluator, describe_failures
 from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
-from studyrunner.results import BranchResult, MarchResult
+from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.schedule import serve_tasks, work_on_tasks
 from studyrunner.study import Study
@@ -19,10 +19,10 @@ from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
-Evaluate = Callable[[BranchTask | MarchTask], BranchResult | MarchResult]
+Evaluate = Callable[[BranchTask | MarchTask], Iterator[StartResult | MarchResult]]
 
 _QUIET_COST = 0.1
-"""Estimated time of a march from a state that hardly moves, over that of the liveliest one of its branch."""
+"""Estimated time of a march from a state that hardly moves, over that from a lively one."""
 
 
 @dataclass(frozen=True)
@@ -67,41 +67,47 @@ def work_on_job(ranks: Ranks, job: Job) -> None:
 def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, progress: RunProgress) -> tuple[MarchResult, ...]:
     """Results of all march tasks, in the order in which they arrive. Rank 0 only; the others work on tasks.
 
-    A march becomes available when its branch is done. What a task computes never depends on the order.
+    A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
+    order.
     """
     results: list[MarchResult] = []
-    costs = {"done": 0.0, "total": plan.cost, "points": 0.0, "branches": 0.0}
-    n_branches = count(len(plan.branches), "branch", "branches")
+    sums = {"done": 0.0, "total": plan.cost, "most": 0.0}
+    counts = {"points": 0, "starts": 0}
+    n_starts = sum(len(branch.frequencies) for branch in plan.branches)
 
-    def take(task: BranchTask | MarchTask, result: BranchResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
-        costs["done"] += task.cost
+    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new: tuple[MarchTask, ...] = ()
-        if isinstance(task, BranchTask) and isinstance(result, BranchResult):
-            planned = plan.marches[task.number]
-            new = start_marches(planned, result)
-            costs["total"] += sum(march.cost for march in new) - sum(march.cost for march in planned)
-            costs["branches"] += 1
-            progress.say(f"marching through wear histories, {costs['branches']:.0f} of {n_branches} followed")
+        if isinstance(task, BranchTask) and isinstance(result, StartResult):
+            planned = [march for march in plan.marches[task.number] if march.position == result.position]
+            sums["most"] = max(sums["most"], result.activity)
+            new = start_marches(planned, result, sums["most"])
+            sums["done"] += task.cost / len(task.frequencies)
+            sums["total"] += sum(march.cost for march in new) - sum(march.cost for march in planned)
+            counts["starts"] += 1
+            if counts["starts"] == n_starts:
+                progress.say("marching through the remaining wear histories")
         elif isinstance(result, MarchResult):
             results.append(result)
-            costs["points"] += len(result.points)
-        progress.report(costs["done"], costs["total"], int(costs["points"]), plan.n_points)
+            sums["done"] += task.cost
+            counts["points"] += len(result.points)
+        progress.report(sums["done"], sums["total"], counts["points"], plan.n_points)
         return new
 
-    n_frequencies = len(plan.branches[0].frequencies)
-    progress.say(f"following {n_branches} along {count(n_frequencies, 'frequency', 'frequencies')}")
+    n_branches = count(len(plan.branches), "branch", "branches")
+    n_frequencies = count(len(plan.branches[0].frequencies), "frequency", "frequencies")
+    progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
     progress.report(0.0, plan.cost, 0, plan.n_points)
     first: list[BranchTask | MarchTask] = [*plan.branches]
     serve_tasks(ranks, first, evaluate, take, progress.tick)
     return tuple(results)
 
 
-def start_marches(planned: Sequence[MarchTask], branch: BranchResult) -> tuple[MarchTask, ...]:
-    """The marches of a branch with their start states, dearer where the joint moves more."""
-    most = max(branch.activity, default=0.0)
-    marches = []
-    for task in planned:
-        liveliness = branch.activity[task.position] / most if most > 0.0 else 1.0
-        cost = task.cost * (_QUIET_COST + (1.0 - _QUIET_COST) * liveliness)
-        marches.append(replace(task, start=branch.starts[task.position], cost=cost))
-    return tuple(marches)
+def start_marches(planned: Sequence[MarchTask], started: StartResult, most: float) -> tuple[MarchTask, ...]:
+    """The marches from a start state, dearer where the joint moves more; `most`: the largest activity so far."""
+    liveliness = started.activity / most if most > 0.0 else 1.0
+    share = _QUIET_COST + (1.0 - _QUIET_COST) * liveliness
+    # The urgency compares all marches of a study, the first ones too: no share of a largest value that still grows.
+    return tuple(
+        replace(task, start=started.start, cost=task.cost * share, urgency=task.cost * started.activity)
+        for task in planned
+    )

@@ -36,6 +36,11 @@ class BranchTask:
     frequencies: tuple[float, ...]
     cost: float
 
+    @property
+    def urgency(self) -> float:
+        """Before all marches: branches make them possible."""
+        return math.inf
+
 
 @dataclass(frozen=True)
 class MarchTask:
@@ -44,7 +49,8 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
     cycle 0 holds for all cycles; wear_coefficient, step and scheme are then those of the first point.
     cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
-    variables: what is kept. start: start state, None until its branch is done. cost: estimated seconds.
+    variables: what is kept. cost: estimated seconds. start: start state, None until its branch has reached it.
+    urgency: estimated work in arbitrary units, the same for all marches of a study; known with the start state.
     """
 
     branch: int
@@ -60,6 +66,7 @@ class MarchTask:
     variables: tuple[str, ...]
     cost: float
     start: object = field(default=None, compare=False)
+    urgency: float = field(default=0.0, compare=False)
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,7 @@ def vibro_impact_orbit(
     state, here, largest, previous = _state(orbit, at_rest), sweep_start, sweep_step * natural, None
     step = largest
     while here != omega:
-        there = omega if abs(omega - here) <= step else here + np.copysign(step, omega - here)
+        there = _towards(here, omega, step)
         slope = np.zeros(2) if previous is None else (state - previous[1]) / (here - previous[0])
         guess = state + slope * (there - here)
         system = system_at(there)
@@ -255,18 +255,23 @@ def vibro_impact_orbit(
         elif step > 1e-4 * largest:
             step /= 2
             continue
-        else:  # the branch has ended: the motion falls on another one
-            orbit, previous, step = _land(system, state), None, largest
+        else:  # the branch has ended: a whole step behind its end the motion falls on another one
+            there, previous, step = _towards(here, omega, largest), None, largest
+            orbit = _land(system_at(there), state)
         state, here = _state(orbit, state), there
     if orbit is None:
         raise NoPeriodicMotionError(f"no periodic motion at {omega} rad/s on a sweep {sweep} from {sweep_start} rad/s")
     return orbit
 
 
+def _towards(here: float, end: float, step: float) -> float:
+    return end if abs(end - here) <= step else here + float(np.copysign(step, end - here))
+
+
 def _land(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
     y = system.extended(state[:1], state[1:])
     try:
-        return solve_orbit(system, system.phase_at("open", y), y, attempts=5)
+        return solve_orbit(system, system.phase_at("open", y), y, attempts=10)
     except NoPeriodicMotionError:
         return None  # chaos, or a period of several forces: the sweep goes on behind it
 

@@ -165,7 +165,7 @@ def chord_directions(stagger_degrees: float) -> tuple[FloatArray, FloatArray]:
 def _airfoil_section(parameters: Parameters, height: float, across: FloatArray) -> FloatArray:
     """Points (n_thickness, n_axial, 3) of the section at a height above the platform, fillet included.
 
-    Chord, thickness and stagger vary linearly from foot to tip. Over the fillet the section blends quadratically from
+    Chord, thicknesses and stagger vary linearly from foot to tip. Over the fillet the section blends quadratically from
     the rectangle of the neck to the airfoil.
     """
     p = parameters
@@ -174,7 +174,8 @@ def _airfoil_section(parameters: Parameters, height: float, across: FloatArray) 
     thickness = p.root_thickness + share * (p.tip_thickness - p.root_thickness)
     along, normal = chord_directions(p.root_stagger + share * (p.tip_stagger - p.root_stagger))
     stations = _axial_stations(p)
-    profile = p.edge_thickness + (1.0 - p.edge_thickness) * (1.0 - (2.0 * stations) ** 2)
+    edge = p.root_edge_thickness + share * (p.tip_edge_thickness - p.root_edge_thickness)
+    profile = edge + (1.0 - edge) * (1.0 - (2.0 * stations) ** 2)
     airfoil = (
         chord * stations[None, :, None] * along
         + 0.5 * thickness * profile[None, :, None] * across[:, None, None] * normal

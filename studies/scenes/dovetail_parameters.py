@@ -20,7 +20,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
-    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, rpm; it presses the flanks together")
+    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
     mesh: int = Field(2, ge=1, le=3, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
@@ -34,7 +34,7 @@ class Parameters(BaseModel):
 
     bore_radius: float = Field(0.120, gt=0, description="radius of the clamped bore, m")
     hub_radius: float = Field(0.125, gt=0, description="outer radius of the hub, m")
-    web_inner_radius: float = Field(0.147, gt=0, description="radius where the web has become thin, m")
+    web_inner_radius: float = Field(0.146, gt=0, description="radius where the web has become thin, m")
     web_outer_radius: float = Field(0.202, gt=0, description="radius where the web begins to widen to the rim, m")
     rim_inner_radius: float = Field(0.212, gt=0, description="inner radius of the rim, m")
     slot_bottom_radius: float = Field(0.234, gt=0, description="radius of the slot bottom, m")
@@ -59,9 +59,10 @@ class Parameters(BaseModel):
     tip_chord: float = Field(0.040, gt=0, description="chord at the tip, m")
     root_thickness: float = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade, m")
     tip_thickness: float = Field(0.0026, gt=0, description="thickness in mid-chord at the tip, m")
-    edge_thickness: float = Field(
-        0.85, gt=0, le=1, description="thickness of the edges over that in mid-chord, parabolic between, -"
+    root_edge_thickness: float = Field(
+        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord, parabolic between, -"
     )
+    tip_edge_thickness: float = Field(0.78, gt=0, le=1, description="the same ratio at the tip, -")
     root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")
     tip_stagger: float = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip, degrees")
     fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
@@ -84,11 +85,6 @@ class Parameters(BaseModel):
             self.flank_top_radius - self.flank_length * cos(angle),
             self.flank_top_half_width + self.flank_length * sin(angle),
         )
-
-    @property
-    def tip_radius(self) -> float:
-        """Radius of the blade tip along the centre line, m."""
-        return self.platform_radius + self.platform_thickness + self.blade_length
 
 
 _ASCENDING = (

@@ -81,6 +81,15 @@ def test_uneven_tasks_are_balanced_while_running(n_ranks: int, tmp_path: Path) -
     assert max(loads) < 1.25 * sum(loads) / n_ranks
 
 
+@pytest.mark.parametrize(("n_ranks", "sweeps"), [(2, "['up']"), (3, "['up', 'down']")], ids=["one", "one a rank"])
+def test_marches_are_done_while_their_branch_goes_on(n_ranks: int, sweeps: str, tmp_path: Path) -> None:
+    """Every branch stands still after its first start state until a march from it is done, which no rank but one has
+    time for."""
+    arguments = [FAKED, *GRID, "--set", f"axes.sweep={sweeps}"]
+    done = start(n_ranks, arguments, tmp_path, {"FAKE_SECONDS": "0.01", "FAKE_PATIENCE": "20"})
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("failing", [0, 1])
 def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None:
     done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": str(failing)})

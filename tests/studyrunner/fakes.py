@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
-from studyrunner.results import BranchResult, MarchResult
+from studyrunner.results import MarchResult, StartResult
+from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.variables import ASKED
 
 FACTS = SceneFacts(
@@ -23,14 +25,25 @@ FACTS = SceneFacts(
 
 def fake_evaluate(
     task: BranchTask | MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0
-) -> BranchResult | MarchResult:
-    """A result that depends on everything in the task but its cost; takes up to `seconds`, unevenly."""
+) -> Iterator[StartResult | MarchResult]:
+    """Results that depend on everything in the task but its cost; a march takes up to `seconds`, unevenly."""
     if isinstance(task, BranchTask):
-        settings = (task.settings.harmonics, task.settings.samples, task.settings.tolerance)
-        starts = tuple(
-            (frequency, task.excitation_amplitude, task.sweep == "up", *settings) for frequency in task.frequencies
-        )
-        return BranchResult(starts=starts, activity=tuple(1.0 / frequency for frequency in task.frequencies))
+        yield from fake_branch(task)
+    else:
+        yield fake_march(task, facts, seconds)
+
+
+def fake_branch(task: BranchTask) -> Iterator[StartResult]:
+    """Start states in the order of the sweep."""
+    settings = (task.settings.harmonics, task.settings.samples, task.settings.tolerance)
+    places = list(enumerate(task.frequencies))
+    for position, frequency in places if task.sweep == "up" else reversed(places):
+        start = (frequency, task.excitation_amplitude, task.sweep == "up", *settings)
+        yield StartResult(position, start, 1.0 / frequency)
+
+
+def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0) -> MarchResult:
+    """A history whose values tell the task."""
     assert isinstance(task.start, tuple)
     fingerprint = float(np.dot(task.start, [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0]))
     fingerprint += task.wear_coefficient * 1e9 + task.step * 1e-4 + 0.5 * (task.scheme == "implicit")
@@ -42,3 +55,14 @@ def fake_evaluate(
         shape = (len(task.cycles), *(sizes[dimension] for dimension in ASKED[name].dimensions[1:]))
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
     return MarchResult(task.points, 0, values, np.nan, 0.01, round(fingerprint), pause)
+
+
+def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:
+    """All marches of a branch with their start states."""
+    return [
+        march
+        for started in fake_branch(plan.branches[branch])
+        for march in start_marches(
+            [task for task in plan.marches[branch] if task.position == started.position], started, 1.0
+        )
+    ]

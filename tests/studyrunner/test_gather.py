@@ -13,10 +13,9 @@ from studyrunner import gather
 from studyrunner.evaluate import endings
 from studyrunner.gather import build_dataset, write_dataset
 from studyrunner.results import MarchResult
-from studyrunner.run import start_marches
 from studyrunner.study_file import read_study
-from studyrunner.tasks import MarchTask, build_tasks
-from tests.studyrunner.fakes import FACTS, fake_evaluate
+from studyrunner.tasks import build_tasks
+from tests.studyrunner.fakes import FACTS, fake_march, fake_starts
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -31,11 +30,7 @@ SHAPE = (2, 1, 1, 1, 2, 1, 2)
 def fake_results(*overrides: str) -> list[MarchResult]:
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
-    results = []
-    for branch, line in zip(plan.branches, plan.marches, strict=True):
-        for task in start_marches(line, fake_evaluate(branch)):
-            results.append(fake_evaluate(task))
-    return results
+    return [fake_march(task) for branch in plan.branches for task in fake_starts(plan, branch.number)]
 
 
 @pytest.fixture
@@ -95,13 +90,8 @@ def test_coordinates(opened: xr.Dataset) -> None:
 def test_every_point_is_where_it_belongs(opened: xr.Dataset) -> None:
     study = read_study("sdof_slider", OVERRIDES)
     plan = build_tasks(study, FACTS.n_displacements)
-    branch = plan.branches[1]
-    task = next(task for task in plan.marches[1] if task.scheme == "explicit" and task.position == 1)
-    (started,) = [
-        t for t in start_marches(plan.marches[1], fake_evaluate(branch)) if t == task or t.points == task.points
-    ]
-    expected = fake_evaluate(started)
-    assert isinstance(expected, MarchResult)
+    (started,) = [task for task in fake_starts(plan, 1) if task.scheme == "explicit" and task.position == 1]
+    expected = fake_march(started)
     there = opened.sel(frequency=160.0, scheme="explicit", harmonics=3).squeeze()
     assert there.wear_depth.dims == ("cycle", "contact")
     assert np.array_equal(there.wear_depth, expected.values["wear_depth"])
@@ -162,8 +152,8 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    tasks: list[MarchTask] = list(start_marches(plan.marches[0], fake_evaluate(plan.branches[0])))
-    write_dataset(build_dataset(study, FACTS, [fake_evaluate(task) for task in tasks]), tmp_path / "dovetail.nc")
+    results = [fake_march(task) for task in fake_starts(plan, 0)]
+    write_dataset(build_dataset(study, FACTS, results), tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.evaluate import build_result
 from studyrunner.progress import RunProgress, format_seconds
-from studyrunner.results import BranchResult, MarchResult
+from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
@@ -34,12 +34,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, MarchResult], MarchResult]) -> None:
     """Puts the stand-in in place of the solver; `change` has the last word on every history."""
 
-    def build_fake(model: object, friction_coefficient: float) -> Callable[..., BranchResult | MarchResult]:
+    def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
         facts = describe_scene(model)
 
-        def evaluate(task: BranchTask | MarchTask) -> BranchResult | MarchResult:
-            result = fake_evaluate(task, facts)
-            return result if isinstance(result, BranchResult) else change(task, result)
+        def evaluate(task: BranchTask | MarchTask) -> Iterator[StartResult | MarchResult]:
+            for result in fake_evaluate(task, facts):
+                yield result if isinstance(result, StartResult) else change(task, result)
 
         return evaluate
 

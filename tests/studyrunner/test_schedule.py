@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
@@ -14,34 +16,56 @@ from studyrunner.schedule import serve_tasks
 @dataclass(frozen=True)
 class Job:
     name: str
-    cost: float
+    urgency: float
 
 
 def take_nothing(job: Job, result: object) -> list[Job]:
     return []
 
 
-def test_expensive_tasks_go_first_and_results_make_new_ones() -> None:
+def test_urgent_tasks_go_first_and_results_make_new_ones() -> None:
     done: list[tuple[str, str]] = []
+
+    def run(job: Job) -> Iterator[str]:
+        yield job.name.upper()
 
     def take(job: Job, result: str) -> list[Job]:
         done.append((job.name, result))
         return [Job("a1", 2.0), Job("a2", 5.0)] if job.name == "a" else []
 
-    serve_tasks(Alone(), [Job("b", 1.0), Job("a", 3.0)], lambda job: job.name.upper(), take)
-    order = [name for name, _ in done]
-    assert sorted(order) == ["a", "a1", "a2", "b"]
-    assert order.index("a") == 0
-    assert order.index("a2") < order.index("a1")
-    assert all(result == name.upper() for name, result in done)
+    serve_tasks(Alone(), [Job("b", 1.0), Job("a", 3.0)], run, take)
+    assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
+
+
+def test_results_arrive_while_their_task_goes_on() -> None:
+    taken = threading.Event()
+
+    def run(job: Job) -> Iterator[int]:
+        yield 1
+        assert taken.wait(10.0)
+        yield 2
+
+    def take(job: Job, result: int) -> list[Job]:
+        taken.set()
+        results.append(result)
+        return []
+
+    results: list[int] = []
+    serve_tasks(Alone(), [Job("a", 1.0)], run, take)
+    assert results == [1, 2]
+
+
+def test_a_task_may_have_no_result() -> None:
+    serve_tasks(Alone(), [Job("a", 1.0)], lambda job: [], take_nothing)
 
 
 def test_no_tasks() -> None:
-    serve_tasks(Alone(), [], lambda job: job, take_nothing)
+    serve_tasks(Alone(), [], lambda job: [job], take_nothing)
 
 
 def test_an_exception_in_a_task_is_raised() -> None:
-    def fail(job: Job) -> None:
+    def fail(job: Job) -> Iterator[object]:
+        yield "a result"
         raise ZeroDivisionError(job.name)
 
     with pytest.raises(ZeroDivisionError, match="a"):

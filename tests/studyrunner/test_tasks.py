@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import Counter
 
-import numpy as np
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.results import BranchResult
+from studyrunner.results import StartResult
 from studyrunner.run import start_marches
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
@@ -96,18 +96,27 @@ def test_largest_depth_makes_the_step_axis_idle_for_the_explicit_scheme() -> Non
     assert_every_point_once(study, plan)
 
 
-def test_marches_cost_more_where_the_joint_moves_more() -> None:
+def test_marches_cost_more_and_go_first_where_the_joint_moves_more() -> None:
     _, plan = plan_of("axes.frequency=[1, 2, 3]", "axes.scheme=implicit")
-    starts = start_marches(plan.marches[0], BranchResult(starts=("a", "b", "c"), activity=(0.0, 4.0, 2.0)))
-    assert [task.start for task in starts] == ["a", "b", "c"]
-    assert starts[0].cost < starts[2].cost < starts[1].cost
-    assert np.isclose(starts[1].cost, plan.marches[0][1].cost)
+    still, some, lively = (
+        start_marches(plan.marches[0][:1], StartResult(0, "state", activity), 4.0)[0] for activity in (0.0, 2.0, 4.0)
+    )
+    assert lively.start == "state"
+    assert 0.0 < still.cost < some.cost < lively.cost
+    assert still.urgency < some.urgency < lively.urgency < plan.branches[0].urgency
+    assert math.isclose(lively.cost, plan.marches[0][0].cost)
+
+
+def test_urgency_does_not_depend_on_what_was_seen_before() -> None:
+    _, plan = plan_of("axes.frequency=[1, 2]", "axes.scheme=implicit")
+    first, later = (start_marches(plan.marches[0][:1], StartResult(0, "state", 2.0), most)[0] for most in (2.0, 10.0))
+    assert first.urgency == later.urgency
 
 
 def test_marches_of_a_branch_that_was_not_found_have_a_cost() -> None:
     _, plan = plan_of("axes.frequency=[1, 2]", "axes.scheme=implicit")
-    starts = start_marches(plan.marches[0], BranchResult(starts=(None, None), activity=(0.0, 0.0)))
-    assert all(task.cost > 0.0 for task in starts)
+    (task,) = start_marches(plan.marches[0][:1], StartResult(0, None, 0.0), 0.0)
+    assert task.cost > 0.0
 
 
 def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
