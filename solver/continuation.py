@@ -19,6 +19,7 @@ from solver.response import periodic_state, solve_first_state
 from solver.settings import SolverSettings
 
 LEAD_IN = 0.05  # of the first frequency: a sweep begins outside its range, so that a single frequency knows its branch
+FINE = 0.001  # of the frequency: steps that a sweep may always take
 
 Sweep = Literal["up", "down"]
 
@@ -86,7 +87,9 @@ class _Line:
     def _next(self, omega: float) -> PathPoint | None:
         assert self.point is not None
         tolerance = self.case.settings.tolerance
-        point, arrived = follow_naturally(self._balance_at, self.point, omega, self.solver, tolerance, self.effort)
+        point, arrived = follow_naturally(
+            self._balance_at, self.point, omega, self.solver, tolerance, self.effort, fine=FINE * omega
+        )
         if arrived:
             return point
         return follow_arc(self._balance_at, point, omega, 0.05 * omega, tolerance, self.effort)

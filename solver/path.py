@@ -20,6 +20,7 @@ BalanceAt = Callable[[float, FloatArray], Balance]
 
 EASY = 10  # Newton iterations of a step that is not divided
 SMALLEST_SHARE = 1.0 / 64.0  # of the way to a target: below it the branch is taken to fold
+CALM = 0.2  # relative change of the vibration over a step that need not be divided
 ARC_STEPS = 400
 FARTHEST_BACK = 10.0  # natural lengths of the parameter
 ARC_ITERATIONS = 8
@@ -72,35 +73,40 @@ def follow_naturally(
     tolerance: float,
     effort: Effort,
     keep_history: bool = False,
+    fine: float = np.inf,
 ) -> tuple[PathPoint, bool]:
     """Step the parameter to the target, the step halved where Newton labours; the last point and whether it got there.
 
-    The first Newton iteration from the last state is the tangent predictor (for wear: Eq. (19)), so no other is needed.
+    Where steps leave a history behind, what is found depends on them: a step longer than `fine` is taken only where the
+    vibration changes little over it. The first Newton iteration from the last state is the tangent predictor (for wear: Eq. (19)), so no other is needed.
     With `keep_history` the history stays that of the start: the intermediate states are no states of the joint.
     """
     point = start
-    share = 1.0
     whole = target - start.parameter
-    if whole == 0.0:
-        return start, True
+    share = 1.0
     while point.parameter != target:
         reach = point.parameter + share * whole
         if (target - reach) * whole <= 1e-9 * whole * whole:
             reach = target
         balance = balance_at(reach, point.history)
-        last_chance = share <= 2.0 * SMALLEST_SHARE
-        result = solve_balance(
-            balance, point.evaluation.predicted_h, solver, tolerance, effort, 30 if last_chance else EASY
-        )
-        if result.converged:
+        most = 30 if share <= 2.0 * SMALLEST_SHARE else EASY
+        result = solve_balance(balance, point.evaluation.predicted_h, solver, tolerance, effort, most)
+        calm = abs(reach - point.parameter) <= fine or _change(point.evaluation, result.evaluation) <= CALM
+        if result.converged and calm:
             history = point.history if keep_history else final_history(balance, result.evaluation)
             point = PathPoint(reach, result.evaluation, history)
             share = min(2.0 * share, 1.0)
         else:
             share *= 0.5
-            if share < SMALLEST_SHARE:
+            if share < SMALLEST_SHARE and (not result.converged or share * abs(whole) < 0.25 * fine):
                 return point, False
     return point, True
+
+
+def _change(before: Evaluation, after: Evaluation) -> float:
+    """Change of the vibrating part of the predicted force over its size, of two states."""
+    change = float(np.linalg.norm(after.predicted_h[:, 1:] - before.predicted_h[:, 1:]))
+    return change / max(float(np.linalg.norm(before.predicted_h[:, 1:])), 1e-300)
 
 
 def follow_arc(

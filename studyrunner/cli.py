@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import time
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from studyrunner.ranks import LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
@@ -21,6 +24,9 @@ CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit statuses."""
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+_INTERRUPTED_LINE = "run-study: interrupted, nothing was written"
+_SECONDS_FOR_RANK_0 = 3.0
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -99,19 +105,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks."""
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
     try:
         ranks = start_ranks()
     except LauncherError as error:
         if launcher_rank() == 0:
             print(f"run-study: launcher: {error}", file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:
+        if launcher_rank() == 0:
+            print(_INTERRUPTED_LINE, file=sys.stderr)
+        return INTERRUPTED
     try:
         status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
         ranks.close()
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
         if isinstance(error, KeyboardInterrupt):
-            print("run-study: interrupted, nothing was written", file=sys.stderr)
+            if ranks.rank > 0:
+                # The launcher interrupts all ranks, and rank 0 then speaks for them.
+                time.sleep(_SECONDS_FOR_RANK_0)
+            print(_INTERRUPTED_LINE, file=sys.stderr)
             status = INTERRUPTED
         else:
             print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
@@ -119,6 +135,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             status = UNEXPECTED
         ranks.abort(status)
     return status
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    """Ctrl-C and SIGTERM: ends the run in good order; the same again does not disturb that."""
+    for again in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(again, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:

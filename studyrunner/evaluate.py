@@ -30,6 +30,8 @@ class Ending:
 
 CONVERGED = int(Outcome.CONVERGED)
 
+_ROUND_OFF = 1e-10
+
 
 def endings() -> tuple[Ending, ...]:
     """All ways for a computation to end, by number."""
@@ -64,7 +66,7 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -
         _solver_settings(task.settings),
     )
     for position, start in branch:
-        yield StartResult(position, start, _activity(start))
+        yield StartResult(position, start, _moves(start))
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> MarchResult:
@@ -116,11 +118,12 @@ def _variable(history: WearHistory, name: str) -> FloatArray:
     return cast("FloatArray", getattr(history, name))
 
 
-def _activity(start: StartState) -> float:
-    """Size of the relative motion in the joint without its mean, m; 0 where there is no state."""
+def _moves(start: StartState) -> bool:
+    """Whether the relative motion in the joint is more than the round-off of its mean; no where there is no state."""
     if start.state is None:
-        return 0.0
-    return float(np.linalg.norm(start.state.displacement_h[:, :, 1:]))
+        return False
+    motion_h = start.state.displacement_h
+    return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))
 
 
 def _solver_settings(settings: Settings) -> SolverSettings:

@@ -57,7 +57,12 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult
     )
     for name in map(str, dataset.variables):
         entry = COORDINATES.get(name) or variables[name]
-        dataset[name].attrs = {"units": entry.units, "long_name": entry.long_name}
+        content = "coordinate" if name in COORDINATES else "modelResult"
+        dataset[name].attrs = {
+            "units": entry.units,
+            "long_name": entry.long_name,
+            "coverage_content_type": content,
+        }
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
@@ -105,9 +110,10 @@ def _attributes(study: Study, facts: SceneFacts) -> dict[str, str]:
     versions = {name: metadata.version(name) for name in _PACKAGES}
     own = f"{_PACKAGES[0]} {versions[_PACKAGES[0]]}"
     return {
-        "Conventions": "CF-1.11 ACDD-1.3",
+        "Conventions": "CF-1.11, ACDD-1.3",
         "title": study.study.title or study.study.name,
         "summary": "Fretting wear of a joint under vibration: wear histories over the axes of a parameter study.",
+        "keywords": "fretting wear, contact, dry friction, vibration, harmonic balance",
         "source": f"{own}: multiscale harmonic balance with wear on a slow time scale",
         "history": f"computed by run-study of {own} from the study in the attribute study",
         "study": format_study(study),

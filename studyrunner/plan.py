@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from studyrunner.estimate import memory_a_rank
+from studyrunner.estimate import COMPILE_SECONDS, ITERATIONS_A_STEP, memory_a_rank, seconds_an_iteration
 from studyrunner.progress import count, format_seconds
 from studyrunner.scene import SceneFacts
 from studyrunner.study import Study
@@ -23,6 +23,10 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
     left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or ["nothing"]
     size = n_values * 8 / 1e6
     memory = memory_a_rank(plan.n_unknowns, n_values) / 1e9
+    assumed = (
+        f"{ITERATIONS_A_STEP} Newton iterations of {1e3 * seconds_an_iteration(plan.n_unknowns):.0f} ms or less a step, none"
+        f" where nothing slips; a first run compiles for {COMPILE_SECONDS} s more"
+    )
     rows = [
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
@@ -34,7 +38,11 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
         ("unknowns", f"{plan.n_unknowns} at most in one task"),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
-        ("time", f"about {format_seconds(plan.cost)} on one rank, {_on_two(plan)} on two (rough estimate)"),
+        (
+            "time",
+            f"about {format_seconds(plan.cost)} on one rank, {_on_two(plan)} on two, if every point wears (rough)",
+        ),
+        ("assumed", assumed),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {text}" for label, text in rows)

@@ -86,7 +86,8 @@ class RunProgress:
         return f"[{format_seconds(self.seconds):>7}]"
 
     def _left(self) -> str:
-        if self._done_cost <= 0.0:
+        # Before, hardly more is known than what the plan said.
+        if self._done_cost <= 0.0 or self._points[0] == 0:
             return ""
         left = self.seconds * (self._total_cost / self._done_cost - 1.0)
         return f", about {format_seconds(left)} left"

@@ -15,13 +15,13 @@ from studyrunner.tasks import Index
 class StartResult:
     """Start state at one frequency of a branch; a branch gives one after the other.
 
-    position: place of the frequency in the branch. start: what a march starts from. activity: how much moves in the
-    joint, in arbitrary units: points that move more wear more and take longer.
+    position: place of the frequency in the branch. start: what a march starts from. moves: whether anything slips or
+    lifts in the joint; where nothing does nothing wears.
     """
 
     position: int
     start: object
-    activity: float
+    moves: bool
 
 
 @dataclass(frozen=True)

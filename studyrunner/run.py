@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 Evaluate = Callable[[BranchTask | MarchTask], Iterator[StartResult | MarchResult]]
 
-_QUIET_COST = 0.1
-"""Estimated time of a march from a state that hardly moves, over that from a lively one."""
+_COST_AT_REST = 0.01
+"""Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, progress: RunPro
     order.
     """
     results: list[MarchResult] = []
-    sums = {"done": 0.0, "total": plan.cost, "most": 0.0}
+    sums = {"done": 0.0, "total": plan.cost}
     counts = {"points": 0, "starts": 0}
     n_starts = sum(len(branch.frequencies) for branch in plan.branches)
 
@@ -79,8 +79,7 @@ def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, progress: RunPro
         new: tuple[MarchTask, ...] = ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
             planned = [march for march in plan.marches[task.number] if march.position == result.position]
-            sums["most"] = max(sums["most"], result.activity)
-            new = start_marches(planned, result, sums["most"])
+            new = start_marches(planned, result)
             sums["done"] += task.cost / len(task.frequencies)
             sums["total"] += sum(march.cost for march in new) - sum(march.cost for march in planned)
             counts["starts"] += 1
@@ -102,12 +101,7 @@ def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, progress: RunPro
     return tuple(results)
 
 
-def start_marches(planned: Sequence[MarchTask], started: StartResult, most: float) -> tuple[MarchTask, ...]:
-    """The marches from a start state, dearer where the joint moves more; `most`: the largest activity so far."""
-    liveliness = started.activity / most if most > 0.0 else 1.0
-    share = _QUIET_COST + (1.0 - _QUIET_COST) * liveliness
-    # The urgency compares all marches of a study, the first ones too: no share of a largest value that still grows.
-    return tuple(
-        replace(task, start=started.start, cost=task.cost * share, urgency=task.cost * started.activity)
-        for task in planned
-    )
+def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:
+    """The marches from a start state. Where something moves they take about the same time, be it little or much."""
+    share = 1.0 if started.moves else _COST_AT_REST
+    return tuple(replace(task, start=started.start, cost=task.cost * share) for task in planned)

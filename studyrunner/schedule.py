@@ -53,9 +53,7 @@ class _End:
     number: int
 
 
-def _work(
-    assignment: _Assignment[Task], run: Callable[[Task], Iterable[Result]]
-) -> Iterator[_Delivery[Result] | _End]:
+def _work(assignment: _Assignment[Task], run: Callable[[Task], Iterable[Result]]) -> Iterator[_Delivery[Result] | _End]:
     """What a rank sends back for a task, as soon as it is there."""
     for result in run(assignment.task):
         yield _Delivery(assignment.number, result)

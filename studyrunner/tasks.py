@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from studyrunner.estimate import ITERATIONS_A_STATE, ITERATIONS_A_STEP, seconds_an_iteration
+from studyrunner.estimate import ITERATIONS_A_STATE, ITERATIONS_A_STEP, ITERATIONS_AT_FIRST, seconds_an_iteration
 from studyrunner.study import SOLVER_AXES, Study
 
 Index = tuple[int, ...]
@@ -49,8 +49,8 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
     cycle 0 holds for all cycles; wear_coefficient, step and scheme are then those of the first point.
     cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
-    variables: what is kept. cost: estimated seconds. start: start state, None until its branch has reached it.
-    urgency: estimated work in arbitrary units, the same for all marches of a study; known with the start state.
+    variables: what is kept. cost: estimated seconds, as if it wears until the start state says that nothing moves.
+    start: start state, None until its branch has reached it.
     """
 
     branch: int
@@ -66,7 +66,11 @@ class MarchTask:
     variables: tuple[str, ...]
     cost: float
     start: object = field(default=None, compare=False)
-    urgency: float = field(default=0.0, compare=False)
+
+    @property
+    def urgency(self) -> float:
+        """The longest go first, so that the ranks end together."""
+        return self.cost
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
                 sweep=study.axes.sweep[line[1]],
                 settings=settings,
                 frequencies=tuple(study.axes.frequency[place] for place in ascending),
-                cost=seconds * ITERATIONS_A_STATE * len(ascending),
+                cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(ascending)),
             )
         )
         marches.append(
@@ -180,7 +184,7 @@ def _marches(
     for key, members in shared.items():
         wear, step, scheme = members[0]
         held = key == ("held",)
-        n_steps = 1 if held else max(study.cycles_kept[-1] / axes.step[step], len(study.cycles_kept))
+        n_steps = 1 if held else math.ceil(study.cycles_kept[-1] / axes.step[step])
         tasks.append(
             MarchTask(
                 branch=branch[0],

@@ -26,7 +26,6 @@ from studyrunner.scene import describe_scene
 from studyrunner.tasks import BranchTask, MarchTask
 from tests.studyrunner.fakes import fake_branch, fake_march
 
-
 BULK = np.zeros(100_000)
 """Goes with every start state: larger than what MPI sends off at once."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -30,12 +31,16 @@ def mpiexec() -> str:
     return found
 
 
+def launcher(n_ranks: int) -> list[str]:
+    """What stands before the command: nothing for 0 ranks."""
+    return [mpiexec(), "-n", str(n_ranks)] if n_ranks else []
+
+
 def start(
     n_ranks: int, arguments: list[str], folder: Path, environment: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Runs under mpiexec, or alone for 0 ranks; never hangs."""
-    launcher = [mpiexec(), "-n", str(n_ranks)] if n_ranks else []
-    command = [*launcher, sys.executable, *arguments]
+    command = [*launcher(n_ranks), sys.executable, *arguments]
     variables = {**os.environ, **(environment or {})}
     return subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, timeout=120, check=False)
 
@@ -53,23 +58,26 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
         xr.testing.assert_identical(results[n_ranks], results[0])
 
 
-def test_real_tasks_give_the_same_on_one_and_on_two_ranks(tmp_path: Path) -> None:
+def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> None:
     arguments = [
-        *("-m", "studyrunner.cli", "sdof_slider"),
-        *("--set", "axes.frequency=[150, 165, 180]"),
+        *("-m", "studyrunner.cli", "dovetail"),
+        *("--set", "axes.frequency=[211.5, 212.5, 214]"),
+        *("--set", "scene.mesh=1"),
         *("--set", "solver.harmonics=3"),
         *("--set", "solver.samples=64"),
-        *("--set", "slow_time.cycles=2000"),
+        *("--set", "slow_time.cycles=10000"),
         *("--set", "slow_time.outputs=3"),
     ]
     root = Path(__file__).parents[2]
     results = []
-    for n_ranks in (0, 2):
+    for n_ranks in (0, 2, 3):
         done = start(n_ranks, [*arguments, "-o", f"{n_ranks}.nc"], tmp_path, {"PYTHONPATH": str(root)})
         assert done.returncode in (0, 3), done.stderr
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results.append(result.load().drop_vars("run_time"))
-    xr.testing.assert_identical(*results)
+    assert (results[0].worn_volume.isel(cycle=-1) > 0.0).any()
+    xr.testing.assert_identical(results[1], results[0])
+    xr.testing.assert_identical(results[2], results[0])
 
 
 @pytest.mark.parametrize("n_ranks", [2, 4])
@@ -97,6 +105,29 @@ def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None
     assert f"unexpected failure on rank {failing} of 2" in done.stderr
     assert "ZeroDivisionError: a task that fails" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("n_ranks", [0, 2])
+def test_an_interrupted_run_ends_at_once(n_ranks: int, number: signal.Signals, tmp_path: Path) -> None:
+    environment = {**os.environ, "FAKE_SECONDS": "60"}
+    with subprocess.Popen(
+        [*launcher(n_ranks), sys.executable, FAKED, *GRID, "-o", "out.nc"],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None
+        assert "following 2 branches" in process.stderr.readline()
+        process.send_signal(number)
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert said.count("run-study: interrupted, nothing was written") == 1
+    assert "Traceback" not in said
+    assert len(said.splitlines()) < 8
+    assert list(tmp_path.glob("*out.nc*")) == []
 
 
 @pytest.mark.parametrize("n_ranks", [0, 2])

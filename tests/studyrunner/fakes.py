@@ -39,7 +39,7 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
     places = list(enumerate(task.frequencies))
     for position, frequency in places if task.sweep == "up" else reversed(places):
         start = (frequency, task.excitation_amplitude, task.sweep == "up", *settings)
-        yield StartResult(position, start, 1.0 / frequency)
+        yield StartResult(position, start, moves=position % 2 == 0)
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0) -> MarchResult:
@@ -63,6 +63,6 @@ def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:
         march
         for started in fake_branch(plan.branches[branch])
         for march in start_marches(
-            [task for task in plan.marches[branch] if task.position == started.position], started, 1.0
+            [task for task in plan.marches[branch] if task.position == started.position], started
         )
     ]

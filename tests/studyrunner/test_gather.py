@@ -109,7 +109,7 @@ def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
 
 def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
     attributes = opened.attrs
-    assert attributes["Conventions"] == "CF-1.11 ACDD-1.3"
+    assert attributes["Conventions"] == "CF-1.11, ACDD-1.3"
     assert attributes["title"] == read_study("sdof_slider").study.title
     assert attributes["history"]
     assert attributes["source"].startswith("fretwear ")

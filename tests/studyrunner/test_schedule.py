@@ -56,7 +56,7 @@ def test_results_arrive_while_their_task_goes_on() -> None:
 
 
 def test_a_task_may_have_no_result() -> None:
-    serve_tasks(Alone(), [Job("a", 1.0)], lambda job: [], take_nothing)
+    serve_tasks(Alone(), [Job("a", 1.0)], lambda _: [], take_nothing)
 
 
 def test_no_tasks() -> None:

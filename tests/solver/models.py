@@ -1,0 +1,138 @@
+"""Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from solver.balance import Balance
+from solver.continuation import follow_branch
+from solver.history import PeriodicState, StartState
+from solver.joint import build_case
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.settings import SolverSettings
+from studies.scenes import build_scene, scene_parameters
+
+STIFFNESS = 1e7  # N/m
+MASS = 5.0  # kg
+PRELOAD = 100.0  # N on a pair
+OMEGA = 600.0  # rad/s, below the first natural frequencies of the random models
+COMPONENTS = {
+    "3d": (0, 1, 2),
+    "one_tangent": (0, 1),
+    "second_tangent": (0, 2),
+    "normal_only": (0,),
+    "constant_load": (1, 2),
+    "constant_load_one_tangent": (1,),
+}
+
+
+def definite(random: np.random.Generator, size: int, complex_values: bool = False) -> np.ndarray:
+    """Positive definite matrix with eigenvalues of about 0.5 to 4."""
+    root = random.normal(size=(size, size)) / np.sqrt(size)
+    if complex_values:
+        root = root + 1j * random.normal(size=(size, size)) / np.sqrt(size)
+    matrix = root @ root.conj().T + 0.5 * np.eye(size)
+    return (matrix + matrix.conj().T) / 2
+
+
+def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: int) -> ContactInterface:
+    """Pairs whose displacements lie scattered among the inner ones."""
+    n_contact = len(kinds)
+    dofs = np.full((n_contact, 3), -1)
+    places = random.permutation(sum(len(COMPONENTS[kind]) for kind in kinds) + n_inner)
+    taken = 0
+    for pair, kind in enumerate(kinds):
+        for component in COMPONENTS[kind]:
+            dofs[pair, component] = places[taken]
+            taken += 1
+    return ContactInterface(
+        dofs=dofs.astype(np.int64),
+        area=random.uniform(0.5e-4, 2e-4, n_contact),
+        gap=np.zeros(n_contact),
+        normal_load=np.where(dofs[:, 0] < 0, PRELOAD, 0.0),
+        position=np.full((n_contact, 3), np.nan),
+        surface=("plane",) * n_contact,
+    )
+
+
+def random_linear(random: np.random.Generator, contact: ContactInterface, n: int, hermitian: bool = False) -> LinearModel:
+    """Structure pressed on its pairs, excited everywhere, about 5 % damped, two responses."""
+    stiffness = STIFFNESS * definite(random, n, hermitian)
+    load_static = 0.05 * PRELOAD * random.normal(size=n)
+    closing = contact.dofs[:, 0]
+    load_static[closing[closing >= 0]] += PRELOAD
+    response = random.normal(size=(2, n))
+    if hermitian:
+        response = response + 1j * random.normal(size=(2, n))
+    return LinearModel(
+        mass=MASS * definite(random, n, hermitian),
+        damping=5e-5 * stiffness,
+        stiffness=stiffness,
+        load_static=load_static,
+        load_harmonic=random.normal(size=n) + 1j * random.normal(size=n),
+        response=response,
+    )
+
+
+def random_model(seed: int, kinds: Sequence[str] = ("3d", "3d", "3d"), n_inner: int = 4) -> ReducedModel:
+    """Random structure with preloaded pairs."""
+    random = np.random.default_rng(seed)
+    contact = random_contact(random, kinds, n_inner)
+    n = int((contact.dofs >= 0).sum()) + n_inner
+    return ReducedModel({0: random_linear(random, contact, n)}, contact, ("first", "second"))
+
+
+def random_balance(
+    model: ReducedModel, settings: SolverSettings, seed: int, *, wear: bool, friction: float = 0.4, amplitude: float = 60.0
+) -> tuple[Balance, FloatArray]:
+    """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
+    random = np.random.default_rng(seed)
+    case = build_case(model, friction, OMEGA, settings)
+    joint = case.joint(OMEGA, amplitude)
+    n_contact = model.contact.n_contact
+    history = 0.3 * friction * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
+    # ten times what wears in the tests of the march, so that its part of the Jacobian is not lost beside the others
+    gain = random.uniform(0.5, 1.0, n_contact) * 1e-2 / PRELOAD if wear else np.zeros(n_contact)
+    balance = Balance(joint, history, random.uniform(0.0, 2e-6, n_contact), gain)
+    predicted = random.normal(size=(joint.slots.size, 2 * settings.harmonics + 1))
+    order = (np.arange(predicted.shape[1]) + 1) // 2
+    predicted *= 0.8 * PRELOAD / (1.0 + order) ** 1.5
+    predicted[joint.slots % 3 == 0, 0] += PRELOAD
+    return balance, predicted
+
+
+def scene(name: str, n_harmonics: int = 21, **values: float) -> ReducedModel:
+    """A bundled scene with other than the default parameters."""
+    return build_scene(name, scene_parameters(name)(**values), n_harmonics)
+
+
+@lru_cache(maxsize=4)
+def dovetail(n_harmonics: int = 3, nodal_diameter: int = 0) -> ReducedModel:
+    """The coarse dovetail sector: 16 pairs."""
+    return scene("dovetail_sector", n_harmonics, mesh=1, nodal_diameter=nodal_diameter)
+
+
+def branch_states(
+    model: ReducedModel,
+    friction: float,
+    amplitude: float,
+    omegas: Sequence[float],
+    settings: SolverSettings,
+    sweep: str = "up",
+) -> list[StartState]:
+    """Start states at angular frequencies, rad/s, ascending."""
+    frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
+    found = dict(follow_branch(model, friction, amplitude, frequencies, sweep, settings))
+    return [found[index] for index in range(len(omegas))]
+
+
+def converged_state(
+    model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings, sweep: str = "up"
+) -> PeriodicState:
+    """The one state at an angular frequency, rad/s."""
+    (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
+    assert start.state is not None, start.outcome
+    return start.state
