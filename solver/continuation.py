@@ -32,12 +32,12 @@ def follow_branch(
     sweep: Sweep,
     settings: SolverSettings,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one as the sweep reaches them.
+    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one as they are reached.
 
     "up" follows the branch from the lowest frequency, "down" from the highest, each from a little outside the range. At a
     fold the branch is followed by arc length until it reaches the next frequency, which is where a slow sweep of the
-    machine would land if the branch is one curve; where that fails the state is sought from nothing. excitation_amplitude
-    in N. Each state starts from the tangential history of the one before.
+    machine would land if the branch is one curve; where that fails the state is sought from nothing.
+    excitation_amplitude in N. Each state starts from the tangential history of the one before.
     """
     order = np.arange(frequencies.size) if sweep == "up" else np.arange(frequencies.size)[::-1]
     omegas = 2.0 * np.pi * frequencies
@@ -65,6 +65,7 @@ class _Line:
         self.solver = JacobianSolver()
         self.effort = Effort()
         self.point: PathPoint | None = None
+        self.failure = Outcome.START_FAILED
 
     def advance(self, omega: float, sweep: Sweep) -> tuple[Outcome, PathPoint | None]:
         """State at the next angular frequency, rad/s."""
@@ -76,12 +77,14 @@ class _Line:
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None
         if reached is None:
-            return Outcome.START_FAILED if self.point is None else Outcome.BRANCH_LOST, None
+            return self.failure if self.point is None else Outcome.BRANCH_LOST, None
         self.point = reached
         return Outcome.CONVERGED, reached
 
     def _first(self, omega: float) -> PathPoint | None:
-        found = solve_first_state(self.case, omega, self.excitation_amplitude, self.unworn, self.solver, self.effort)
+        self.failure, found = solve_first_state(
+            self.case, omega, self.excitation_amplitude, self.unworn, self.solver, self.effort
+        )
         return None if found is None else PathPoint(omega, found.evaluation, found.history)
 
     def _next(self, omega: float) -> PathPoint | None:

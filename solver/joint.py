@@ -107,7 +107,7 @@ class Case:
 
 
 def build_case(model: ReducedModel, friction_coefficient: float, omega: float, settings: SolverSettings) -> Case:
-    """Case of a scene; omega, rad/s, is where the penalty is taken and has to be the same for states that are compared."""
+    """Case of a scene; omega, rad/s, is where the penalty is taken: the same for states that are compared."""
     return Case(model, friction_coefficient, build_penalty(model, omega, settings.harmonics), settings)
 
 

@@ -1,8 +1,8 @@
 """Contact through one period: force, its tangent and the wear integral. Floats and arrays only.
 
-The law is applied to a *predicted* force `p` (what the joint would take up if the pair did not move) and to a force-like
-tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS section 2: the
-print has the sign of the normal test the other way round):
+The law is applied to a *predicted* force `p` (what the joint would take up if the pair did not move) and to a
+force-like tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS
+section 2: the print has the sign of the normal test the other way round):
 
 - separated, `p_N <= 0`: no force, and the state follows freely, `x = p_T`;
 - stick, `|p_T - x'| < mu p_N` with x' the state one sample earlier: `lambda_T = p_T - x'`, `x = x'`;
@@ -238,9 +238,7 @@ def march_tangent(
                 if not last and status == STICK:
                     continue
                 before_dstate[:, :] = dstate
-                state_tangent(
-                    dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce
-                )
+                state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce)
                 if not last:
                     continue
                 if status != SEPARATED:

@@ -40,9 +40,7 @@ class JacobianSolver:
         step[rest] = (right - tangent.apply(step))[rest]
         return step
 
-    def _solve_kept(
-        self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray
-    ) -> FloatArray:
+    def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         m = right.shape[1]
         if self._factor is None or not np.isin(pairs, self._pairs).all():
             self._refresh(tangent, pairs)
@@ -77,5 +75,5 @@ class JacobianSolver:
         padded = np.zeros((kept.size, right.shape[1]))
         position = np.searchsorted(kept, rows)
         padded[position] = right
-        solved = scipy.linalg.lu_solve(self._factor, padded.ravel(), check_finite=False)
+        solved: FloatArray = scipy.linalg.lu_solve(self._factor, padded.ravel(), check_finite=False)
         return solved.reshape(padded.shape)[position]

@@ -14,9 +14,9 @@ from solver.joint import Case, Joint, build_case
 from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.path import BalanceAt, Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
 from solver.record import Recorder
-from solver.response import report_state, solve_first_state
+from solver.response import StateReport, report_state, solve_first_state
 from solver.settings import SolverSettings
 
 Scheme = Literal["explicit", "implicit"]
@@ -35,9 +35,9 @@ def march_wear(
 ) -> WearHistory:
     """Wear history of one point of a study.
 
-    wear_coefficient: 1/Pa. step: h, cycles. cycles (n_output,): ascending counts to report, the first 0; between two steps
-    they are interpolated linearly, and the last step is shortened to end on the last of them. largest_depth: m; where
-    given, the explicit scheme takes its step from Eq. (22) instead of `step`.
+    wear_coefficient: 1/Pa. step: h, cycles. cycles (n_output,): ascending counts to report, the first 0; between two
+    steps they are interpolated linearly, and the last step is shortened to end on the last of them. largest_depth: m;
+    where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
     """
     started = time.thread_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time)
@@ -96,7 +96,8 @@ class _March:
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
 
-    def report(self):
+    def report(self) -> StateReport:
+        """What is reported of the current state."""
         return report_state(self.joint, self.point.evaluation)
 
     def rate(self) -> FloatArray:
@@ -108,7 +109,7 @@ class _March:
         return bool(self.rate().max(initial=0.0) > 0.0)
 
     def planned_step(self, step: float, largest_depth: float | None) -> float:
-        """h in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
+        """H in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
         if largest_depth is None or self.scheme == "implicit":
             return step
         return largest_depth / float(self.rate().max())
@@ -134,7 +135,7 @@ class _March:
         self.cycle = reach
         return True
 
-    def _explicit(self, length: float):
+    def _explicit(self, length: float) -> BalanceAt:
         before, grown = self.point.evaluation.wear_depth, length * self.rate()
 
         def balance_at(share: float, history: FloatArray) -> Balance:
@@ -142,7 +143,7 @@ class _March:
 
         return balance_at
 
-    def _implicit(self, length: float):
+    def _implicit(self, length: float) -> BalanceAt:
         before = self.point.evaluation.wear_depth
         gain = length * self.wear_coefficient / self.joint.contact.area
 
@@ -157,14 +158,15 @@ class _March:
             return None
         before, change = self.last_change
         predicted = self.point.evaluation.predicted_h + (length / before) * change
-        if balance.evaluate(predicted).scaled_residual() > balance.evaluate(
-            self.point.evaluation.predicted_h
-        ).scaled_residual():
+        if (
+            balance.evaluate(predicted).scaled_residual()
+            > balance.evaluate(self.point.evaluation.predicted_h).scaled_residual()
+        ):
             return None
         result = solve_balance(balance, predicted, self.solver, self.case.settings.tolerance, self.effort, 8)
         return result.evaluation if result.converged else None
 
-    def _jump(self, balance_at, last: PathPoint, length: float) -> Evaluation | None:
+    def _jump(self, balance_at: BalanceAt, last: PathPoint, length: float) -> Evaluation | None:
         """The branch has ended within the step: follow it through its fold, or land on another one."""
         tolerance = self.case.settings.tolerance
         if np.isnan(self.jump_cycle):
@@ -174,7 +176,7 @@ class _March:
         if beyond is not None:
             return beyond.evaluation
         worn = last.evaluation.wear_depth
-        other = solve_first_state(
+        _, other = solve_first_state(
             self.case, self.joint.omega, self.joint.excitation_amplitude, worn, self.solver, self.effort
         )
         if other is None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from solver.model import FloatArray
 
-
 PATIENCE = 6  # full steps that may go by without a new lowest residual
 SHORTEST = 1.0 / 128.0
 
@@ -18,7 +17,9 @@ SHORTEST = 1.0 / 128.0
 class HasResidual(Protocol):
     """What an evaluation must offer: its residual norm, over scales that may be held fixed, and those scales."""
 
-    scale: tuple[float, float]
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Scales of the residual, in its unit."""
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
         """Norm of the residual, dimensionless."""

@@ -13,8 +13,7 @@ class Outcome(IntEnum):
     START_FAILED = 2
     BRANCH_LOST = 3
     MARCH_FAILED = 4
-    NOT_FINITE = 5
-    SINGULAR = 6
+    SINGULAR = 5
 
     @property
     def meaning(self) -> str:
@@ -29,12 +28,12 @@ class Outcome(IntEnum):
 
 _SENTENCES = {
     Outcome.CONVERGED: "The point was computed to tolerance.",
-    Outcome.STATIC_FAILED: "The static contact state was not found: check the static load, the gaps and the supports.",
-    Outcome.START_FAILED: "No periodic state was found at the first frequency of the sweep, not even with the excitation"
-    " raised gradually.",
+    Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
+    Outcome.START_FAILED: "No periodic state was found at the start of the sweep, not even with the excitation raised"
+    " gradually: use more harmonics or start elsewhere.",
     Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more frequencies or more harmonics.",
-    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller step"
-    " or more harmonics.",
-    Outcome.NOT_FINITE: "The computation produced a number that is not finite: check the matrices of the scene.",
-    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping or a support.",
+    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller"
+    " step or more harmonics.",
+    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
+    " or a support.",
 }

@@ -28,7 +28,7 @@ ARC_ITERATIONS = 8
 
 @dataclass(frozen=True)
 class PathPoint:
-    """A converged state at a value of the parameter; `history` (n_contact, 2), m, is what the next state starts from."""
+    """A converged state at a value of the parameter; `history` (n_contact, 2), m: what the next state starts from."""
 
     parameter: float
     evaluation: Evaluation
@@ -43,8 +43,9 @@ class Effort:
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the next state: the corrected slip X_T at the end of the period, the mean
-    position of pairs at velocity level."""
+    """Tangential history (n_contact, 2), m, for the next state: the corrected slip X_T at the end of the period, the
+    mean position of pairs at velocity level.
+    """
     joint = balance.joint
     at_end = evaluation.state_t[:, :, -1] / joint.state_stiffness[:, None]
     return np.where(joint.penalty.at_velocity[:, None], evaluation.displacement_h[:, 1:, 0], at_end)
@@ -78,8 +79,9 @@ def follow_naturally(
     """Step the parameter to the target, the step halved where Newton labours; the last point and whether it got there.
 
     Where steps leave a history behind, what is found depends on them: a step longer than `fine` is taken only where the
-    vibration changes little over it. The first Newton iteration from the last state is the tangent predictor (for wear: Eq. (19)), so no other is needed.
-    With `keep_history` the history stays that of the start: the intermediate states are no states of the joint.
+    vibration changes little over it. The first Newton iteration from the last state is the tangent predictor (for wear:
+    Eq. (19)), so no other is needed. With `keep_history` the history stays that of the start: the intermediate states
+    are no states of the joint.
     """
     point = start
     whole = target - start.parameter
@@ -221,8 +223,9 @@ class _Arc:
     ) -> PathPoint | None:
         """Point behind a corner of the branch, where a contact sample changes its state and the branch may turn back.
 
-        The plane across the old tangent need not meet the branch behind the corner. The tangent of the piece behind it is
-        taken a little ahead of the point, and both of its signs are tried; a solution back on the old piece is refused.
+        The plane across the old tangent need not meet the branch behind the corner. The tangent of the piece behind it
+        is taken a little ahead of the point, and both of its signs are tried; a solution back on the old piece is
+        refused.
         """
         shape = point.evaluation.predicted_h.shape
         base = self.place(point.parameter, point.evaluation)

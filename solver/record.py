@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.history import WearHistory
 from solver.model import FloatArray, ReducedModel
@@ -22,7 +24,7 @@ class Recorder:
     cycles: FloatArray
     start_iterations: int
     start_time: float
-    _kept: dict[str, np.ndarray] = field(init=False, repr=False)
+    _kept: dict[str, NDArray[Any]] = field(init=False, repr=False)
     _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
     _local_errors: float = field(init=False, default=0.0, repr=False)
 
@@ -71,13 +73,20 @@ class Recorder:
     def _history(
         self, outcome: Outcome, jump_cycle: float, error: float, iterations: int, run_time: float
     ) -> WearHistory:
+        kept = self._kept
         return WearHistory(
             outcome=outcome,
             cycles=self.cycles,
-            worn_volume=self._kept["wear_depth"] @ self.model.contact.area,
+            worn_volume=kept["wear_depth"] @ self.model.contact.area,
+            wear_rate=kept["wear_rate"],
+            wear_depth=kept["wear_depth"],
+            mean_pressure=kept["mean_pressure"],
+            slip_range=kept["slip_range"],
+            open_fraction=kept["open_fraction"],
+            response=kept["response"],
+            response_peak=kept["response_peak"],
             jump_cycle=jump_cycle,
             error_estimate=error,
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
-            **self._kept,
         )

@@ -14,6 +14,7 @@ from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
 from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
+from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
 
 LOAD_STEPS = 20
@@ -22,8 +23,8 @@ LOAD_STEPS = 20
 def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
     """Frictional unilateral state under the static load, raised gradually from nothing; None where there is none.
 
-    The state depends on the path of the load, so it is raised in equal steps and each starts from the tangential state of
-    the one before. The first evaluation lets the pairs stick.
+    The state depends on the path of the load, so it is raised in equal steps and each starts from the tangential state
+    of the one before. The first evaluation lets the pairs stick.
     """
     idle = np.zeros(joint.contact.n_contact)
     solver = JacobianSolver()
@@ -52,8 +53,8 @@ def solve_first_state(
     wear_depth: FloatArray,
     solver: JacobianSolver,
     effort: Effort,
-) -> PathPoint | None:
-    """Periodic state found from nothing: the static state first, then the excitation raised; None where there is none.
+) -> tuple[Outcome, PathPoint | None]:
+    """Periodic state found from nothing: the static state first, then the excitation raised; or why there is none.
 
     omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
     """
@@ -62,7 +63,7 @@ def solve_first_state(
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, wear_depth, tolerance, effort)
     if static is None:
-        return None
+        return Outcome.STATIC_FAILED, None
 
     def balance_at(share: float, history: FloatArray) -> Balance:
         return Balance(case.joint(omega, share * excitation_amplitude), history, wear_depth, idle)
@@ -75,10 +76,11 @@ def solve_first_state(
     start = still.predict(displacement_h, force_h)
     result = solve_balance(still, start, solver, tolerance, effort)
     if not result.converged:
-        return None
+        return Outcome.START_FAILED, None
     point = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
     point, arrived = follow_naturally(balance_at, point, 1.0, solver, tolerance, effort)
-    return point if arrived else follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
+    reached = point if arrived else follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
+    return (Outcome.START_FAILED, None) if reached is None else (Outcome.CONVERGED, reached)
 
 
 def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:

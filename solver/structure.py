@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.harmonics import from_complex, to_complex
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, Matrix, ReducedModel
 
 
 @dataclass(frozen=True)
@@ -67,64 +67,65 @@ def build_structure(
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
-    linear, _ = model.harmonic_structure(0)
-    static, static_coupling, static_offset = condense(np.real(linear.stiffness), relative, linear.load_static)
-    stiffness, force, response, offset = [], np.zeros(relative.size, complex), [], np.zeros(0, complex)
-    offset = np.zeros(linear.response.shape[0], complex)
+    still = model.linear[0]
+    static = condense(np.real(still.stiffness), relative, still.load_static)
+    n_response = still.response.shape[0]
+    stiffness = np.empty((n_harmonics, relative.size, relative.size), complex)
+    response = np.empty((n_harmonics, n_response, relative.size), complex)
+    force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
     for harmonic in range(1, n_harmonics + 1):
         linear, conjugate = model.harmonic_structure(harmonic)
         frequency = harmonic * omega
         full = linear.stiffness + 1j * frequency * linear.damping - frequency**2 * linear.mass
-        load = excitation_amplitude * linear.load_harmonic if harmonic == 1 else np.zeros(full.shape[0], complex)
-        reduced, coupling, reaction = condense(full, relative, load)
-        rows = _response_rows(linear, relative, coupling)
-        stiffness.append(reduced.conj() if conjugate else reduced)
-        response.append(rows.conj() if conjugate else rows)
+        share = excitation_amplitude if harmonic == 1 else 0.0
+        moving = condense(full, relative, share * linear.load_harmonic)
+        rows = linear.response @ moving.motion
+        stiffness[harmonic - 1] = moving.stiffness.conj() if conjugate else moving.stiffness
+        response[harmonic - 1] = rows.conj() if conjugate else rows
         if harmonic == 1:
-            force = reaction[relative]
-            offset = linear.response @ _held_displacement(reaction, relative)
-    n_response = linear.response.shape[0]
-    held = model.harmonic_structure(0)[0]
+            force, offset = moving.force, linear.response @ moving.held_motion
+            if conjugate:
+                force, offset = force.conj(), offset.conj()
     return CondensedStructure(
-        static_stiffness=static,
-        dynamic_stiffness=np.array(stiffness, complex).reshape(n_harmonics, relative.size, relative.size),
-        static_force=static_offset[relative],
+        static_stiffness=np.real(static.stiffness),
+        dynamic_stiffness=stiffness,
+        static_force=np.real(static.force),
         harmonic_force=force,
-        static_response=np.real(_response_rows(held, relative, static_coupling)),
-        dynamic_response=np.array(response, complex).reshape(n_harmonics, n_response, relative.size),
-        static_offset=np.real(held.response @ _held_displacement(static_offset, relative)),
+        static_response=np.real(still.response @ static.motion),
+        dynamic_response=response,
+        static_offset=np.real(still.response @ static.held_motion),
         harmonic_offset=offset,
     )
 
 
-def condense(full: Matrix, relative: IntArray, load: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Schur complement of `full` (n, n) on `relative`, and what it takes to come back.
+@dataclass(frozen=True)
+class Condensed:
+    """A matrix (n, n) and a load (n,) reduced to the relative displacements u (n_rel,).
 
-    Returns the reduced matrix (n_rel, n_rel); the motion (n, n_rel) that follows a unit relative displacement; and a
-    vector (n,) with the condensed load at `relative` and the displacement under the load with u = 0 elsewhere.
+    stiffness (n_rel, n_rel): Schur complement, N/m. force (n_rel,): reduced load, N. motion (n, n_rel): all
+    displacements that follow a unit u. held_motion (n,): displacement under the load with u = 0, m.
     """
+
+    stiffness: Matrix
+    force: Matrix
+    motion: Matrix
+    held_motion: Matrix
+
+
+def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
+    """Static condensation of one (dynamic) stiffness; raises numpy.linalg.LinAlgError where the rest is singular."""
     n = full.shape[0]
     internal = np.setdiff1d(np.arange(n), relative)
-    motion = np.zeros((n, relative.size), full.dtype)
+    motion: Matrix = np.zeros_like(full, shape=(n, relative.size))
     motion[relative, np.arange(relative.size)] = 1.0
-    both = np.zeros(n, np.result_type(full, load))
-    both[relative] = load[relative]
-    reduced = full[np.ix_(relative, relative)]
+    held_motion = np.zeros(n, np.result_type(full, load))
+    stiffness: Matrix = full[np.ix_(relative, relative)]
+    force: Matrix = load[relative]
     if internal.size:
         right = np.column_stack([full[np.ix_(internal, relative)], load[internal]])
         solved = np.linalg.solve(full[np.ix_(internal, internal)], right)
-        motion[internal] = -solved[:, :-1]
-        reduced = reduced + full[np.ix_(relative, internal)] @ motion[internal]
-        both[internal] = solved[:, -1]
-        both[relative] -= full[np.ix_(relative, internal)] @ both[internal]
-    return reduced, motion, both
-
-
-def _response_rows(linear: LinearModel, relative: IntArray, motion: Matrix) -> Matrix:
-    return linear.response @ motion
-
-
-def _held_displacement(both: Matrix, relative: IntArray) -> Matrix:
-    held = both.copy()
-    held[relative] = 0.0
-    return held
+        motion[internal], held_motion[internal] = -solved[:, :-1], solved[:, -1]
+        coupling = full[np.ix_(relative, internal)]
+        stiffness = stiffness + coupling @ motion[internal]
+        force = force - coupling @ held_motion[internal]
+    return Condensed(stiffness, force, motion, held_motion)

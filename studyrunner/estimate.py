@@ -6,11 +6,11 @@ slips takes no step at all.
 
 from __future__ import annotations
 
-ITERATIONS_AT_FIRST = 50
-"""For the first state of a branch, found from nothing: 100 to 200 iterations, most of them without harmonics."""
+ITERATIONS_AT_FIRST = 100
+"""For the first state of a branch, found from nothing: nearly 300 iterations, most of them without harmonics."""
 
 ITERATIONS_A_STATE = 20
-"""For each frequency of a branch (measured: 3 to 8 where it is smooth, the time of 150 at a fold)."""
+"""For each frequency of a branch (measured: 3 where nothing slips, 12 to 20 where the sweep shortens its steps)."""
 
 ITERATIONS_A_STEP = 3
 """For one step on the slow time scale, explicit or implicit (measured: 2 to 4 where the joint slips)."""
@@ -23,11 +23,11 @@ _MATRICES_A_RANK = 6
 
 
 def seconds_an_iteration(n_unknowns: int) -> float:
-    """Time of one Newton iteration, s, on average: a third of them factorise the Jacobian anew.
+    """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
 
-    Fits 2, 5, 16, 40, 70 and 210 ms measured at 86, 336, 1008, 1584, 2016 and 3024 unknowns within 30 %.
+    Fits 2, 9, 23, 45 and 108 ms measured at 336, 1008, 1584, 2016 and 3024 unknowns within 20 %.
     """
-    return 1e-3 + 8e-6 * n_unknowns + 6e-12 * float(n_unknowns) ** 3
+    return 7e-4 + 5e-6 * n_unknowns + 3.3e-12 * float(n_unknowns) ** 3
 
 
 def memory_a_rank(n_unknowns: int, result_values: int) -> float:

@@ -23,9 +23,10 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
     left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or ["nothing"]
     size = n_values * 8 / 1e6
     memory = memory_a_rank(plan.n_unknowns, n_values) / 1e9
+    milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
     assumed = (
-        f"{ITERATIONS_A_STEP} Newton iterations of {1e3 * seconds_an_iteration(plan.n_unknowns):.0f} ms or less a step, none"
-        f" where nothing slips; a first run compiles for {COMPILE_SECONDS} s more"
+        f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step, none where nothing slips;"
+        f" a first run compiles for {COMPILE_SECONDS} s more"
     )
     rows = [
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),

@@ -59,7 +59,7 @@ def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: i
 
 
 def random_linear(random: np.random.Generator, contact: ContactInterface, n: int, hermitian: bool = False) -> LinearModel:
-    """Structure pressed on its pairs, excited everywhere, about 5 % damped, two responses."""
+    """Elastic joint with little mass of its own, pressed on its pairs, excited everywhere, damped, two responses."""
     stiffness = STIFFNESS * definite(random, n, hermitian)
     load_static = 0.05 * PRELOAD * random.normal(size=n)
     closing = contact.dofs[:, 0]
@@ -67,8 +67,10 @@ def random_linear(random: np.random.Generator, contact: ContactInterface, n: int
     response = random.normal(size=(2, n))
     if hermitian:
         response = response + 1j * random.normal(size=(2, n))
+    share = np.ones(n)
+    share[contact.dofs[contact.dofs >= 0]] = 0.1
     return LinearModel(
-        mass=MASS * definite(random, n, hermitian),
+        mass=MASS * definite(random, n, hermitian) * np.outer(share, share),
         damping=5e-5 * stiffness,
         stiffness=stiffness,
         load_static=load_static,
@@ -94,12 +96,13 @@ def random_balance(
     joint = case.joint(OMEGA, amplitude)
     n_contact = model.contact.n_contact
     history = 0.3 * friction * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
-    # ten times what wears in the tests of the march, so that its part of the Jacobian is not lost beside the others
-    gain = random.uniform(0.5, 1.0, n_contact) * 1e-2 / PRELOAD if wear else np.zeros(n_contact)
+    history[model.contact.dofs[:, 1:] < 0] = 0.0
+    # so much wear in a step that its part of the Jacobian is as large as the others
+    gain = random.uniform(0.1, 0.3, n_contact) / PRELOAD if wear else np.zeros(n_contact)
     balance = Balance(joint, history, random.uniform(0.0, 2e-6, n_contact), gain)
     predicted = random.normal(size=(joint.slots.size, 2 * settings.harmonics + 1))
     order = (np.arange(predicted.shape[1]) + 1) // 2
-    predicted *= 0.8 * PRELOAD / (1.0 + order) ** 1.5
+    predicted *= 1.2 * PRELOAD / (1.0 + order) ** 1.5
     predicted[joint.slots % 3 == 0, 0] += PRELOAD
     return balance, predicted
 

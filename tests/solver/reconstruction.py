@@ -50,23 +50,17 @@ def series(values_h: FloatArray, n_samples: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class FullMotion:
-    """displacement[n] and contact_force[n] (n_displacements,) complex amplitudes of harmonic n on the whole structure."""
+    """Motion of the whole structure that has the relative displacements of a state.
+
+    displacement[n] (n_displacements,): complex amplitudes of harmonic n, m. imbalance[n]: N, what is missing from
+    equilibrium under the loads and the contact force of the state; `force`, N, is the largest of those.
+    """
 
     model: ReducedModel
     state: PeriodicState
     displacement: tuple[ComplexArray, ...]
-    contact_force: tuple[ComplexArray, ...]
-
-    def contact_error(self) -> float:
-        """Largest difference of the relative displacements from those of the state, over the largest vibration."""
-        dofs = self.model.contact.dofs
-        exists = dofs >= 0
-        given = self.state.displacement_h
-        errors = [
-            np.abs(self.displacement[n][dofs[exists]] - amplitudes(given, n)[exists]).max()
-            for n in range(len(self.displacement))
-        ]
-        return float(max(errors) / np.abs(given[exists]).max())
+    imbalance: tuple[float, ...]
+    force: float
 
     def excitation_work(self) -> float:
         """Work of the excitation over a period, J."""
@@ -79,7 +73,7 @@ class FullMotion:
         for n in range(1, len(self.displacement)):
             moved = self.displacement[n]
             damping = harmonic_structure(self.model, n).damping
-            total += np.pi * n * self.state.omega * float(np.real(moved.conj() @ damping @ moved))
+            total += np.pi * n**2 * self.state.omega * float(np.real(moved.conj() @ damping @ moved))
         return total
 
     def response(self, harmonic: int = 1) -> ComplexArray:
@@ -88,11 +82,11 @@ class FullMotion:
 
 
 def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
-    """Motion of the whole structure under its loads and the contact force of a state."""
+    """Motion of the whole structure; relative displacements are given, for the static structure may be free to slide."""
     n_harmonics = (state.displacement_h.shape[2] - 1) // 2
-    dofs = model.contact.dofs
-    exists = dofs >= 0
-    moved, forces = [], []
+    exists = model.contact.dofs >= 0
+    relative = model.contact.dofs[exists]
+    moved, imbalance, largest = [], [], 0.0
     for n in range(n_harmonics + 1):
         linear = harmonic_structure(model, n)
         matrix = linear.stiffness + 1j * n * state.omega * linear.damping - (n * state.omega) ** 2 * linear.mass
@@ -101,11 +95,17 @@ def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
             load += linear.load_static
         if n == 1:
             load += state.excitation_amplitude * linear.load_harmonic
-        force = np.zeros(matrix.shape[0], complex)
-        force[dofs[exists]] = amplitudes(state.contact_force_h, n)[exists]
-        moved.append(np.linalg.solve(matrix, load - force))
-        forces.append(force)
-    return FullMotion(model, state, tuple(moved), tuple(forces))
+        load[relative] -= amplitudes(state.contact_force_h, n)[exists]
+        whole = np.zeros(matrix.shape[0], complex)
+        whole[relative] = amplitudes(state.displacement_h, n)[exists]
+        inner = np.setdiff1d(np.arange(whole.size), relative)
+        if inner.size:
+            right = (load - matrix @ whole)[inner]
+            whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], right)
+        moved.append(whole)
+        imbalance.append(float(np.abs(matrix @ whole - load).max()))
+        largest = max(largest, float(np.abs(load).max()), float(np.abs(state.contact_force_h).max()))
+    return FullMotion(model, state, tuple(moved), tuple(imbalance), largest)
 
 
 def contact_work(state: PeriodicState, force_t: FloatArray) -> float:

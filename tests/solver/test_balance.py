@@ -1,0 +1,170 @@
+"""Residual and Jacobian of the harmonic balance against differences, its inverse, and the full equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance
+from solver.kernels import SEPARATED, SLIP, STICK
+from solver.model import FloatArray
+from solver.settings import SolverSettings
+from tests.solver.models import random_balance, random_model, scene
+
+SETTINGS = SolverSettings(3, 24)
+MODELS = {
+    "3d": ("3d", "3d", "3d", "3d"),
+    "mixed": ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent"),
+}
+
+
+def case(kinds: str, seed: int, wear: bool) -> tuple[Balance, FloatArray]:
+    return random_balance(random_model(seed, MODELS[kinds]), SETTINGS, seed + 100, wear=wear)
+
+
+def jacobian_by_differences(balance: Balance, predicted: FloatArray, step: float) -> FloatArray:
+    """Central differences where the differences of both sides agree, that is away from the switches.
+
+    The states of the samples may change by round-off: a pair that has shaken down touches its limit without passing it.
+    """
+    columns, kinks = [], []
+    here = balance.evaluate(predicted).residual.ravel()
+    for index in np.ndindex(predicted.shape):
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = predicted.copy()
+            moved[index] += sign * step
+            sides.append(sign * (balance.evaluate(moved).residual.ravel() - here) / step)
+        columns.append((sides[0] + sides[1]) / 2)
+        kinks.append(np.abs(sides[0] - sides[1]).max())
+    differences = np.array(columns).T
+    assert max(kinks) < 1e-3 * np.abs(differences).max(), "a switch within the differences: take another seed"
+    return differences
+
+
+@pytest.mark.parametrize("wear", [False, True])
+@pytest.mark.parametrize("kinds", MODELS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_jacobian_is_that_of_central_differences(kinds: str, seed: int, wear: bool) -> None:
+    balance, predicted = case(kinds, seed, wear)
+    at = balance.evaluate(predicted)
+    assert {SEPARATED, STICK, SLIP} <= set(at.status_t.ravel())
+    assert np.abs(at.start).max() > 1.0
+    step = 1e-4
+    differences = jacobian_by_differences(balance, predicted, step)
+    dense = balance.linearise(at).dense(np.arange(balance.joint.contact.n_contact))
+    # truncation (step / pull)^2 with pulls above 1 N, round-off 1e-16 * 1e3 N / step
+    assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
+
+
+@pytest.mark.parametrize("kinds", MODELS)
+def test_the_product_is_that_of_the_dense_jacobian(kinds: str) -> None:
+    balance, predicted = case(kinds, 2, wear=True)
+    tangent = balance.linearise(balance.evaluate(predicted))
+    dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
+    step = np.random.default_rng(3).normal(size=predicted.shape)
+    expected = (dense @ step.ravel()).reshape(step.shape)
+    assert tangent.apply(step) == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
+
+
+def test_dense_of_some_pairs_is_a_block_of_the_whole() -> None:
+    balance, predicted = case("mixed", 4, wear=True)
+    tangent = balance.linearise(balance.evaluate(predicted))
+    whole = tangent.dense(np.arange(6))
+    m = predicted.shape[1]
+    pairs = np.array([1, 3, 4])
+    chosen = np.flatnonzero(np.repeat(np.isin(balance.joint.slots // 3, pairs), m))
+    assert np.array_equal(tangent.dense(pairs), whole[np.ix_(chosen, chosen)])
+
+
+def test_wear_is_a_change_of_rank_one_of_the_columns_of_a_pair() -> None:
+    worn, predicted = case("3d", 0, wear=True)
+    unworn = Balance(worn.joint, worn.history, worn.wear_depth, np.zeros_like(worn.wear_gain))
+    with_wear, without = (
+        balance.linearise(balance.evaluate(predicted)).dense(np.arange(4)) for balance in (worn, unworn)
+    )
+    m = predicted.shape[1]
+    slipping = 0
+    for pair in range(4):
+        columns = slice(3 * m * pair, 3 * m * (pair + 1))
+        sizes = np.linalg.svd((with_wear - without)[:, columns], compute_uv=False)
+        assert sizes[1] < 1e-10 * max(sizes[0], np.abs(without).max() * 1e-3)
+        slipping += sizes[0] > 1e-3 * np.abs(without).max()
+    assert slipping >= 2
+
+
+@pytest.mark.parametrize("wear", [False, True])
+@pytest.mark.parametrize("kinds", MODELS)
+def test_predict_is_the_inverse_of_evaluate(kinds: str, wear: bool) -> None:
+    balance, predicted = case(kinds, 5, wear)
+    at = balance.evaluate(predicted)
+    # what a state stores is its own depth; from there no wear is left to add
+    stored = Balance(balance.joint, balance.history, at.wear_depth, np.zeros_like(at.wear_depth))
+    back = stored.predict(at.displacement_h, at.force_h)
+    assert back == pytest.approx(predicted, abs=1e-11 * np.abs(predicted).max())
+    assert np.abs(stored.evaluate(back).residual - at.residual).max() < 1e-10 * np.abs(at.residual).max()
+
+
+def test_predict_is_the_inverse_at_velocity_level() -> None:
+    balance, predicted = random_balance(scene("sdof_slider"), SETTINGS, 6, wear=False)
+    assert balance.joint.penalty.at_velocity.all()
+    at = balance.evaluate(predicted)
+    back = balance.predict(at.displacement_h, at.force_h)
+    assert back == pytest.approx(predicted, abs=1e-10 * np.abs(predicted).max())
+
+
+@pytest.mark.parametrize("wear", [False, True])
+@pytest.mark.parametrize("name", ["sdof_slider", "two_masses"])
+def test_jacobian_at_velocity_level(name: str, wear: bool) -> None:
+    balance, predicted = random_balance(scene(name), SETTINGS, 7, wear=wear)
+    assert balance.joint.penalty.at_velocity.all()
+    at = balance.evaluate(predicted)
+    assert SLIP in at.status_t
+    differences = jacobian_by_differences(balance, predicted, 1e-4)
+    dense = balance.linearise(at).dense(np.arange(1))
+    assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
+
+
+def test_residual_is_that_of_the_stiffness_matrices() -> None:
+    balance, predicted = case("mixed", 8, wear=True)
+    at = balance.evaluate(predicted)
+    structure = balance.joint.structure
+    moved, force = balance.joint.to_relative(at.displacement_h), balance.joint.to_relative(at.force_h)
+    static = structure.static_stiffness @ moved[:, 0] + force[:, 0] - structure.static_force
+    assert at.residual[:, 0] == pytest.approx(static, abs=1e-10)
+    for n in (1, 2, 3):
+        amplitude = moved[:, 2 * n - 1] - 1j * moved[:, 2 * n]
+        taken = force[:, 2 * n - 1] - 1j * force[:, 2 * n]
+        left = structure.dynamic_stiffness[n - 1] @ amplitude + taken - structure.harmonic_force * (n == 1)
+        assert at.residual[:, 2 * n - 1] - 1j * at.residual[:, 2 * n] == pytest.approx(left, abs=1e-10)
+
+
+def test_wear_opens_the_pairs_that_slip_by_gain_times_slip_work() -> None:
+    balance, predicted = case("3d", 0, wear=True)
+    unworn = Balance(balance.joint, balance.history, balance.wear_depth, np.zeros(4))
+    worn_at, unworn_at = balance.evaluate(predicted), unworn.evaluate(predicted)
+    assert np.array_equal(unworn_at.wear_depth, balance.wear_depth)
+    assert worn_at.wear_depth == pytest.approx(balance.wear_depth + balance.wear_gain * unworn_at.slip_work, rel=1e-14)
+    moved = worn_at.displacement_h - unworn_at.displacement_h
+    grown = np.zeros_like(moved)
+    grown[:, 0, 0] = worn_at.wear_depth - balance.wear_depth
+    assert moved == pytest.approx(grown, abs=1e-12 * np.abs(unworn_at.displacement_h).max())
+
+
+def test_a_gap_and_a_wear_depth_act_alike() -> None:
+    balance, predicted = case("3d", 1, wear=False)
+    flat = Balance(balance.joint, balance.history, np.zeros(4), np.zeros(4))
+    difference = balance.evaluate(predicted).displacement_h - flat.evaluate(predicted).displacement_h
+    assert difference[:, 0, 0] == pytest.approx(balance.wear_depth, rel=1e-9)
+    difference[:, 0, 0] = 0.0
+    assert not difference.any()
+
+
+def test_the_scaled_residual_shows_an_error_of_the_vibration_beside_a_large_preload() -> None:
+    balance, predicted = case("3d", 9, wear=False)
+    at = balance.evaluate(predicted)
+    static, moving = at.scale
+    assert at.scaled_residual() == pytest.approx(
+        np.hypot(np.linalg.norm(at.residual[:, 0]) / static, np.linalg.norm(at.residual[:, 1:]) / moving)
+    )
+    assert at.scaled_residual((2 * static, 2 * moving)) == pytest.approx(at.scaled_residual() / 2)

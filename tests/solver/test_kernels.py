@@ -1,0 +1,236 @@
+"""Contact kernels against the law, a plain twin, differences, and themselves without compilation."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from solver.harmonics import build_basis
+from solver.kernels import SEPARATED, SLIP, STICK, contact_sample, march_period, march_tangent, wear_integral
+from tests.solver import contact_twin
+from tests.solver.kernel_cases import BASIS, FRICTION, PERIODS, KernelCase, kernel_case, kernel_results
+
+number = st.integers(-(10**8), 10**8).map(lambda count: 1e-6 * count)  # N; no squares that underflow
+friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
+
+
+@settings(deadline=None, derandomize=True)
+@given(
+    normal=number,
+    tangents=st.tuples(number, number),
+    states=st.tuples(number, number),
+    friction=friction_coefficients,
+)
+def test_every_sample_obeys_signorini_and_coulomb(
+    normal: float, tangents: tuple[float, float], states: tuple[float, float], friction: float
+) -> None:
+    pressure, *rest, status = contact_sample(normal, *tangents, friction, *states)
+    force, state = np.array(rest[:2]), np.array(rest[2:])
+    moved = state - np.array(states)
+    assert pressure == max(normal, 0.0)
+    assert np.linalg.norm(force) <= friction * pressure * (1 + 1e-15)
+    # the spring between predicted force and slider carries the force
+    assert force + state == pytest.approx(np.array(tangents), abs=1e-13)
+    if status == SEPARATED:
+        assert normal <= 0
+        assert not force.any()
+    elif status == STICK:
+        assert np.linalg.norm(force) < friction * pressure
+        assert not moved.any()
+    else:
+        assert status == SLIP
+        assert np.linalg.norm(force) == pytest.approx(friction * pressure, rel=1e-14, abs=1e-300)
+        # slip along the force
+        assert moved @ force == pytest.approx(np.linalg.norm(moved) * np.linalg.norm(force), rel=1e-9, abs=1e-9)
+
+
+def test_the_three_states_of_a_sample() -> None:
+    assert contact_sample(-1.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
+    assert contact_sample(0.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
+    assert contact_sample(20.0, 4.0, 5.0, 0.5, 1.0, 1.0) == (20.0, 3.0, 4.0, 1.0, 1.0, STICK)
+    assert contact_sample(4.0, 4.0, 5.0, 0.5, 1.0, 1.0) == pytest.approx((4.0, 1.2, 1.6, 2.8, 3.4, SLIP))
+    assert contact_sample(4.0, 4.0, 5.0, 0.0, 1.0, 1.0) == (4.0, 0.0, 0.0, 4.0, 5.0, SLIP)
+
+
+@pytest.mark.parametrize("most_passes", [1, 2, 5])
+def test_displacement_level_is_that_of_the_plain_twin(most_passes: int) -> None:
+    case = kernel_case(4, 24, seed=1, at_velocity=False)
+    force_t, state_t, status_t, passes, drift = march_period(
+        case.predicted_t, FRICTION, case.start, case.at_velocity, 0.0, most_passes
+    )
+    for pair in range(4):
+        force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, case.start[pair], passes[pair])
+        assert force_t[pair] == pytest.approx(force, abs=1e-11)
+        assert state_t[pair] == pytest.approx(slip, abs=1e-11)
+        assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
+        assert drift[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
+    assert passes.max() <= most_passes
+    assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
+
+
+def test_velocity_level_is_that_of_the_plain_twin() -> None:
+    case = kernel_case(4, 24, seed=2, at_velocity=True)
+    force_t, state_t, status_t, passes, _ = march_period(
+        case.predicted_t, FRICTION, case.start, case.at_velocity, 0.0, 8
+    )
+    for pair in range(4):
+        force, sliding = contact_twin.pair_period_at_velocity(case.predicted_t[pair], FRICTION)
+        assert force_t[pair] == pytest.approx(force, abs=1e-11)
+        assert np.diff(state_t[pair]) == pytest.approx(sliding, abs=1e-11)
+        expected = contact_twin.status(case.predicted_t[pair], FRICTION, np.zeros_like(sliding))
+        assert np.array_equal(status_t[pair], expected)
+    assert np.array_equal(passes, np.ones(4))
+    assert not state_t[:, :, 0].any()
+    assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
+
+
+def test_a_period_is_marched_until_its_state_repeats() -> None:
+    # Separation forgets the history within one pass, slip under constant pressure within two.
+    case = kernel_case(6, 48, seed=3, at_velocity=False)
+    *_, passes, drift = march_period(case.predicted_t, FRICTION, case.start, case.at_velocity, 1e-9, 50)
+    assert (drift <= 1e-9).all()
+    assert (passes >= 2).all()
+    again = march_period(case.predicted_t, FRICTION, case.start, case.at_velocity, 1e-9, 60)
+    assert np.array_equal(again[3], passes)
+
+
+def test_a_stuck_pair_keeps_its_history_and_wears_exactly_zero() -> None:
+    case = kernel_case(3, 64, seed=4, at_velocity=False)
+    predicted = case.predicted_t.copy()
+    predicted[:, 0] = 1e3  # far above what the tangents need
+    for at_velocity in (False, True):
+        levels = np.full(3, at_velocity)
+        force_t, state_t, status_t, passes, drift = march_period(predicted, FRICTION, case.start, levels, 0.0, 8)
+        assert (status_t == STICK).all()
+        assert np.array_equal(wear_integral(force_t, state_t, levels), np.zeros(3))
+        assert np.array_equal(passes, np.ones(3))
+        assert not drift.any()
+        if not at_velocity:
+            assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
+
+
+def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() -> None:
+    # Constant pressure P, p_T = A cos: once periodic, the slider moves to and fro over 2 (A - mu P), so the integral of
+    # P |dX| is 4 P (A - mu P); the samples contain both turns of p_T, so it holds to round-off.
+    pressure, amplitude, n = 10.0, 12.0, 64
+    predicted = np.zeros((1, 3, n))
+    predicted[0, 0] = pressure
+    predicted[0, 1] = amplitude * np.cos(2 * np.pi * np.arange(n) / n)
+    levels = np.zeros(1, bool)
+    force_t, state_t, _, _, drift = march_period(predicted, FRICTION, np.full((1, 2), 3.0), levels, 1e-12, 8)
+    assert drift[0] == pytest.approx(0, abs=1e-12)
+    expected = 4 * pressure * (amplitude - FRICTION * pressure)
+    assert wear_integral(force_t, state_t, levels)[0] == pytest.approx(expected, rel=1e-12)
+    # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
+    work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
+    assert work <= FRICTION * expected * (1 + 1e-12)
+
+
+def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_increment() -> None:
+    force_t = np.zeros((2, 3, 3))
+    force_t[:, 0] = [1.0, 3.0, 5.0]
+    state_t = np.zeros((2, 2, 4))
+    state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
+    state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
+    expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6, 1 * 5 + 5 * 6]
+    assert wear_integral(force_t, state_t, np.array([False, True])) == pytest.approx(expected, rel=1e-15)
+
+
+def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, float]:
+    """Largest error of the tangents against central differences relative to their size, and the switches' distance."""
+    basis = BASIS
+    m = basis.synthesis.shape[0]
+
+    def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        predicted_t = predicted_h @ basis.synthesis
+        force_t, state_t, status_t, passes, _ = march_period(
+            predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS
+        )
+        return force_t @ basis.analysis, wear_integral(force_t, state_t, case.at_velocity), status_t
+
+    predicted_t = case.predicted_h @ basis.synthesis
+    *_, passes, _ = march_period(predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS)
+    force_tangent, wear_tangent = march_tangent(
+        predicted_t,
+        FRICTION,
+        case.start,
+        case.at_velocity,
+        passes,
+        basis.synthesis,
+        basis.analysis,
+        case.has_normal,
+    )
+    force_error, wear_error, same = 0.0, 0.0, True
+    _, _, status = run(case.predicted_h)
+    step = 1e-4
+    for component in range(3):
+        for k in range(m):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = case.predicted_h.copy()
+                moved[case.has_normal | (component > 0), component, k] += sign * step
+                ends.append(run(moved))
+            same = same and all(np.array_equal(end[2], status) for end in ends)
+            force_difference = (ends[0][0] - ends[1][0]) / (2 * step)
+            column = force_tangent[:, :, component * m + k].reshape(n_contact, 3, m)
+            force_error = max(force_error, np.abs(column - force_difference).max())
+            wear_difference = (ends[0][1] - ends[1][1]) / (2 * step)
+            wear_error = max(wear_error, np.abs(wear_tangent[:, component * m + k] - wear_difference).max())
+    assert same, "a sample changes its state within the differences: another seed is needed"
+    return force_error, wear_error, float(np.abs(wear_tangent).max())
+
+
+@pytest.mark.parametrize("at_velocity", [False, True])
+@pytest.mark.parametrize("seed", [10, 12, 13])
+def test_tangents_are_those_of_central_differences(at_velocity: bool, seed: int) -> None:
+    case = kernel_case(4, BASIS.n_samples, seed=seed, at_velocity=at_velocity)
+    assert not case.has_normal.all()
+    force_error, wear_error, wear_size = derivative_error(case, 4)
+    # truncation: step^2 / pull^2 with pulls above 0.1 N; round-off: 1e-16 * 100 N / step
+    assert force_error < 1e-7
+    assert wear_error < 1e-7 * max(wear_size, 1.0)
+    assert wear_size > 1.0
+
+
+def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
+    # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
+    case = kernel_case(4, BASIS.n_samples, seed=10, at_velocity=False)
+    arguments = (case.predicted_t, FRICTION, case.start, case.at_velocity)
+    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
+    one, _ = march_tangent(*arguments, np.full(4, 1), *rest)
+    two, _ = march_tangent(*arguments, np.full(4, 2), *rest)
+    assert np.abs(one - two).max() > 1e-3
+
+
+def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
+    basis = build_basis(0, 1)
+    predicted_t = np.array([[[2.0], [0.5], [3.0]]])
+    start, level = np.zeros((1, 2)), np.zeros(1, bool)
+    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, level, 0.0, 8)
+    assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
+    tangent, _ = march_tangent(
+        predicted_t, FRICTION, start, level, np.array([2]), basis.synthesis, basis.analysis, np.ones(1, bool)
+    )
+    assert tangent[0, 0] == pytest.approx([1.0, 0.0, 0.0])
+    assert wear_integral(force_t, state_t, level)[0] == 0.0
+
+
+def test_kernels_give_the_same_numbers_without_compilation(tmp_path: Path) -> None:
+    path = tmp_path / "plain.npz"
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root)}
+    code = "import sys; from tests.solver.kernel_cases import save_results; save_results(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", code, str(path)], check=True, env=environment, cwd=root, timeout=120)
+    with np.load(path) as plain:
+        assert bool(plain["disabled"])
+        compiled = kernel_results()
+        assert set(plain.files) == {*compiled, "disabled"}
+        for name, values in compiled.items():
+            assert values == pytest.approx(plain[name], rel=1e-12, abs=1e-12 * max(np.abs(values).max(), 1e-300)), name

@@ -1,0 +1,113 @@
+"""Newton directions against a dense solve of the whole Jacobian."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import linear
+from solver.balance import Balance
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.settings import SolverSettings
+from tests.solver.models import PRELOAD, random_balance, random_model
+
+SETTINGS = SolverSettings(3, 24)
+
+
+def large(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
+    """14 pairs, 42 displacements, 294 unknowns: above the size that is always solved directly."""
+    balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), SETTINGS, seed, wear=wear)
+    assert predicted.size > linear.SMALL
+    return balance, predicted
+
+
+def oracle(balance: Balance, predicted: FloatArray, right: FloatArray) -> FloatArray:
+    tangent = balance.linearise(balance.evaluate(predicted))
+    dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
+    return np.linalg.solve(dense, right.ravel()).reshape(right.shape)
+
+
+def error(found: FloatArray, exact: FloatArray) -> float:
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+
+
+def test_a_small_system_is_solved_to_round_off() -> None:
+    kinds = ("3d", "constant_load", "normal_only", "3d")
+    balance, predicted = random_balance(random_model(1, kinds), SETTINGS, 2, wear=True)
+    assert predicted.size <= linear.SMALL
+    right = np.random.default_rng(3).normal(size=predicted.shape)
+    step = JacobianSolver().solve(balance.linearise(balance.evaluate(predicted)), right)
+    assert error(step, oracle(balance, predicted, right)) < 1e-10
+
+
+def test_a_large_system_is_solved_to_round_off_by_a_fresh_factorisation() -> None:
+    balance, predicted = large(4)
+    right = np.random.default_rng(5).normal(size=predicted.shape)
+    step = JacobianSolver().solve(balance.linearise(balance.evaluate(predicted)), right)
+    assert error(step, oracle(balance, predicted, right)) < 1e-10
+
+
+@pytest.mark.parametrize("wear", [False, True])
+def test_a_kept_factorisation_follows_jacobians_that_change(wear: bool) -> None:
+    balance, predicted = large(6, wear)
+    solver = JacobianSolver()
+    random = np.random.default_rng(7)
+    conditions = []
+    for _ in range(8):
+        tangent = balance.linearise(balance.evaluate(predicted))
+        right = random.normal(size=predicted.shape)
+        step = solver.solve(tangent, right)
+        # the promise is the residual: of the Jacobian of now, not of the one that was factorised
+        residual = np.linalg.norm(tangent.apply(step) - right) / np.linalg.norm(right)
+        condition = np.linalg.cond(tangent.dense(np.arange(balance.joint.contact.n_contact)))
+        conditions.append(condition)
+        assert residual < 10 * linear.FORCING
+        assert error(step, oracle(balance, predicted, right)) < linear.FORCING * condition
+        predicted = predicted + 0.02 * PRELOAD * random.normal(size=predicted.shape) / np.arange(1, 8)
+    # the bound on the error would be empty if the Jacobian were nearly singular
+    assert min(conditions) < 1e3
+
+
+def test_a_jump_to_another_state_is_solved_as_well() -> None:
+    balance, predicted = large(8)
+    solver = JacobianSolver()
+    right = np.random.default_rng(9).normal(size=predicted.shape)
+    for changed in (predicted, -predicted, 3.0 * predicted, predicted[::-1].copy()):
+        tangent = balance.linearise(balance.evaluate(changed))
+        step = solver.solve(tangent, right)
+        assert np.linalg.norm(tangent.apply(step) - right) < 10 * linear.FORCING * np.linalg.norm(right)
+
+
+def test_pairs_that_stay_stuck_are_left_out_and_found_again() -> None:
+    balance, predicted = large(10, wear=False)
+    solver = JacobianSolver()
+    random = np.random.default_rng(11)
+    joint = balance.joint
+    # in steps ever more pairs are pressed so that they neither slip nor open, then they are let go again
+    for held in (0, 5, 10, 14, 10, 2, 0):
+        changed = predicted.copy()
+        closing = (joint.slots // 3 < held) & (joint.slots % 3 == 0)
+        changed[closing, 0] += 100.0 * PRELOAD
+        tangent = balance.linearise(balance.evaluate(changed))
+        assert tangent.active().size <= 14 - held
+        right = random.normal(size=predicted.shape)
+        step = solver.solve(tangent, right)
+        assert np.linalg.norm(tangent.apply(step) - right) < 10 * linear.FORCING * np.linalg.norm(right)
+        if held == 14:
+            # everything is stuck: the unknown moves nothing and the Jacobian is the identity
+            assert error(step, right) < 1e-12
+
+
+def test_a_newton_iteration_with_kept_factors_converges_like_one_with_fresh_ones() -> None:
+    balance, predicted = large(12)
+    at = balance.evaluate(predicted)
+    solver = JacobianSolver()
+    solver.solve(balance.linearise(at), -at.residual)
+    for _ in range(2):
+        moved = predicted + 1e-3 * PRELOAD * np.random.default_rng(13).normal(size=predicted.shape)
+        near = balance.evaluate(moved)
+        kept = solver.solve(balance.linearise(near), -near.residual)
+        fresh = oracle(balance, moved, -near.residual)
+        assert error(kept, fresh) < 1e-2
+        predicted = moved

@@ -1,0 +1,162 @@
+"""Newton's method on small piecewise examples that know nothing of contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from solver.newton import solve_newton
+
+Function = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Example:
+    """Evaluation of a plain function."""
+
+    point: np.ndarray
+    residual: np.ndarray
+    scale: tuple[float, float] = (1.0, 1.0)
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        return float(np.linalg.norm(self.residual))
+
+
+@dataclass
+class Problem:
+    """A function with its (generalised) derivative, and how often it was evaluated."""
+
+    function: Function
+    derivative: Function
+    calls: list[np.ndarray] = field(default_factory=list)
+
+    def evaluate(self, point: np.ndarray) -> Example:
+        self.calls.append(point)
+        return Example(point, self.function(point))
+
+    def direction(self, at: Example) -> np.ndarray:
+        return np.linalg.solve(self.derivative(at.point), -at.residual)
+
+
+def kink(left: float, right: float, value: float) -> Problem:
+    """`slope * x - value`, with slopes `left` and `right` of the kink at 0: a spring that stiffens."""
+
+    def slope(x: np.ndarray) -> np.ndarray:
+        return np.where(x < 0, left, right)
+
+    return Problem(lambda x: slope(x) * x - value, lambda x: np.diag(slope(x)))
+
+
+def plain_newton(problem: Problem, start: np.ndarray, iterations: int) -> np.ndarray:
+    point = start
+    for _ in range(iterations):
+        point = point + problem.direction(problem.evaluate(point))
+    return point
+
+
+# Slopes 1, 5, 1 between kinks at -1 and 1, so that the tangent of either outer piece leads to the other one.
+def ramp() -> Problem:
+    def function(x: np.ndarray) -> np.ndarray:
+        return 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1))
+
+    return Problem(function, lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0)))
+
+
+def test_a_linear_system_takes_one_iteration() -> None:
+    matrix = np.random.default_rng(1).normal(size=(4, 4)) + 4 * np.eye(4)
+    problem = Problem(lambda x: matrix @ x - 1.0, lambda x: matrix)
+    result = solve_newton(problem.evaluate, problem.direction, np.zeros(4), 1e-12)
+    assert result.converged
+    assert result.iterations == 1
+    assert result.unknown == pytest.approx(np.linalg.solve(matrix, np.ones(4)), rel=1e-12)
+    assert np.array_equal(result.evaluation.point, result.unknown)
+
+
+def test_a_solution_takes_no_iteration() -> None:
+    problem = kink(1.0, 2.0, 2.0)
+    result = solve_newton(problem.evaluate, problem.direction, np.array([1.0]), 1e-12)
+    assert (result.converged, result.iterations) == (True, 0)
+    assert len(problem.calls) == 1
+
+
+def test_convergence_is_quadratic_on_a_smooth_function() -> None:
+    problem = Problem(lambda x: np.exp(x) - 2.0, lambda x: np.diag(np.exp(x)))
+    result = solve_newton(problem.evaluate, problem.direction, np.array([1.5]), 1e-14)
+    assert result.converged
+    assert result.iterations <= 6
+    errors = [abs(float(point[0]) - np.log(2.0)) for point in problem.calls]
+    assert errors[3] < errors[2] ** 2
+
+
+def test_a_stiffening_spring_is_solved_from_either_side() -> None:
+    for start in (-10.0, 10.0):
+        problem = kink(1.0, 100.0, 3.0)
+        result = solve_newton(problem.evaluate, problem.direction, np.array([start]), 1e-12)
+        assert result.converged
+        assert result.unknown[0] == pytest.approx(0.03, rel=1e-10)
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_a_cycle_of_plain_newton_is_broken(size: int) -> None:
+    start = np.linspace(2.0, 3.0, size)
+    there = plain_newton(ramp(), start, 1)
+    back = plain_newton(ramp(), start, 2)
+    assert there == pytest.approx(-4.0 * np.ones(size))
+    assert back == pytest.approx(4.0 * np.ones(size))
+    assert plain_newton(ramp(), start, 20) == pytest.approx(back), "plain Newton must cycle for this test to mean anything"
+    problem = ramp()
+    result = solve_newton(problem.evaluate, problem.direction, start, 1e-10)
+    assert result.converged
+    assert result.unknown == pytest.approx(np.zeros(size), abs=1e-10)
+
+
+def test_a_cycle_of_coupled_pieces_is_broken() -> None:
+    # The same ramp along the rows of a matrix: all unknowns depend on each other.
+    mixing = np.array([[1.0, 0.4], [-0.3, 1.0]])
+    inner = ramp()
+    problem = Problem(lambda x: inner.function(mixing @ x), lambda x: inner.derivative(mixing @ x) @ mixing)
+    start = np.linalg.solve(mixing, np.array([2.0, -3.0]))
+    assert np.linalg.norm(inner.function(mixing @ plain_newton(problem, start, 30))) > 1.0
+    result = solve_newton(problem.evaluate, problem.direction, start, 1e-10)
+    assert result.converged
+    assert result.unknown == pytest.approx(np.zeros(2), abs=1e-10)
+
+
+def test_no_solution_is_a_value() -> None:
+    problem = Problem(lambda x: x**2 + 1.0, lambda x: np.diag(2 * x))
+    result = solve_newton(problem.evaluate, problem.direction, np.array([1.3]), 1e-10, 30)
+    assert not result.converged
+    assert result.evaluation.scaled_residual() >= 1.0
+    assert np.array_equal(result.evaluation.point, result.unknown)
+    # the best point so far, not the last one
+    assert result.evaluation.scaled_residual() == min(np.linalg.norm(x**2 + 1) for x in problem.calls)
+
+
+def test_the_iterations_are_bounded() -> None:
+    problem = ramp()
+    result = solve_newton(problem.evaluate, problem.direction, np.array([2.0]), 1e-10, 3)
+    assert not result.converged
+    assert result.iterations <= 3
+    assert len(problem.calls) <= 4
+
+
+def test_a_direction_that_is_not_finite_is_a_failure() -> None:
+    problem = Problem(lambda x: x - 1.0, lambda x: np.eye(1))
+    result = solve_newton(problem.evaluate, lambda at: np.full(1, np.nan), np.zeros(1), 1e-10)
+    assert not result.converged
+    assert result.unknown[0] == 0.0
+
+
+def test_a_residual_that_is_not_finite_sends_the_iteration_back() -> None:
+    # The full step lands where the logarithm is undefined.
+    def function(x: np.ndarray) -> np.ndarray:
+        return np.log(x) if x[0] > 0 else np.full(1, np.nan)
+
+    problem = Problem(function, lambda x: np.diag(1 / x))
+    result = solve_newton(problem.evaluate, problem.direction, np.array([10.0]), 1e-12)
+    assert np.isnan(problem.evaluate(problem.calls[1]).scaled_residual())
+    assert result.converged
+    assert result.unknown[0] == pytest.approx(1.0, rel=1e-10)

@@ -1,0 +1,251 @@
+"""Static and periodic states against equilibrium, the contact law and the energy; reports against time signals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance, Evaluation
+from solver.history import PeriodicState
+from solver.joint import Case, Joint, build_case
+from solver.linear import JacobianSolver
+from solver.model import FloatArray, ReducedModel
+from solver.path import Effort, PathPoint
+from solver.response import largest_distance, periodic_state, report_state, solve_first_state, solve_static_state
+from solver.settings import SolverSettings
+from tests.solver.contact_twin import pair_period, status
+from tests.solver.models import OMEGA, dovetail, random_model
+from tests.solver.reconstruction import contact_work, full_motion, series
+
+FRICTION = 0.4
+AMPLITUDE = 60.0
+SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
+KINDS = {
+    "3d": ("3d", "3d", "3d"),
+    "mixed": ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent"),
+}
+
+
+def case_of(kinds: str, seed: int) -> Case:
+    return build_case(random_model(seed, KINDS[kinds]), FRICTION, OMEGA, SETTINGS)
+
+
+@lru_cache
+def periodic(kinds: str, seed: int) -> tuple[Joint, PathPoint, PeriodicState]:
+    case = case_of(kinds, seed)
+    worn = np.random.default_rng(seed).uniform(0.0, 2e-6, case.model.contact.n_contact)
+    point = solve_first_state(case, OMEGA, AMPLITUDE, worn, JacobianSolver(), Effort())
+    assert point is not None
+    joint = case.joint(OMEGA, AMPLITUDE)
+    return joint, point, periodic_state(joint, point)
+
+
+def static_point(case: Case, wear_depth: FloatArray, tolerance: float = 1e-10) -> PathPoint:
+    point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, tolerance, Effort())
+    assert point is not None
+    return point
+
+
+def check_static(model: ReducedModel, evaluation: Evaluation, friction: float) -> None:
+    """Equilibrium of the full structure, Signorini and Coulomb, in displacements and forces."""
+    contact, linear = model.contact, model.linear[0]
+    force, moved = evaluation.force_h[:, :, 0], evaluation.displacement_h[:, :, 0]
+    exists = contact.dofs >= 0
+    relative = contact.dofs[exists]
+    inner = np.setdiff1d(np.arange(linear.stiffness.shape[0]), relative)
+    solved = np.zeros(linear.stiffness.shape[0])
+    solved[relative] = moved[exists]
+    load = linear.load_static.copy()
+    load[relative] -= force[exists]
+    # the relative displacements are given: a free blade may slide along its root without resistance
+    solved[inner] = np.linalg.solve(linear.stiffness[np.ix_(inner, inner)], (load - linear.stiffness @ solved)[inner])
+    assert np.abs(linear.stiffness @ solved - load).max() < 1e-8 * np.abs(force).max()
+    length = np.abs(solved).max()
+    closing = exists[:, 0]
+    opening = contact.gap + evaluation.wear_depth - moved[:, 0]
+    assert (force[:, 0] >= 0).all()
+    assert (opening[closing] >= -1e-12 * length).all()
+    assert np.abs((force[:, 0] * opening)[closing]).max(initial=0.0) <= 1e-10 * length * force.max()
+    assert force[~closing, 0] == pytest.approx(contact.normal_load[~closing], rel=1e-15)
+    assert (np.hypot(force[:, 1], force[:, 2]) <= friction * force[:, 0] * (1 + 1e-14)).all()
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_static_state_is_in_equilibrium_and_obeys_the_contact_law(kinds: str, seed: int) -> None:
+    case = case_of(kinds, seed)
+    n_contact = case.model.contact.n_contact
+    worn = np.random.default_rng(seed).uniform(0.0, 4e-5, n_contact)
+    for depth in (np.zeros(n_contact), worn):
+        check_static(case.model, static_point(case, depth).evaluation, FRICTION)
+
+
+def test_the_static_state_of_the_dovetail_obeys_the_contact_law() -> None:
+    case = build_case(dovetail(), 0.5, 2 * np.pi * 212.0, SolverSettings(3, 64))
+    point = static_point(case, np.zeros(16), 1e-9)
+    check_static(case.model, point.evaluation, 0.5)
+    force = point.evaluation.force_h[:, :, 0]
+    # the spring-up of the load leaves pairs on both sides of sticking
+    assert (force[:, 0] > 0).all()
+
+
+def test_a_wide_gap_leaves_a_pair_open() -> None:
+    case = case_of("3d", 4)
+    contact = replace(case.model.contact, gap=np.array([0.0, 1e-2, 0.0]))
+    case = build_case(replace(case.model, contact=contact), FRICTION, OMEGA, SETTINGS)
+    evaluation = static_point(case, np.zeros(3)).evaluation
+    assert not evaluation.force_h[1].any()
+    assert (evaluation.force_h[[0, 2], 0, 0] > 0).all()
+    check_static(case.model, evaluation, FRICTION)
+
+
+def test_the_static_state_does_not_depend_on_how_exactly_its_steps_are_solved() -> None:
+    # A loose tolerance ends Newton's method earlier; as it ends exactly in its piece, the state is the same.
+    case = case_of("3d", 5)
+    tight, loose = (static_point(case, np.zeros(3), tolerance) for tolerance in (1e-12, 1e-7))
+    size = np.abs(tight.evaluation.force_h).max()
+    assert loose.evaluation.force_h == pytest.approx(tight.evaluation.force_h, abs=20 * 1e-7 * size * 10)
+    lengths = np.abs(tight.evaluation.displacement_h).max()
+    assert loose.history == pytest.approx(tight.history, abs=20 * 1e-7 * lengths * 10)
+
+
+def test_a_load_that_rises_in_proportion_without_slip_leaves_no_history() -> None:
+    model = random_model(6, ("normal_only", "normal_only"))
+    case = build_case(model, FRICTION, OMEGA, SETTINGS)
+    point = static_point(case, np.zeros(2))
+    check_static(model, point.evaluation, FRICTION)
+    assert not point.history.any()
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_periodic_state_is_in_equilibrium_in_every_harmonic(kinds: str, seed: int) -> None:
+    joint, point, state = periodic(kinds, seed)
+    assert point.parameter == 1.0
+    motion = full_motion(case_of(kinds, seed).model, state)
+    # the static harmonic is among them: mean forces balance
+    assert max(motion.imbalance) < 1e-8 * motion.force
+    assert state.omega == OMEGA
+    assert state.excitation_amplitude == AMPLITUDE
+    assert np.array_equal(state.start_history, point.evaluation.history)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds: str, seed: int) -> None:
+    joint, point, state = periodic(kinds, seed)
+    model = case_of(kinds, seed).model
+    motion = full_motion(model, state)
+    penalty = joint.penalty
+    assert not penalty.at_velocity.any()
+    # the contact force from the plain law alone, from what the state stores
+    moved = state.displacement_h.copy()
+    moved[:, 0, 0] -= model.contact.gap + state.wear_depth
+    eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
+    predicted_h = state.contact_force_h + eps[:, :, None] * moved
+    predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
+    predicted_t = series(predicted_h, SETTINGS.samples)
+    forces = np.array(
+        [
+            pair_period(predicted_t[pair], FRICTION, penalty.tangential[pair] * state.start_history[pair], 8)[0]
+            for pair in range(model.contact.n_contact)
+        ]
+    )
+    size = np.abs(state.contact_force_h).max()
+    assert forces @ joint.basis.analysis == pytest.approx(state.contact_force_h, abs=1e-9 * size)
+    work, viscous, friction = motion.excitation_work(), motion.viscous_work(), contact_work(state, forces)
+    assert friction > 0.01 * work
+    assert work == pytest.approx(viscous + friction, rel=1e-6)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds: str, seed: int) -> None:
+    joint, point, _ = periodic(kinds, seed)
+    at = point.evaluation
+    normal = at.force_t[:, 0]
+    assert (normal >= 0).all()
+    assert (np.hypot(at.force_t[:, 1], at.force_t[:, 2]) <= FRICTION * normal * (1 + 1e-15)).all()
+    # pressed: no opening left in the predicted force; open: no force at all
+    assert np.array_equal(normal, np.maximum(at.predicted_t[:, 0], 0.0))
+    assert not at.force_t[:, 1:][np.repeat((normal == 0)[:, None], 2, axis=1)].any()
+    # slip along the friction force; none while it is below the limit
+    slip = np.diff(at.state_t)
+    along = np.einsum("pcn,pcn->pn", slip, at.force_t[:, 1:])
+    sizes = np.hypot(slip[:, 0], slip[:, 1]) * np.hypot(at.force_t[:, 1], at.force_t[:, 2])
+    assert along == pytest.approx(sizes, abs=1e-9 * max(sizes.max(), 1.0))
+    assert not slip[:, :][np.repeat((at.status_t == 1)[:, None], 2, axis=1)].any()
+    # what the state repeats, and what the statuses mean
+    assert at.drift <= 1e-9 * max(float(normal.max()), 1.0)
+    for pair in range(normal.shape[0]):
+        expected = status(at.predicted_t[pair], FRICTION, at.state_t[pair, :, :-1])
+        assert np.array_equal(at.status_t[pair], expected)
+
+
+def test_the_random_states_stick_slip_and_open() -> None:
+    seen = {int(s) for kinds in KINDS for seed in (1, 2) for s in periodic(kinds, seed)[1].evaluation.status_t.ravel()}
+    assert seen == {0, 1, 2}
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
+    joint, point, state = periodic(kinds, 1)
+    report = report_state(joint, point.evaluation)
+    model = case_of(kinds, 1).model
+    at = point.evaluation
+    motion = full_motion(model, state)
+    assert report.response == pytest.approx(motion.response(), rel=1e-8)
+    static = np.real(model.linear[0].response @ motion.displacement[0])
+    phase = 2 * np.pi * np.arange(SETTINGS.samples) / SETTINGS.samples
+    waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
+    assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8)
+    assert report.mean_pressure == pytest.approx(at.force_t[:, 0].mean(axis=1) / model.contact.area, rel=1e-12)
+    assert report.open_fraction == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
+    slip = at.state_t / joint.penalty.tangential[:, None, None]
+    for pair in range(model.contact.n_contact):
+        distances = np.linalg.norm(slip[pair, :, :, None] - slip[pair, :, None, :], axis=0)
+        assert report.slip_range[pair] == pytest.approx(distances.max(), rel=1e-12, abs=1e-20)
+        steps = np.linalg.norm(np.diff(slip[pair]), axis=0)
+        pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
+        assert report.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
+    assert np.array_equal(report.wear_depth, state.wear_depth)
+
+
+def test_largest_distance_is_that_between_any_two_points() -> None:
+    points = np.array([[[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 2.0, 0.5]]])
+    assert largest_distance(points) == pytest.approx([np.sqrt(5.0)])
+    assert np.array_equal(largest_distance(np.ones((2, 2, 5))), np.zeros(2))
+
+
+def test_a_stored_state_is_reproduced_without_an_iteration() -> None:
+    joint, point, state = periodic("3d", 1)
+    idle = np.zeros(3)
+    balance = Balance(joint, state.start_history, state.wear_depth, idle)
+    again = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    assert again.scaled_residual() <= 1.1 * SETTINGS.tolerance
+    assert again.force_t == pytest.approx(point.evaluation.force_t, abs=1e-8)
+
+
+def test_without_excitation_the_periodic_state_is_the_static_one() -> None:
+    case = case_of("mixed", 3)
+    idle = np.zeros(6)
+    point = solve_first_state(case, OMEGA, 0.0, idle, JacobianSolver(), Effort())
+    assert point is not None
+    still = static_point(case, idle).evaluation
+    size = np.abs(still.force_h).max()
+    assert point.evaluation.force_h[:, :, 1:] == pytest.approx(0.0 * point.evaluation.force_h[:, :, 1:], abs=1e-8 * size)
+    assert point.evaluation.force_h[:, :, 0] == pytest.approx(still.force_h[:, :, 0], abs=1e-8 * size)
+
+
+def test_a_structure_that_only_friction_holds_slides_until_its_weak_springs_carry_the_rest() -> None:
+    model = random_model(7, ("constant_load", "constant_load"), n_inner=0)
+    linear = model.linear[0]
+    loose = replace(linear, stiffness=1e-6 * linear.stiffness, load_static=np.full(4, 1e4))
+    case = build_case(replace(model, linear={0: loose}), FRICTION, OMEGA, SETTINGS)
+    evaluation = static_point(case, np.zeros(2)).evaluation
+    check_static(case.model, evaluation, FRICTION)
+    force = evaluation.force_h[:, :, 0]
+    assert np.hypot(force[:, 1], force[:, 2]) == pytest.approx(FRICTION * case.model.contact.normal_load, rel=1e-9)

@@ -1,0 +1,191 @@
+"""The condensed structure against the full equations, and a folded sector against its whole ring."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.harmonics import from_complex, to_complex
+from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.structure import build_structure, relative_indices
+from tests.solver.models import MASS, OMEGA, STIFFNESS, definite, random_contact, random_linear, random_model
+
+KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
+HARMONICS = 3
+AMPLITUDE = 60.0
+
+
+def cyclic_model(seed: int, n_sectors: int, nodal_diameter: int) -> ReducedModel:
+    """Sector whose structures at different nodal diameters have nothing in common: an index mixed up is seen."""
+    random = np.random.default_rng(seed)
+    contact = random_contact(random, KINDS, 4)
+    n = int((contact.dofs >= 0).sum()) + 4
+    linear = {
+        k: random_linear(random, contact, n, hermitian=k > 0)
+        for k in needed_nodal_diameters(nodal_diameter, n_sectors, HARMONICS)
+    }
+    return ReducedModel(linear, contact, ("first", "second"), n_sectors, nodal_diameter)
+
+
+@pytest.mark.parametrize("n_inner", [0, 1, 6])
+def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner: int) -> None:
+    model = random_model(1, KINDS, n_inner)
+    linear = model.linear[0]
+    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    relative, _ = relative_indices(model.contact)
+    force_h = np.random.default_rng(2).normal(size=(relative.size, 2 * HARMONICS + 1)) * 10.0
+    force = np.column_stack([force_h[:, 0], to_complex(force_h)])
+    moved = []
+    for n in range(HARMONICS + 1):
+        matrix = linear.stiffness + 1j * n * OMEGA * linear.damping - (n * OMEGA) ** 2 * linear.mass
+        load = {0: linear.load_static.astype(complex), 1: AMPLITUDE * linear.load_harmonic}.get(n, 0.0 * relative[0])
+        right = np.zeros(matrix.shape[0], complex) + load
+        right[relative] -= force[:, n]
+        moved.append(np.linalg.solve(matrix, right))
+    displacement_h = from_complex(moved[0].real, np.array(moved[1:]).T)
+    residual = structure.apply(displacement_h[relative]) + force_h - structure.force_h()
+    assert np.abs(residual).max() < 1e-11 * np.abs(force_h).max() * 10
+    full_response = linear.response @ displacement_h
+    assert structure.response_h(displacement_h[relative]) == pytest.approx(
+        full_response, abs=1e-12 * np.abs(full_response).max()
+    )
+
+
+def test_relative_displacements_come_pair_by_pair() -> None:
+    contact = ContactInterface(
+        dofs=np.array([[5, -1, 2], [-1, 0, 4]]),
+        area=np.ones(2),
+        gap=np.zeros(2),
+        normal_load=np.ones(2),
+        position=np.zeros((2, 3)),
+        surface=("a", "b"),
+    )
+    indices, slots = relative_indices(contact)
+    assert indices.tolist() == [5, 2, 0, 4]
+    assert slots.tolist() == [0, 2, 4, 5]
+
+
+@pytest.mark.parametrize("harmonic", [1, 2, 3])
+def test_a_harmonic_sees_its_own_nodal_diameter(harmonic: int) -> None:
+    # 6 sectors, d = 2: harmonics 1, 2, 3 see nodal diameters 2, 4 (folded to 2) and 0
+    model = cyclic_model(3, 6, 2)
+    assert sorted(model.linear) == [0, 2]
+    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    relative, _ = relative_indices(model.contact)
+    linear = model.linear[{1: 2, 2: 2, 3: 0}[harmonic]]
+    stiffness, damping, mass = linear.stiffness, linear.damping, linear.mass
+    if harmonic == 2:
+        # nodal diameter 4 = 6 - 2 is the mirror image: its *matrices* are conjugate, its damping stays damping
+        stiffness, damping, mass = stiffness.conj(), damping.conj(), mass.conj()
+    rate = harmonic * OMEGA
+    receptance = np.linalg.inv(stiffness + 1j * rate * damping - rate**2 * mass)[np.ix_(relative, relative)]
+    expected = np.linalg.inv(receptance)
+    error = np.abs(structure.dynamic_stiffness[harmonic - 1] - expected).max()
+    assert error < 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 1), (5, 2), (6, 2), (6, 3), (7, 3)])
+def test_every_harmonic_of_every_wave_loses_energy_to_the_damping(n_sectors: int, nodal_diameter: int) -> None:
+    model = cyclic_model(4, n_sectors, nodal_diameter)
+    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    for n, stiffness in enumerate(structure.dynamic_stiffness, 1):
+        taken = (stiffness - stiffness.conj().T) / 2j
+        assert np.linalg.eigvalsh(taken).min() > 0, f"harmonic {n} is driven by its damping"
+
+
+def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
+    # Two masses a sector, tied to each other and, unevenly, to the next sector; the ring is assembled directly, and forces
+    # that travel with the wave act on the contact displacement 0 of every sector.
+    n_sectors, wave, n_harmonics = 5, 2, 4
+    random = np.random.default_rng(5)
+    own = {name: scale * definite(random, 2) for name, scale in (("k", STIFFNESS), ("c", 300.0), ("m", MASS))}
+    tie = {"k": 0.1 * STIFFNESS * random.normal(size=(2, 2)), "c": 30.0 * random.normal(size=(2, 2)), "m": np.zeros((2, 2))}
+
+    def ring(name: str) -> np.ndarray:
+        whole = np.zeros((2 * n_sectors, 2 * n_sectors))
+        for s in range(n_sectors):
+            here, there = slice(2 * s, 2 * s + 2), slice(2 * ((s + 1) % n_sectors), 2 * ((s + 1) % n_sectors) + 2)
+            whole[here, here] += own[name]
+            whole[here, there] += tie[name]
+            whole[there, here] += tie[name].T
+        return whole
+
+    def sector(name: str, k: int) -> np.ndarray:
+        turn = np.exp(2j * np.pi * k / n_sectors)
+        matrix = own[name] + tie[name] * turn + tie[name].T / turn
+        return matrix.real if k == 0 else matrix
+
+    contact = ContactInterface(
+        dofs=np.array([[-1, 0, -1]]),
+        area=np.ones(1),
+        gap=np.zeros(1),
+        normal_load=np.ones(1),
+        position=np.full((1, 3), np.nan),
+        surface=("ring",),
+    )
+    load = np.array([0.0, 1.0 - 0.5j])
+    linear = {
+        k: LinearModel(
+            mass=sector("m", k),
+            damping=sector("c", k),
+            stiffness=sector("k", k),
+            load_static=np.zeros(2),
+            load_harmonic=load * (k == wave),
+            response=np.array([[0.0, 1.0]]),
+        )
+        for k in needed_nodal_diameters(wave, n_sectors, n_harmonics)
+    }
+    model = ReducedModel(linear, contact, ("free",), n_sectors, wave)
+    structure = build_structure(model, OMEGA, AMPLITUDE, n_harmonics)
+    for n in range(1, n_harmonics + 1):
+        rate = n * OMEGA
+        whole = ring("k") + 1j * rate * ring("c") - rate**2 * ring("m")
+        phase = np.exp(2j * np.pi * n * wave * np.arange(n_sectors) / n_sectors)
+        contact_force = 3.0 - 2.0j
+        right = np.zeros(2 * n_sectors, complex)
+        right[0::2] = -contact_force * phase
+        if n == 1:
+            right += np.kron(phase, AMPLITUDE * load)
+        moved = np.linalg.solve(whole, right)
+        assert moved[2:4] == pytest.approx(moved[:2] * phase[1], rel=1e-10)
+        displacement_h = np.zeros((1, 2 * n_harmonics + 1))
+        displacement_h[0, 2 * n - 1], displacement_h[0, 2 * n] = moved[0].real, -moved[0].imag
+        taken = to_complex(structure.force_h() - structure.apply(displacement_h))[0, n - 1]
+        assert taken == pytest.approx(contact_force, rel=1e-9), f"harmonic {n}"
+        response = to_complex(structure.response_h(displacement_h))[0, n - 1]
+        assert response == pytest.approx(moved[1], rel=1e-9), f"harmonic {n}"
+
+
+def test_a_wave_with_nodal_diameter_0_shows_all_harmonics_the_same_structure() -> None:
+    model = cyclic_model(6, 6, 0)
+    assert sorted(model.linear) == [0]
+    plain = ReducedModel(model.linear, model.contact, model.response_names)
+    for name in ("static_stiffness", "dynamic_stiffness", "static_force", "harmonic_force", "dynamic_response"):
+        ours, theirs = (getattr(build_structure(m, OMEGA, AMPLITUDE, HARMONICS), name) for m in (model, plain))
+        assert np.array_equal(ours, theirs)
+
+
+def test_needed_nodal_diameters_are_folded() -> None:
+    assert needed_nodal_diameters(3, 47, 3) == (0, 3, 6, 9)
+    assert needed_nodal_diameters(20, 47, 3) == (0, 7, 13, 20)  # 40 -> 7, 60 - 47 = 13
+    assert needed_nodal_diameters(2, 4, 5) == (0, 2)
+    assert needed_nodal_diameters(0, 47, 9) == (0,)
+    assert needed_nodal_diameters(4, 0, 9) == (0,)
+
+
+def test_a_missing_nodal_diameter_is_loud() -> None:
+    model = cyclic_model(7, 6, 2)
+    short = ReducedModel({0: model.linear[0]}, model.contact, model.response_names, 6, 2)
+    with pytest.raises(KeyError):
+        build_structure(short, OMEGA, AMPLITUDE, HARMONICS)
+
+
+def test_a_structure_that_nothing_holds_is_singular() -> None:
+    model = random_model(8)
+    linear = model.linear[0]
+    free = {name: np.zeros_like(linear.mass) for name in ("mass", "damping", "stiffness")}
+    loose = LinearModel(
+        **free, load_static=linear.load_static, load_harmonic=linear.load_harmonic, response=linear.response
+    )
+    with pytest.raises(np.linalg.LinAlgError):
+        build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, 1)
