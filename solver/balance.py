@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.joint import Joint
-from solver.kernels import march_period, march_tangent, wear_integral
+from solver.kernels import march_period, march_tangent, mean_normal_force, wear_integral
 from solver.model import FloatArray, IntArray
 
 CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
@@ -64,6 +64,7 @@ class Balance:
         slip_work = wear_integral(force_t, state_t, at_velocity) / joint.state_stiffness
         wear_depth = self.wear_depth + self.wear_gain * slip_work
         force_h = force_t @ joint.basis.analysis
+        force_h[:, 0] = mean_normal_force(predicted_t) @ joint.basis.analysis
         displacement_h = joint.motion(pairs - force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         displacement_h[at_velocity, 1:, 0] += self.history[at_velocity]

@@ -32,10 +32,10 @@ def follow_branch(
     sweep: Sweep,
     settings: SolverSettings,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one as they are reached.
+    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one.
 
-    "up" follows the branch from the lowest frequency, "down" from the highest, each from a little outside the range. At a
-    fold the branch is followed by arc length until it reaches the next frequency, which is where a slow sweep of the
+    "up" follows the branch from the lowest frequency, "down" from the highest, each from a little outside the range. At
+    a fold the branch is followed by arc length until it reaches the next frequency, which is where a slow sweep of the
     machine would land if the branch is one curve; where that fails the state is sought from nothing.
     excitation_amplitude in N. Each state starts from the tangential history of the one before.
     """

@@ -168,12 +168,11 @@ class _Arc:
         """Scaled unknowns of a point."""
         return np.append(evaluation.predicted_h.ravel() / self.size, parameter / self.span)
 
-    def bordered(self, parameter: float, evaluation: Evaluation, last_row: FloatArray) -> FloatArray:
+    def bordered(self, balance: Balance, parameter: float, evaluation: Evaluation, last_row: FloatArray) -> FloatArray:
         """Jacobian of the residual over `size` and the scaled unknowns, bordered by `last_row`.
 
         The column of the parameter is a difference: it only steers the corrector, whose residual is exact.
         """
-        balance = self.balance_at(parameter, self.history)
         jacobian = balance.linearise(evaluation).dense(np.arange(balance.joint.contact.n_contact))
         delta = 1e-7 * self.span
         ahead = self.balance_at(parameter + delta, self.history).evaluate(evaluation.predicted_h)
@@ -189,7 +188,8 @@ class _Arc:
         n = evaluation.predicted_h.size
         row = np.append(np.full(n, 1e-3 / np.sqrt(n)), 1.0)
         try:
-            tangent = np.linalg.solve(self.bordered(parameter, evaluation, row), np.append(np.zeros(n), 1.0))
+            matrix = self.bordered(self.balance_at(parameter, self.history), parameter, evaluation, row)
+            tangent = np.linalg.solve(matrix, np.append(np.zeros(n), 1.0))
         except np.linalg.LinAlgError:
             return None
         return tangent / np.linalg.norm(tangent) if np.all(np.isfinite(tangent)) else None
@@ -203,14 +203,15 @@ class _Arc:
         unknown = base + length * tangent
         for _ in range(ARC_ITERATIONS):
             parameter = float(unknown[-1] * self.span)
-            evaluation = self.balance_at(parameter, self.history).evaluate(unknown[:-1].reshape(shape) * self.size)
+            balance = self.balance_at(parameter, self.history)
+            evaluation = balance.evaluate(unknown[:-1].reshape(shape) * self.size)
             ahead = float(tangent @ (unknown - base)) - length
             norm = evaluation.scaled_residual()
             if norm <= tolerance and abs(ahead) < 1e-3 * length:
                 return PathPoint(parameter, evaluation, self.history)
             if not np.isfinite(norm) or np.linalg.norm(unknown - base) > 4.0 * length:
                 return None
-            matrix = self.bordered(parameter, evaluation, tangent)
+            matrix = self.bordered(balance, parameter, evaluation, tangent)
             try:
                 unknown = unknown - np.linalg.solve(matrix, np.append(evaluation.residual.ravel() / self.size, ahead))
             except np.linalg.LinAlgError:

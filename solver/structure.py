@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from solver.harmonics import from_complex, to_complex
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, Matrix, ReducedModel
+from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 
 
 @dataclass(frozen=True)
@@ -73,17 +75,16 @@ def build_structure(
     stiffness = np.empty((n_harmonics, relative.size, relative.size), complex)
     response = np.empty((n_harmonics, n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
-    for harmonic in range(1, n_harmonics + 1):
-        linear, conjugate = model.harmonic_structure(harmonic)
-        frequency = harmonic * omega
+    for (linear, conjugate), harmonics in _by_structure(model, n_harmonics):
+        frequency = omega * harmonics[:, None, None]
         full = linear.stiffness + 1j * frequency * linear.damping - frequency**2 * linear.mass
-        share = excitation_amplitude if harmonic == 1 else 0.0
-        moving = condense(full, relative, share * linear.load_harmonic)
+        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * linear.load_harmonic
+        moving = condense(full, relative, load)
         rows = linear.response @ moving.motion
-        stiffness[harmonic - 1] = moving.stiffness.conj() if conjugate else moving.stiffness
-        response[harmonic - 1] = rows.conj() if conjugate else rows
-        if harmonic == 1:
-            force, offset = moving.force, linear.response @ moving.held_motion
+        stiffness[harmonics - 1] = moving.stiffness.conj() if conjugate else moving.stiffness
+        response[harmonics - 1] = rows.conj() if conjugate else rows
+        if harmonics[0] == 1:
+            force, offset = moving.force[0], linear.response @ moving.held_motion[0]
             if conjugate:
                 force, offset = force.conj(), offset.conj()
     return CondensedStructure(
@@ -98,12 +99,21 @@ def build_structure(
     )
 
 
+def _by_structure(model: ReducedModel, n_harmonics: int) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
+    """Linear model (and whether its conjugate holds) with the harmonics above the static one that see it."""
+    seen = [model.harmonic_structure(harmonic) for harmonic in range(1, n_harmonics + 1)]
+    for number, (linear, conjugate) in enumerate(seen):
+        same = [other is linear and folded == conjugate for other, folded in seen]
+        if same.index(True) == number:
+            yield (linear, conjugate), 1 + np.flatnonzero(same)
+
+
 @dataclass(frozen=True)
 class Condensed:
-    """A matrix (n, n) and a load (n,) reduced to the relative displacements u (n_rel,).
+    """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
 
-    stiffness (n_rel, n_rel): Schur complement, N/m. force (n_rel,): reduced load, N. motion (n, n_rel): all
-    displacements that follow a unit u. held_motion (n,): displacement under the load with u = 0, m.
+    stiffness (..., n_rel, n_rel): Schur complement, N/m. force (..., n_rel): reduced load, N. motion (..., n, n_rel):
+    all displacements that follow a unit u. held_motion (..., n): displacement under the load with u = 0, m.
     """
 
     stiffness: Matrix
@@ -113,19 +123,19 @@ class Condensed:
 
 
 def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Static condensation of one (dynamic) stiffness; raises numpy.linalg.LinAlgError where the rest is singular."""
-    n = full.shape[0]
+    """Static condensation of (dynamic) stiffnesses; raises numpy.linalg.LinAlgError where the rest is singular."""
+    n = full.shape[-1]
     internal = np.setdiff1d(np.arange(n), relative)
-    motion: Matrix = np.zeros_like(full, shape=(n, relative.size))
-    motion[relative, np.arange(relative.size)] = 1.0
-    held_motion = np.zeros(n, np.result_type(full, load))
-    stiffness: Matrix = full[np.ix_(relative, relative)]
-    force: Matrix = load[relative]
+    motion = cast("Matrix", np.zeros((*full.shape[:-1], relative.size), full.dtype))
+    motion[..., relative, np.arange(relative.size)] = 1.0
+    held_motion = np.zeros((*full.shape[:-2], n), np.result_type(full, load))
+    stiffness: Matrix = full[..., relative[:, None], relative]
+    force: Matrix = load[..., relative]
     if internal.size:
-        right = np.column_stack([full[np.ix_(internal, relative)], load[internal]])
-        solved = np.linalg.solve(full[np.ix_(internal, internal)], right)
-        motion[internal], held_motion[internal] = -solved[:, :-1], solved[:, -1]
-        coupling = full[np.ix_(relative, internal)]
-        stiffness = stiffness + coupling @ motion[internal]
-        force = force - coupling @ held_motion[internal]
+        right = np.concatenate([full[..., internal[:, None], relative], load[..., internal, None]], axis=-1)
+        solved = np.linalg.solve(full[..., internal[:, None], internal], right)
+        motion[..., internal, :], held_motion[..., internal] = -solved[..., :-1], solved[..., -1]
+        coupling = full[..., relative[:, None], internal]
+        stiffness = stiffness + coupling @ motion[..., internal, :]
+        force = force - (coupling @ held_motion[..., internal, None])[..., 0]
     return Condensed(stiffness, force, motion, held_motion)

@@ -10,8 +10,12 @@ import numpy as np
 from solver.balance import Balance
 from solver.continuation import follow_branch
 from solver.history import PeriodicState, StartState
-from solver.joint import build_case
+from solver.joint import Case, build_case
+from solver.linear import JacobianSolver
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.outcome import Outcome
+from solver.path import Effort, PathPoint
+from solver.response import solve_first_state
 from solver.settings import SolverSettings
 from studies.scenes import build_scene, scene_parameters
 
@@ -130,6 +134,14 @@ def branch_states(
     frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
     found = dict(follow_branch(model, friction, amplitude, frequencies, sweep, settings))
     return [found[index] for index in range(len(omegas))]
+
+
+def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArray) -> PathPoint:
+    """State found from nothing, which must exist; its parameter is the share 1 of the excitation."""
+    outcome, point = solve_first_state(case, omega, amplitude, wear_depth, JacobianSolver(), Effort())
+    assert outcome is Outcome.CONVERGED
+    assert point is not None
+    return point
 
 
 def converged_state(

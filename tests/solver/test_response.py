@@ -11,13 +11,12 @@ import pytest
 from solver.balance import Balance, Evaluation
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, build_case
-from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
 from solver.path import Effort, PathPoint
-from solver.response import largest_distance, periodic_state, report_state, solve_first_state, solve_static_state
+from solver.response import largest_distance, periodic_state, report_state, solve_static_state
 from solver.settings import SolverSettings
 from tests.solver.contact_twin import pair_period, status
-from tests.solver.models import OMEGA, dovetail, random_model
+from tests.solver.models import OMEGA, dovetail, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series
 
 FRICTION = 0.4
@@ -37,8 +36,7 @@ def case_of(kinds: str, seed: int) -> Case:
 def periodic(kinds: str, seed: int) -> tuple[Joint, PathPoint, PeriodicState]:
     case = case_of(kinds, seed)
     worn = np.random.default_rng(seed).uniform(0.0, 2e-6, case.model.contact.n_contact)
-    point = solve_first_state(case, OMEGA, AMPLITUDE, worn, JacobianSolver(), Effort())
-    assert point is not None
+    point = first_point(case, OMEGA, AMPLITUDE, worn)
     joint = case.joint(OMEGA, AMPLITUDE)
     return joint, point, periodic_state(joint, point)
 
@@ -232,8 +230,7 @@ def test_a_stored_state_is_reproduced_without_an_iteration() -> None:
 def test_without_excitation_the_periodic_state_is_the_static_one() -> None:
     case = case_of("mixed", 3)
     idle = np.zeros(6)
-    point = solve_first_state(case, OMEGA, 0.0, idle, JacobianSolver(), Effort())
-    assert point is not None
+    point = first_point(case, OMEGA, 0.0, idle)
     still = static_point(case, idle).evaluation
     size = np.abs(still.force_h).max()
     assert point.evaluation.force_h[:, :, 1:] == pytest.approx(0.0 * point.evaluation.force_h[:, :, 1:], abs=1e-8 * size)

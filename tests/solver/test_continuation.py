@@ -1,0 +1,200 @@
+"""Sweeps against exact motions, and their convergence with samples and harmonics."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.continuation import follow_branch
+from solver.history import PeriodicState
+from solver.outcome import Outcome
+from solver.penalty import build_penalty
+from solver.settings import SolverSettings
+from tests.references import coulomb_orbit, den_hartog_amplitude, slider_orbit, vibro_impact_orbit
+from tests.solver.contact_twin import pair_period_at_velocity
+from tests.solver.models import branch_states, converged_state, random_model, scene
+from tests.solver.reconstruction import contact_work, full_motion, series
+
+FINE = SolverSettings(harmonics=21, samples=256)
+SLIDER = (0.1, 0.0, 1.6e5, 10.0, 3.0)  # mass, damping, stiffness, force, friction force
+NATURAL = np.sqrt(1.6e6)
+TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
+VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
+
+
+@lru_cache
+def slider_state(ratio: float, harmonics: int, samples: int) -> PeriodicState:
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    return converged_state(model, 0.3, 10.0, ratio * NATURAL, SolverSettings(harmonics, samples))
+
+
+def first_harmonic(model: str, state: PeriodicState, **values: float) -> np.ndarray:
+    return np.abs(full_motion(scene(model, **values), state).displacement[1])
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.7, 0.8, 0.9, 1.1, 1.3, 1.6])
+def test_the_slider_has_the_amplitude_of_den_hartog(ratio: float) -> None:
+    mass, _, stiffness, force, friction = SLIDER
+    expected = den_hartog_amplitude(mass, stiffness, force, friction, ratio * NATURAL)
+    moved = series(slider_state(ratio, 21, 256).displacement_h[0, 1], 4096)
+    assert np.abs(moved).max() == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("omega", [0.3, 0.4, 0.6, 0.7, 1.3])
+def test_two_masses_have_their_exact_first_harmonics(omega: float) -> None:
+    orbit = coulomb_orbit(*TWO_MASSES, omega)
+    state = converged_state(scene("two_masses"), 0.5, 20.0, omega, FINE)
+    expected = [abs(orbit.harmonic(dof)) for dof in (0, 1)]
+    assert first_harmonic("two_masses", state) == pytest.approx(expected, rel=0.02)
+
+
+def test_two_masses_converge_with_the_reciprocal_of_the_first_harmonic_left_out() -> None:
+    # A force that jumps has harmonics of 1/n; a mass turns what is left out of them into an error of first order.
+    orbit = coulomb_orbit(*TWO_MASSES, 0.5)
+    expected = abs(orbit.harmonic(1))
+    harmonics = np.array([5, 11, 21, 41])
+    errors = []
+    for n in harmonics:
+        state = converged_state(scene("two_masses"), 0.5, 20.0, 0.5, SolverSettings(int(n), 512))
+        errors.append(abs(first_harmonic("two_masses", state)[1] / expected - 1))
+    slope = np.polyfit(np.log(harmonics + 1), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-1.0, abs=0.1)
+
+
+def test_the_slider_converges_with_harmonics() -> None:
+    exact = abs(slider_orbit(*SLIDER, 0.6 * NATURAL).harmonic(0))
+    errors = [
+        abs(first_harmonic("sdof_slider", slider_state(0.6, n, 512), normal_stiffness=0.0)[0] / exact - 1)
+        for n in (1, 3, 5, 11, 21)
+    ]
+    slope = np.polyfit(np.log([2, 4, 6, 12, 22]), np.log(errors), 1)[0]
+    assert slope < -0.9
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_the_slider_converges_with_samples() -> None:
+    def amplitude(samples: int) -> float:
+        return float(first_harmonic("sdof_slider", slider_state(0.6, 21, samples), normal_stiffness=0.0)[0])
+
+    limit = amplitude(2048)
+    # a turn is found to a sample: the friction force is off by up to its double for the 2 pi / N of it, twice a period
+    for samples in (64, 128, 256, 512):
+        friction_error = 3.0 / 10.0 * 2 * 2 * np.pi / samples
+        assert abs(amplitude(samples) / limit - 1) < friction_error
+    assert abs(amplitude(512) / limit - 1) < 1e-4
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.9, 1.3])
+def test_the_slider_balances_its_energy(ratio: float) -> None:
+    state = slider_state(ratio, 21, 256)
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    motion = full_motion(model, state)
+    assert max(motion.imbalance) < 1e-7 * motion.force
+    # the friction force once more from the plain law, at the sliding velocity that the state stores
+    penalty = build_penalty(model, state.omega, 21)
+    assert penalty.at_velocity.all()
+    moved_h, force_h = state.displacement_h[0, 1], state.contact_force_h[0, 1]
+    predicted_h = force_h.copy()
+    predicted_h[0] += penalty.mean[0] * (moved_h[0] - state.start_history[0, 0])
+    for n in range(1, 22):
+        rate = n * state.omega * penalty.tangential[0]
+        predicted_h[2 * n - 1] += rate * moved_h[2 * n]
+        predicted_h[2 * n] -= rate * moved_h[2 * n - 1]
+    predicted_t = np.zeros((3, 256))
+    predicted_t[0] = 10.0
+    predicted_t[1] = series(predicted_h, 256)
+    law, sliding = pair_period_at_velocity(predicted_t, 0.3)
+    phase = 2 * np.pi * np.arange(256) / 256
+    for n in range(22):
+        amplitude = np.mean(law[1] * np.exp(-1j * n * phase)) * (2 if n else 1)
+        stored = force_h[0] if n == 0 else force_h[2 * n - 1] - 1j * force_h[2 * n]
+        assert amplitude == pytest.approx(stored, abs=1e-6 * 3.0)
+    assert (law[1] * sliding[0] >= 0).all()
+    forces = law[None]
+    assert motion.viscous_work() == 0.0
+    assert motion.excitation_work() == pytest.approx(contact_work(state, forces), rel=1e-6)
+    loop = 4 * 3.0 * np.abs(series(state.displacement_h[0, 1], 4096)).max()
+    assert motion.excitation_work() == pytest.approx(loop, rel=0.02)
+
+
+@pytest.mark.parametrize("sweep", ["up", "down"])
+def test_a_sweep_gives_one_state_a_frequency_in_its_own_order(sweep: str) -> None:
+    frequencies = np.array([0.4, 0.55, 0.7]) / (2 * np.pi)
+    found = list(follow_branch(scene("two_masses"), 0.5, 20.0, frequencies, sweep, SolverSettings(5, 64)))
+    assert [index for index, _ in found] == ([0, 1, 2] if sweep == "up" else [2, 1, 0])
+    for index, start in found:
+        assert start.outcome is Outcome.CONVERGED
+        assert start.state is not None
+        assert start.state.omega == pytest.approx(2 * np.pi * frequencies[index], rel=1e-15)
+        assert start.state.excitation_amplitude == 20.0
+        assert not start.state.wear_depth.any()
+        assert start.newton_iterations > 0
+        assert start.run_time >= 0.0
+    assert len({start.penalty_omega for _, start in found}) == 1
+
+
+@pytest.fixture(scope="module")
+def rising() -> dict[float, PeriodicState | None]:
+    omegas = np.round(np.arange(0.85, 1.501, 0.05), 10)
+    starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, "up")
+    return {float(omega): start.state for omega, start in zip(omegas, starts, strict=True)}
+
+
+@pytest.mark.parametrize("omega", [1.05, 1.2, 1.3, 1.4, 1.5])
+def test_a_sweep_up_stays_on_the_branch_with_impacts(rising: dict[float, PeriodicState | None], omega: float) -> None:
+    state = rising[omega]
+    assert state is not None
+    expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
+    assert first_harmonic("vibro_impact", state)[1] == pytest.approx(expected, rel=0.005)
+
+
+def test_a_sweep_down_stays_on_the_branch_without_impacts() -> None:
+    omegas = [1.1, 1.2, 1.3, 1.4, 1.5]
+    for omega, start in zip(omegas, branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, "down"), strict=True):
+        assert start.state is not None
+        expected = 0.02 / abs(1 - omega**2 + 0.05j * omega)
+        assert first_harmonic("vibro_impact", start.state)[1] == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_sweep_down_falls_on_the_branch_with_impacts_where_the_other_one_ends() -> None:
+    # without the wall the mass reaches it at 1.0935 rad/s
+    starts = branch_states(scene("vibro_impact"), 0.0, 0.02, [1.05, 1.15], SolverSettings(9, 128), "down")
+    assert starts[0].state is not None
+    rising = converged_state(scene("vibro_impact"), 0.0, 0.02, 1.05, SolverSettings(9, 128), "up")
+    assert np.abs(rising.contact_force_h).max() > 1e-3
+    expected = first_harmonic("vibro_impact", rising)[1]
+    assert first_harmonic("vibro_impact", starts[0].state)[1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_single_frequency_knows_its_branch() -> None:
+    # both branches exist at 1.12 rad/s; below 1.0935 there is only the one with impacts
+    model = scene("vibro_impact")
+    settings = SolverSettings(5, 64)
+    from_below = converged_state(model, 0.0, 0.02, 1.12, settings, "up")
+    from_above = converged_state(model, 0.0, 0.02, 1.12, settings, "down")
+    assert np.abs(from_below.contact_force_h).max() > 1e-3
+    assert not from_above.contact_force_h.any()
+
+
+def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> None:
+    # Mass 1 between two springs, mass 2 held: K + i w C - w^2 M is exactly zero at 2 rad/s.
+    model = scene("two_masses", stiffness_1=3.0, stiffness_2=1.0, damping_1=0.0, damping_2=0.0)
+    frequency = 2.0 / (2 * np.pi)
+    assert 2 * np.pi * frequency == 2.0
+    starts = dict(follow_branch(model, 0.5, 20.0, np.array([frequency]), "up", SolverSettings(3, 64)))
+    assert starts[0].outcome is Outcome.SINGULAR
+    assert starts[0].state is None
+
+
+def test_a_sweep_is_the_same_twice() -> None:
+    model = random_model(3, ("3d", "one_tangent"))
+    settings = SolverSettings(3, 64)
+    first, second = (branch_states(model, 0.4, 60.0, [550.0, 600.0], settings) for _ in range(2))
+    for one, other in zip(first, second, strict=True):
+        assert one.state is not None
+        assert other.state is not None
+        assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
+        assert np.array_equal(one.state.contact_force_h, other.state.contact_force_h)
+        assert one.newton_iterations == other.newton_iterations

@@ -1,0 +1,295 @@
+"""Wear of the slider under a spring against its differential equation, and the rules of the march."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.history import StartState, WearHistory
+from solver.joint import build_case
+from solver.march import Scheme, march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.penalty import build_penalty
+from solver.settings import SolverSettings
+from tests.references import slider_amplitude, slider_wear_depth
+from tests.solver.contact_twin import pair_period_at_velocity
+from tests.solver.models import branch_states, random_model, scene
+from tests.solver.reconstruction import series
+
+OMEGA = 2 * np.pi * 160.0
+FRICTION = 0.5
+FORCE = 10.0
+WEAR = 1.1e-11  # 1/Pa
+AREA = 1e-4
+END = 8e4
+STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
+COARSE = SolverSettings(harmonics=5, samples=64, tolerance=1e-11)
+FINE = SolverSettings(harmonics=21, samples=256)
+SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
+CYCLES = np.linspace(0.0, END, 9)
+
+
+@lru_cache
+def slider_start(settings: SolverSettings) -> tuple[ReducedModel, StartState]:
+    model = scene("sdof_slider", settings.harmonics)
+    (start,) = branch_states(model, FRICTION, FORCE, [OMEGA], settings)
+    assert start.outcome is Outcome.CONVERGED
+    return model, start
+
+
+def march(
+    step: float,
+    scheme: Scheme,
+    cycles: np.ndarray = CYCLES,
+    settings: SolverSettings = COARSE,
+    wear: float = WEAR,
+    largest_depth: float | None = None,
+) -> WearHistory:
+    model, start = slider_start(settings)
+    return march_wear(model, FRICTION, start, wear, step, scheme, cycles, settings, largest_depth)
+
+
+@lru_cache
+def final_depth(step: float, scheme: Scheme, settings: SolverSettings = COARSE) -> float:
+    history = march(step, scheme, settings=settings)
+    assert history.outcome is Outcome.CONVERGED
+    return float(history.wear_depth[-1, 0])
+
+
+@lru_cache
+def exact_depth(settings: SolverSettings = COARSE) -> float:
+    """Depth at the end for the motion of this many harmonics and samples: only the time integration is left as an error.
+
+    The wear rate of the harmonic balance is tabulated over the depth by states that are found one from the other
+    with a wear that is negligible, and the differential equation is integrated with its interpolation.
+    """
+    from scipy.integrate import solve_ivp
+    from scipy.interpolate import CubicSpline
+
+    fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401), settings)
+    rate = CubicSpline(fine.wear_depth[:, 0], fine.wear_rate / AREA)
+    solution = solve_ivp(lambda _, w: rate(w), (0.0, END), [0.0], method="DOP853", rtol=1e-11, atol=1e-20)
+    return float(solution.y[0, -1])
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_error_of_the_depth_is_of_first_order_in_the_step(scheme: Scheme) -> None:
+    errors = np.array([final_depth(step, scheme) - exact_depth() for step in STEPS])
+    assert (errors > 0).all() if scheme == "explicit" else (errors < 0).all()
+    slope = np.polyfit(np.log(STEPS), np.log(np.abs(errors)), 1)[0]
+    assert slope == pytest.approx(1.0, abs=0.1)
+    assert errors[-2] / errors[-1] == pytest.approx(2.0, rel=0.1)
+
+
+def test_both_schemes_have_the_same_limit() -> None:
+    # their leading errors are opposite: the mean of both is of second order
+    gap = [final_depth(step, "explicit") - final_depth(step, "implicit") for step in STEPS]
+    assert (np.array(gap) > 0).all()
+    slope = np.polyfit(np.log(STEPS), np.log(gap), 1)[0]
+    assert slope == pytest.approx(1.0, abs=0.1)
+    limits = [2 * final_depth(1000.0, scheme) - final_depth(2000.0, scheme) for scheme in SCHEMES]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_with_21_harmonics_the_depth_is_that_of_the_exact_motion(scheme: Scheme) -> None:
+    exact = slider_wear_depth(
+        CYCLES,
+        wear_coefficient=WEAR,
+        area=AREA,
+        friction_coefficient=FRICTION,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda friction_force: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, friction_force, OMEGA),
+    )
+    history = march(1000.0, scheme, settings=FINE)
+    # first order: half of h times the change of the rate, over the depth (0.26 % here), and the motion's own error of 1 %
+    time_error = 0.5 * 1000.0 * (history.wear_rate[0] - history.wear_rate[-1]) / AREA
+    assert time_error < 0.005 * exact[-1]
+    assert np.abs(history.wear_depth[:, 0] - exact).max() < time_error + 0.01 * exact[-1]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("step", [8000.0, 2000.0])
+def test_the_error_estimate_is_that_of_the_time_integration(scheme: Scheme, step: float) -> None:
+    history = march(step, scheme)
+    true = abs(final_depth(step, scheme) - exact_depth()) / exact_depth()
+    assert true / 3 < history.error_estimate < 3 * true
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_step_follows_its_own_equation(scheme: Scheme) -> None:
+    # one step: W = h g(W_0) or W = h g(W); wear_rate is that of the states at both ends
+    history = march(8000.0, scheme, np.array([0.0, 8000.0]))
+    rate = history.wear_rate[0 if scheme == "explicit" else 1] / AREA
+    assert history.wear_depth[1, 0] == pytest.approx(8000.0 * rate, rel=1e-7)
+    assert history.worn_volume == pytest.approx(history.wear_depth[:, 0] * AREA, rel=1e-14)
+
+
+def test_the_wear_rate_is_that_of_the_sliding_velocity() -> None:
+    # k_w N times the sliding path of the corrected motion, from the plain law at velocity level
+    model, start = slider_start(COARSE)
+    state = start.state
+    assert state is not None
+    penalty = build_penalty(model, start.penalty_omega, COARSE.harmonics)
+    predicted_h = state.contact_force_h[0, 1].copy()
+    predicted_h[0] += penalty.mean[0] * (state.displacement_h[0, 1, 0] - state.start_history[0, 0])
+    for n in range(1, COARSE.harmonics + 1):
+        rate = n * OMEGA * penalty.tangential[0]
+        predicted_h[2 * n - 1] += rate * state.displacement_h[0, 1, 2 * n]
+        predicted_h[2 * n] -= rate * state.displacement_h[0, 1, 2 * n - 1]
+    predicted_t = np.zeros((3, COARSE.samples))
+    predicted_t[0] = 10.0
+    predicted_t[1] = series(predicted_h, COARSE.samples)
+    _, sliding = pair_period_at_velocity(predicted_t, FRICTION)
+    path = np.abs(sliding[0] / penalty.tangential[0]).mean() * 2 * np.pi / OMEGA
+    history = march(8000.0, "explicit", np.array([0.0, 8000.0]))
+    assert history.wear_rate[0] == pytest.approx(WEAR * 10.0 * path, rel=1e-8)
+
+
+def test_the_normal_force_falls_with_the_depth() -> None:
+    history = march(4000.0, "implicit")
+    assert history.mean_pressure[:, 0] * AREA == pytest.approx(10.0 - 1e5 * history.wear_depth[:, 0], rel=1e-9)
+    assert not history.open_fraction.any()
+    # less friction, more motion
+    assert (np.diff(np.abs(history.response[:, 0])) > 0).all()
+    assert (np.diff(history.response_peak[:, 0]) > 0).all()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_wear_never_falls(scheme: Scheme) -> None:
+    history = march(8000.0, scheme)
+    assert (np.diff(history.wear_depth, axis=0) > 0).all()
+    assert (np.diff(history.worn_volume) > 0).all()
+    assert history.worn_volume[0] == 0.0
+    assert np.array_equal(history.cycles, CYCLES)
+    assert np.isnan(history.jump_cycle)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_outputs_between_steps_are_interpolated(scheme: Scheme) -> None:
+    at_steps = march(8000.0, scheme, np.array([0.0, 8000.0, 16000.0]))
+    between = march(8000.0, scheme, np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0]))
+    for name in ("wear_depth", "wear_rate", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
+        ends, inner = (getattr(history, name) for history in (at_steps, between))
+        assert inner[[0, 2, 4]] == pytest.approx(ends, rel=1e-14), name
+        assert inner[1] == pytest.approx(0.75 * ends[0] + 0.25 * ends[1], rel=1e-12), name
+        assert inner[3] == pytest.approx(0.25 * ends[1] + 0.75 * ends[2], rel=1e-12), name
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_last_count_is_reached_where_the_step_does_not_divide_it(scheme: Scheme) -> None:
+    # 3000 + 3000 + 1000: the last, short step is a step of its own
+    history = march(3000.0, scheme, np.array([0.0, 6000.0, 7000.0]))
+    assert history.outcome is Outcome.CONVERGED
+    assert np.isfinite(history.wear_depth).all()
+    grown = history.wear_depth[2, 0] - history.wear_depth[1, 0]
+    rate = history.wear_rate[1 if scheme == "explicit" else 2] / AREA
+    assert grown == pytest.approx(1000.0 * rate, rel=1e-6)
+
+
+def test_a_step_longer_than_the_march_is_the_march() -> None:
+    long, whole = (march(step, "implicit", np.array([0.0, 5000.0])) for step in (1e9, 5000.0))
+    assert np.array_equal(long.wear_depth, whole.wear_depth)
+
+
+def test_the_largest_depth_rule_limits_every_step() -> None:
+    largest = 2e-6
+    history = march(1.0, "explicit", np.linspace(0.0, END, 801), largest_depth=largest)
+    assert history.outcome is Outcome.CONVERGED
+    # Eq. (22): h = depth / g; counts as fine as these see every step, whose slope is the rate at its start
+    slopes = np.diff(history.wear_depth[:, 0]) / 100.0
+    starts = np.flatnonzero(np.abs(np.diff(slopes)) > 1e-6 * slopes[0]) + 1
+    depth = history.wear_depth[:, 0]
+    step_depths = np.diff(depth[starts[::2]]) if starts.size else depth[-1:]
+    assert depth[-1] > 10 * largest
+    assert (slopes * 100.0 <= largest).all()
+    assert (step_depths <= largest * 1.1).all()
+    # first order all the same
+    finer = march(1.0, "explicit", np.array([0.0, END]), largest_depth=largest / 2)
+    errors = [depth[-1] - exact_depth(), finer.wear_depth[-1, 0] - exact_depth()]
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15)
+
+
+def test_the_largest_depth_rule_gives_the_first_step_exactly() -> None:
+    rate = march(1.0, "explicit", np.array([0.0, 1.0])).wear_rate[0] / AREA
+    length = 2e-6 / rate
+    # two counts inside the first step and one at its end: a straight line up to the depth
+    history = march(1.0, "explicit", np.array([0.0, 0.25, 0.5, 1.0]) * length, largest_depth=2e-6)
+    assert history.wear_depth[:, 0] == pytest.approx(np.array([0.0, 0.25, 0.5, 1.0]) * 2e-6, rel=1e-9)
+    beyond = march(1.0, "explicit", np.array([0.0, 1.0, 1.5]) * length, largest_depth=2e-6)
+    assert beyond.wear_depth[1, 0] == pytest.approx(2e-6, rel=1e-9)
+    assert beyond.wear_depth[2, 0] < 3e-6
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_without_a_wear_coefficient_nothing_changes(scheme: Scheme) -> None:
+    history = march(1000.0, scheme, wear=0.0)
+    assert history.outcome is Outcome.CONVERGED
+    for name in ("wear_depth", "wear_rate", "worn_volume"):
+        assert not getattr(history, name).any(), name
+    for name in ("mean_pressure", "slip_range", "response", "response_peak", "open_fraction"):
+        values = getattr(history, name)
+        assert np.array_equal(values, np.repeat(values[:1], CYCLES.size, axis=0)), name
+    assert history.error_estimate == 0.0
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_state_without_slip_wears_exactly_nothing(scheme: Scheme) -> None:
+    model = random_model(1, ("3d", "constant_load"))
+    settings = SolverSettings(3, 64)
+    (start,) = branch_states(model, 100.0, 1.0, [300.0], settings)
+    history = march_wear(model, 100.0, start, 1e-6, 1e6, scheme, np.array([0.0, 1e8, 1e9]), settings)
+    assert history.outcome is Outcome.CONVERGED
+    assert not history.slip_range.any()
+    for name in ("wear_depth", "wear_rate", "worn_volume"):
+        assert not getattr(history, name).any(), name
+    assert np.array_equal(history.response, np.repeat(history.response[:1], 3, axis=0))
+    # no step is needed where nothing wears
+    assert history.newton_iterations == start.newton_iterations
+
+
+@pytest.mark.parametrize("outcome", [Outcome.SINGULAR, Outcome.START_FAILED, Outcome.STATIC_FAILED, Outcome.BRANCH_LOST])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_start_that_failed_is_a_history_of_nan_with_its_outcome(scheme: Scheme, outcome: Outcome) -> None:
+    model = scene("sdof_slider", 5)
+    failed = StartState(outcome, None, OMEGA, 17, 0.25)
+    history = march_wear(model, FRICTION, failed, WEAR, 1000.0, scheme, CYCLES, COARSE)
+    assert history.outcome is outcome
+    for name, width in (("wear_depth", 1), ("mean_pressure", 1), ("slip_range", 1), ("open_fraction", 1)):
+        values = getattr(history, name)
+        assert values.shape == (CYCLES.size, width)
+        assert np.isnan(values).all(), name
+    for name in ("wear_rate", "worn_volume", "response", "response_peak"):
+        assert np.isnan(getattr(history, name)).all(), name
+    assert np.isnan(history.error_estimate)
+    assert np.isnan(history.jump_cycle)
+    assert np.array_equal(history.cycles, CYCLES)
+    assert history.newton_iterations == 17
+    assert history.run_time == 0.25
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_only_the_product_of_wear_coefficient_and_cycles_matters(scheme: Scheme) -> None:
+    slow = march(4000.0, scheme)
+    fast = march(400.0, scheme, CYCLES / 10, wear=10 * WEAR)
+    for name in ("wear_depth", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
+        one, other = getattr(slow, name), getattr(fast, name)
+        assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
+    assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9)
+
+
+def test_a_march_starts_from_the_state_it_is_given() -> None:
+    model, start = slider_start(COARSE)
+    state = start.state
+    assert state is not None
+    history = march(1000.0, "implicit", np.array([0.0, 1.0]))
+    response_h = build_case(model, FRICTION, start.penalty_omega, COARSE).joint(OMEGA, FORCE).structure.response_h(
+        state.displacement_h[0, :2]
+    )
+    assert history.response[0] == pytest.approx(response_h[:, 1] - 1j * response_h[:, 2], rel=1e-12)
+    assert history.newton_iterations >= start.newton_iterations
+    assert history.run_time >= start.run_time

@@ -1,0 +1,173 @@
+"""States followed along a parameter: naturally, and by arc length through a fold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance
+from solver.joint import build_case
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.settings import SolverSettings
+from tests.solver.models import OMEGA, first_point, random_model, scene
+
+BalanceAt = Callable[[float, FloatArray], Balance]
+TOLERANCE = 1e-9
+WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
+GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
+
+
+def wall(omega: float, n_harmonics: int = 5) -> tuple[BalanceAt, Callable[[float], PathPoint], Callable[..., float]]:
+    """Vibro-impact along the excitation amplitude: balances, a state found from nothing, and the motion of the mass."""
+    model = scene("vibro_impact")
+    case = build_case(model, 0.0, WALL_OMEGA, SolverSettings(n_harmonics, 64))
+    idle = np.zeros(1)
+
+    def balance_at(amplitude: float, history: FloatArray) -> Balance:
+        return Balance(case.joint(omega, amplitude), history, idle, idle)
+
+    def first(amplitude: float) -> PathPoint:
+        found = first_point(case, omega, amplitude, idle)
+        return PathPoint(amplitude, found.evaluation, found.history)
+
+    def size(point: PathPoint) -> float:
+        structure = case.joint(omega, point.parameter).structure
+        response = structure.response_h(point.evaluation.displacement_h[0, :1])
+        return float(np.hypot(response[0, 1], response[0, 2]))
+
+    return balance_at, first, size
+
+
+def test_a_natural_step_reaches_its_target_from_either_side() -> None:
+    balance_at, first, size = wall(0.5)
+    for start, target in ((0.01, 0.06), (0.06, 0.01)):
+        point, arrived = follow_naturally(balance_at, first(start), target, JacobianSolver(), TOLERANCE, Effort())
+        assert arrived
+        assert point.parameter == target
+        assert point.evaluation.scaled_residual() <= TOLERANCE
+        # below the gap the mass does not feel the wall
+        assert size(point) == pytest.approx(target / abs(1 - 0.25 + 0.025j), rel=1e-7)
+
+
+def test_a_target_that_is_the_start_takes_no_iteration() -> None:
+    balance_at, first, _ = wall(0.5)
+    start, effort = first(0.01), Effort()
+    point, arrived = follow_naturally(balance_at, start, 0.01, JacobianSolver(), TOLERANCE, effort)
+    assert arrived
+    assert point is start
+    assert effort.iterations == 0
+
+
+def test_natural_steps_end_before_a_fold_and_say_so() -> None:
+    balance_at, first, size = wall(WALL_OMEGA)
+    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Effort())
+    assert not arrived
+    # the branch without impacts ends where the mass reaches the wall; 1/64 of the way is the shortest step
+    assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
+    assert point.evaluation.scaled_residual() <= TOLERANCE
+    assert size(point) == pytest.approx(0.1, rel=0.02)
+
+
+@lru_cache
+def upper_branch_size(amplitude: float) -> float:
+    """Motion on the branch with impacts, along the frequency: a way round the fold."""
+    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    idle = np.zeros(1)
+
+    def balance_at(omega: float, history: FloatArray) -> Balance:
+        return Balance(case.joint(omega, amplitude), history, idle, idle)
+
+    found = first_point(case, 0.9, amplitude, idle)
+    point = PathPoint(0.9, found.evaluation, found.history)
+    for omega in np.linspace(0.95, WALL_OMEGA, 6):
+        point, arrived = follow_naturally(balance_at, point, float(omega), JacobianSolver(), TOLERANCE, Effort())
+        assert arrived
+    structure = case.joint(WALL_OMEGA, amplitude).structure
+    response = structure.response_h(point.evaluation.displacement_h[0, :1])
+    return float(np.hypot(response[0, 1], response[0, 2]))
+
+
+def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
+    balance_at, first, size = wall(WALL_OMEGA)
+    visited: list[float] = []
+
+    def watched(amplitude: float, history: FloatArray) -> Balance:
+        visited.append(amplitude)
+        return balance_at(amplitude, history)
+
+    start = first(0.03)
+    point = follow_arc(watched, start, 0.06, 0.03, TOLERANCE, Effort())
+    assert point is not None
+    assert point.parameter == 0.06
+    assert point.evaluation.scaled_residual() <= TOLERANCE
+    assert size(point) == pytest.approx(upper_branch_size(0.06), rel=1e-6)
+    # back behind the start on the unstable branch between
+    assert min(visited) < 0.02
+
+
+def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
+    balance_at, first, _ = wall(0.9)
+    start = first(0.01)
+    natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Effort())
+    assert arrived
+    arc = follow_arc(balance_at, start, 0.03, 0.02, TOLERANCE, Effort())
+    assert arc is not None
+    size = np.abs(natural.evaluation.force_h).max()
+    assert size > 0.001
+    assert arc.evaluation.force_h == pytest.approx(natural.evaluation.force_h, abs=1e-6 * size)
+
+
+def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
+    balance_at, first, _ = wall(0.5)
+    assert follow_arc(balance_at, first(0.01), np.inf, 0.01, TOLERANCE, Effort()) is None
+
+
+def test_history_is_handed_on_or_kept() -> None:
+    model = random_model(1, ("3d", "3d"))
+    settings = SolverSettings(3, 64)
+    case = build_case(model, 0.4, OMEGA, settings)
+    idle = np.zeros(2)
+
+    def balance_at(amplitude: float, history: FloatArray) -> Balance:
+        return Balance(case.joint(OMEGA, amplitude), history, idle, idle)
+
+    found = first_point(case, OMEGA, 20.0, idle)
+    start = PathPoint(20.0, found.evaluation, found.history)
+    assert start.history.any()
+    for keep in (True, False):
+        point, arrived = follow_naturally(
+            balance_at, start, 80.0, JacobianSolver(), TOLERANCE, Effort(), keep_history=keep
+        )
+        assert arrived
+        if keep:
+            assert np.array_equal(point.history, start.history)
+            assert np.array_equal(point.evaluation.history, start.history)
+        else:
+            assert not np.array_equal(point.history, start.history)
+            balance = balance_at(80.0, point.evaluation.history)
+            assert np.array_equal(point.history, final_history(balance, point.evaluation))
+
+
+def test_the_history_is_the_corrected_slip_at_the_end_of_the_period() -> None:
+    model = random_model(2, ("3d", "constant_load"))
+    case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
+    joint = case.joint(OMEGA, 60.0)
+    balance = Balance(joint, np.full((2, 2), 1e-6), np.zeros(2), np.zeros(2))
+    at = balance.evaluate(np.random.default_rng(3).normal(size=(joint.slots.size, 7)) * 100.0)
+    expected = at.state_t[:, :, -1] / joint.penalty.tangential[:, None]
+    assert final_history(balance, at) == pytest.approx(expected, rel=1e-15)
+
+
+def test_iterations_are_counted() -> None:
+    balance_at, first, _ = wall(0.9)
+    start = first(0.01)
+    effort = Effort()
+    balance = balance_at(0.011, start.history)
+    result = solve_balance(balance, start.evaluation.predicted_h, JacobianSolver(), TOLERANCE, effort)
+    assert result.converged
+    assert effort.iterations == result.iterations > 0
