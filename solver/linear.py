@@ -31,7 +31,7 @@ class JacobianSolver:
         step = np.zeros_like(right)
         if rows.size:
             if rows.size * m <= SMALL:
-                step[rows] = np.linalg.solve(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
+                step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
                 step[rows] = self._solve_kept(tangent, pairs, rows, right[rows])
         # the columns of all other unknowns are those of the identity
@@ -77,3 +77,13 @@ class JacobianSolver:
         padded[position] = right
         solved: FloatArray = scipy.linalg.lu_solve(self._factor, padded.ravel(), check_finite=False)
         return solved.reshape(padded.shape)[position]
+
+
+def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solution of a small system, the shortest one where the matrix is singular: Newton goes on and judges by the
+    residual."""
+    try:
+        solution: FloatArray = np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        solution = np.linalg.lstsq(matrix, right)[0]
+    return solution

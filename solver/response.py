@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from solver.balance import Balance, Evaluation
-from solver.harmonics import pad_harmonics, to_complex
+from solver.harmonics import from_complex, pad_harmonics, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
@@ -56,6 +56,9 @@ def solve_first_state(
 ) -> tuple[Outcome, PathPoint | None]:
     """Periodic state found from nothing: the static state first, then the excitation raised; or why there is none.
 
+    A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails,
+    the vibration without the joint is tried as the start, and arc length last.
+
     omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
     """
     tolerance = case.settings.tolerance
@@ -79,8 +82,24 @@ def solve_first_state(
         return Outcome.START_FAILED, None
     point = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
     point, arrived = follow_naturally(balance_at, point, 1.0, solver, tolerance, effort)
-    reached = point if arrived else follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
+    if arrived:
+        return Outcome.CONVERGED, point
+    whole = balance_at(1.0, static.history)
+    sliding = start + _free_motion(whole)
+    result = solve_balance(whole, sliding, solver, tolerance, effort)
+    if result.converged:
+        return Outcome.CONVERGED, PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
+    reached = follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
     return (Outcome.START_FAILED, None) if reached is None else (Outcome.CONVERGED, reached)
+
+
+def _free_motion(balance: Balance) -> FloatArray:
+    """Predicted force (n_rel, 2H+1), N, of the vibration that the excitation would cause without the joint."""
+    joint = balance.joint
+    amplitudes = np.zeros((joint.slots.size, joint.basis.n_harmonics), complex)
+    amplitudes[:, 0] = np.linalg.lstsq(joint.structure.dynamic_stiffness[0], joint.structure.harmonic_force)[0]
+    motion = joint.to_pairs(from_complex(np.zeros(joint.slots.size), amplitudes))
+    return joint.to_relative(joint.surplus(motion))
 
 
 def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
