@@ -25,7 +25,7 @@ from solver.kernels import march_period, march_tangent, mean_normal_force, wear_
 from solver.model import FloatArray, IntArray
 
 CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
-MOST_PASSES = 8
+MOST_PASSES = 400
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 import scipy.linalg
@@ -81,9 +82,10 @@ class JacobianSolver:
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Solution of a small system, the shortest one where the matrix is singular: Newton goes on and judges by the
-    residual."""
+    residual.
+    """
     try:
-        solution: FloatArray = np.linalg.solve(matrix, right)
+        solution = cast("FloatArray", np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
-        solution = np.linalg.lstsq(matrix, right)[0]
+        solution = cast("FloatArray", np.linalg.lstsq(matrix, right)[0])
     return solution

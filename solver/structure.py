@@ -76,17 +76,18 @@ def build_structure(
     response = np.empty((n_harmonics, n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
     for (linear, conjugate), harmonics in _by_structure(model, n_harmonics):
+        # a folded nodal diameter has the conjugate matrices, not the conjugate of the sum: damping stays positive
+        mass, damping, elastic, shape, rows = (
+            part.conj() if conjugate else part
+            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
+        )
         frequency = omega * harmonics[:, None, None]
-        full = linear.stiffness + 1j * frequency * linear.damping - frequency**2 * linear.mass
-        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * linear.load_harmonic
-        moving = condense(full, relative, load)
-        rows = linear.response @ moving.motion
-        stiffness[harmonics - 1] = moving.stiffness.conj() if conjugate else moving.stiffness
-        response[harmonics - 1] = rows.conj() if conjugate else rows
+        full = elastic + 1j * frequency * damping - frequency**2 * mass
+        moving = condense(full, relative, np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape)
+        stiffness[harmonics - 1] = moving.stiffness
+        response[harmonics - 1] = rows @ moving.motion
         if harmonics[0] == 1:
-            force, offset = moving.force[0], linear.response @ moving.held_motion[0]
-            if conjugate:
-                force, offset = force.conj(), offset.conj()
+            force, offset = moving.force[0], rows @ moving.held_motion[0]
     return CondensedStructure(
         static_stiffness=np.real(static.stiffness),
         dynamic_stiffness=stiffness,

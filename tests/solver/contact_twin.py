@@ -16,9 +16,7 @@ def project(force: FloatArray, radius: float) -> FloatArray:
     return force if size <= radius else force * (radius / size)
 
 
-def pair_period(
-    predicted: FloatArray, friction: float, slip: FloatArray, passes: int
-) -> tuple[FloatArray, FloatArray]:
+def pair_period(predicted: FloatArray, friction: float, slip: FloatArray, passes: int) -> tuple[FloatArray, FloatArray]:
     """Contact force (3, N) and slip at the N + 1 ends of the samples (2, N + 1) of the last of some passes.
 
     predicted (3, N), N. slip (2,): at the start, in force units. A spring of unit stiffness ties the slider to the
@@ -34,6 +32,8 @@ def pair_period(
             force[0, n] = normal
             force[1:, n] = project(pull, friction * normal)
             trace.append(trace[-1] + (pull - force[1:, n]))
+        if np.array_equal(trace[-1], trace[0]):
+            break  # all further passes are the same
     return force, np.array(trace).T
 
 

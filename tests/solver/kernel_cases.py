@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from solver.harmonics import build_basis
-from solver.kernels import march_period, march_tangent, wear_integral
+from solver.kernels import march_period, march_tangent, mean_normal_force, wear_integral
 from solver.model import BoolArray, FloatArray
 
 FRICTION = 0.4
@@ -70,6 +70,7 @@ def kernel_results() -> dict[str, FloatArray]:
                 ("passes", passes),
                 ("drift", drift),
                 ("wear", wear_integral(force_t, state_t, case.at_velocity)),
+                ("mean_normal", mean_normal_force(case.predicted_t)),
                 ("force_tangent", force_tangent),
                 ("wear_tangent", wear_tangent),
             )

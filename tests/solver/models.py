@@ -12,7 +12,7 @@ from solver.continuation import follow_branch
 from solver.history import PeriodicState, StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
 from solver.response import solve_first_state
@@ -62,7 +62,9 @@ def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: i
     )
 
 
-def random_linear(random: np.random.Generator, contact: ContactInterface, n: int, hermitian: bool = False) -> LinearModel:
+def random_linear(
+    random: np.random.Generator, contact: ContactInterface, n: int, hermitian: bool = False
+) -> LinearModel:
     """Elastic joint with little mass of its own, pressed on its pairs, excited everywhere, damped, two responses."""
     stiffness = STIFFNESS * definite(random, n, hermitian)
     load_static = 0.05 * PRELOAD * random.normal(size=n)
@@ -91,8 +93,28 @@ def random_model(seed: int, kinds: Sequence[str] = ("3d", "3d", "3d"), n_inner: 
     return ReducedModel({0: random_linear(random, contact, n)}, contact, ("first", "second"))
 
 
+def cyclic_model(
+    seed: int, kinds: Sequence[str], n_sectors: int, nodal_diameter: int, n_harmonics: int = 3
+) -> ReducedModel:
+    """Sector whose structures at different nodal diameters have nothing in common: an index mixed up is seen."""
+    random = np.random.default_rng(seed)
+    contact = random_contact(random, kinds, 4)
+    n = int((contact.dofs >= 0).sum()) + 4
+    linear = {
+        k: random_linear(random, contact, n, hermitian=k > 0)
+        for k in needed_nodal_diameters(nodal_diameter, n_sectors, n_harmonics)
+    }
+    return ReducedModel(linear, contact, ("first", "second"), n_sectors, nodal_diameter)
+
+
 def random_balance(
-    model: ReducedModel, settings: SolverSettings, seed: int, *, wear: bool, friction: float = 0.4, amplitude: float = 60.0
+    model: ReducedModel,
+    settings: SolverSettings,
+    seed: int,
+    *,
+    wear: bool,
+    friction: float = 0.4,
+    amplitude: float = 60.0,
 ) -> tuple[Balance, FloatArray]:
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)

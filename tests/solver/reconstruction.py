@@ -82,7 +82,7 @@ class FullMotion:
 
 
 def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
-    """Motion of the whole structure; relative displacements are given, for the static structure may be free to slide."""
+    """Motion of the whole structure; relative displacements are given: a static structure may be free to slide."""
     n_harmonics = (state.displacement_h.shape[2] - 1) // 2
     exists = model.contact.dofs >= 0
     relative = model.contact.dofs[exists]

@@ -30,9 +30,7 @@ def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards() -> None:
     amplitudes = np.array([[0.7 - 0.2j, 1.5j], [-2.0, 0.1 + 0.4j]])
     static = np.array([0.5, -1.0])
     phase = 2 * np.pi * np.arange(16) / 16
-    expected = static[:, None] + sum(
-        np.real(amplitudes[:, n - 1, None] * np.exp(1j * n * phase)) for n in (1, 2)
-    )
+    expected = static[:, None] + sum(np.real(amplitudes[:, n - 1, None] * np.exp(1j * n * phase)) for n in (1, 2))
     values_h = from_complex(static, amplitudes)
     assert values_h @ build_basis(2, 16).synthesis == pytest.approx(expected, abs=1e-14)
     assert np.array_equal(to_complex(values_h), amplitudes)

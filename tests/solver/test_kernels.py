@@ -13,7 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.harmonics import build_basis
-from solver.kernels import SEPARATED, SLIP, STICK, contact_sample, march_period, march_tangent, wear_integral
+from solver.kernels import (
+    SEPARATED,
+    SLIP,
+    STICK,
+    contact_sample,
+    march_period,
+    march_tangent,
+    mean_normal_force,
+    wear_integral,
+)
 from tests.solver import contact_twin
 from tests.solver.kernel_cases import BASIS, FRICTION, PERIODS, KernelCase, kernel_case, kernel_results
 
@@ -127,7 +136,7 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     force_t, state_t, _, _, drift = march_period(predicted, FRICTION, np.full((1, 2), 3.0), levels, 1e-12, 8)
     assert drift[0] == pytest.approx(0, abs=1e-12)
     expected = 4 * pressure * (amplitude - FRICTION * pressure)
-    assert wear_integral(force_t, state_t, levels)[0] == pytest.approx(expected, rel=1e-12)
+    assert wear_integral(force_t, state_t, levels)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
     work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
     assert work <= FRICTION * expected * (1 + 1e-12)
@@ -140,7 +149,38 @@ def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_incr
     state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
     state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
     expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6, 1 * 5 + 5 * 6]
-    assert wear_integral(force_t, state_t, np.array([False, True])) == pytest.approx(expected, rel=1e-15)
+    assert wear_integral(force_t, state_t, np.array([False, True])) == pytest.approx(expected, rel=1e-15, abs=0.0)
+
+
+def test_a_pair_that_stays_pressed_keeps_its_samples_of_the_normal_force() -> None:
+    predicted_t = kernel_case(3, 24, seed=6, at_velocity=False).predicted_t
+    pressed = predicted_t - predicted_t[:, :1].min(axis=2, keepdims=True) + 1.0
+    assert np.array_equal(mean_normal_force(pressed), pressed[:, 0])
+    assert not mean_normal_force(-pressed).any()
+
+
+def test_a_sample_beside_an_opening_counts_by_the_closed_part_of_the_step() -> None:
+    predicted_t = np.zeros((1, 3, 4))
+    predicted_t[0, 0] = [4.0, -4.0, -1.0, 3.0]
+    # closed for 1/2 of the step behind sample 0 and 3/4 of the one before sample 3, each of half the weight
+    assert mean_normal_force(predicted_t)[0] == pytest.approx([4.0 * (0.5 + 0.25), 0.0, 0.0, 3.0 * (0.5 + 0.375)])
+
+
+def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples() -> None:
+    # max(cos(t - 1) - 0.3, 0): closed for |t - 1| < a, cos a = 0.3
+    a = np.arccos(0.3)
+    exact = np.array([(np.sin(a) - 0.3 * a) / np.pi, (a - 0.3 * np.sin(a)) / np.pi])
+    errors = []
+    for samples in (32, 64, 128, 256):
+        predicted_t = np.zeros((1, 3, samples))
+        predicted_t[0, 0] = np.cos(2 * np.pi * np.arange(samples) / samples - 1.0) - 0.3
+        force_h = mean_normal_force(predicted_t)[0] @ build_basis(1, samples).analysis
+        errors.append(max(abs(force_h[0] - exact[0]), abs(force_h[1] - exact[1] * np.cos(1.0))))
+    # kinks of slope sin a: at most (2 pi / N)^2 sin a, two of them, over the period
+    assert all(
+        error < 2 * (2 * np.pi / n) ** 2 * np.sin(a) / np.pi
+        for error, n in zip(errors, (32, 64, 128, 256), strict=True)
+    )
 
 
 def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, float]:
@@ -150,10 +190,10 @@ def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, fl
 
     def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, passes, _ = march_period(
-            predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS
-        )
-        return force_t @ basis.analysis, wear_integral(force_t, state_t, case.at_velocity), status_t
+        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS)
+        force_h = force_t @ basis.analysis
+        force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
+        return force_h, wear_integral(force_t, state_t, case.at_velocity), status_t
 
     predicted_t = case.predicted_h @ basis.synthesis
     *_, passes, _ = march_period(predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS)

@@ -13,6 +13,7 @@ from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 
 SETTINGS = SolverSettings(3, 24)
+ACCURACY = 2e-3  # relative residual of a direction: Newton's method gains three digits with it
 
 
 def large(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
@@ -62,8 +63,8 @@ def test_a_kept_factorisation_follows_jacobians_that_change(wear: bool) -> None:
         residual = np.linalg.norm(tangent.apply(step) - right) / np.linalg.norm(right)
         condition = np.linalg.cond(tangent.dense(np.arange(balance.joint.contact.n_contact)))
         conditions.append(condition)
-        assert residual < 10 * linear.FORCING
-        assert error(step, oracle(balance, predicted, right)) < linear.FORCING * condition
+        assert residual < ACCURACY
+        assert error(step, oracle(balance, predicted, right)) < ACCURACY * condition
         predicted = predicted + 0.02 * PRELOAD * random.normal(size=predicted.shape) / np.arange(1, 8)
     # the bound on the error would be empty if the Jacobian were nearly singular
     assert min(conditions) < 1e3
@@ -76,7 +77,7 @@ def test_a_jump_to_another_state_is_solved_as_well() -> None:
     for changed in (predicted, -predicted, 3.0 * predicted, predicted[::-1].copy()):
         tangent = balance.linearise(balance.evaluate(changed))
         step = solver.solve(tangent, right)
-        assert np.linalg.norm(tangent.apply(step) - right) < 10 * linear.FORCING * np.linalg.norm(right)
+        assert np.linalg.norm(tangent.apply(step) - right) < ACCURACY * np.linalg.norm(right)
 
 
 def test_pairs_that_stay_stuck_are_left_out_and_found_again() -> None:
@@ -93,7 +94,7 @@ def test_pairs_that_stay_stuck_are_left_out_and_found_again() -> None:
         assert tangent.active().size <= 14 - held
         right = random.normal(size=predicted.shape)
         step = solver.solve(tangent, right)
-        assert np.linalg.norm(tangent.apply(step) - right) < 10 * linear.FORCING * np.linalg.norm(right)
+        assert np.linalg.norm(tangent.apply(step) - right) < ACCURACY * np.linalg.norm(right)
         if held == 14:
             # everything is stuck: the unknown moves nothing and the Jacobian is the identity
             assert error(step, right) < 1e-12

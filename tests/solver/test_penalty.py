@@ -82,10 +82,10 @@ def test_units_do_not_matter(seed: int) -> None:
         assert np.array_equal(after.at_velocity, before.at_velocity)
         tangential = before.tangential * force / length / np.where(before.at_velocity, rate, 1.0)
         exists = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-        assert after.tangential[exists] == pytest.approx(tangential[exists], rel=1e-10)
-        assert after.mean[exists] == pytest.approx((before.mean * force / length)[exists], rel=1e-10)
+        assert after.tangential[exists] == pytest.approx(tangential[exists], rel=1e-10, abs=0.0)
+        assert after.mean[exists] == pytest.approx((before.mean * force / length)[exists], rel=1e-10, abs=0.0)
         closing = model.contact.dofs[:, 0] >= 0
-        assert after.normal[closing] == pytest.approx((before.normal * force / length)[closing], rel=1e-10)
+        assert after.normal[closing] == pytest.approx((before.normal * force / length)[closing], rel=1e-10, abs=0.0)
 
 
 def test_a_pair_without_a_displacement_has_a_penalty_to_divide_by() -> None:
@@ -101,7 +101,7 @@ def test_a_static_state_is_at_displacement_level_with_the_same_stiffness() -> No
     static = static_penalty(slider)
     assert not static.at_velocity.any()
     rate = 6 * 2 * np.pi * 160
-    assert static.tangential == pytest.approx(slider.tangential * rate, rel=1e-12)
+    assert static.tangential == pytest.approx(slider.tangential * rate, rel=1e-12, abs=0.0)
     assert np.array_equal(static.normal, slider.normal)
     joint = static_penalty(build_penalty(dovetail(), DOVETAIL_OMEGA, 3))
     assert np.array_equal(joint.tangential, build_penalty(dovetail(), DOVETAIL_OMEGA, 3).tangential)
@@ -119,6 +119,6 @@ def test_motion_and_surplus_of_a_joint_are_inverse(at_velocity: bool) -> None:
         # a sliding velocity, not a displacement: amplitude over i n omega eps
         amplitude = surplus[0, 1, 3] - 1j * surplus[0, 1, 4]
         moved = motion[0, 1, 3] - 1j * motion[0, 1, 4]
-        assert moved == pytest.approx(amplitude / (2j * OMEGA * penalty.tangential[0]), rel=1e-12)
+        assert moved == pytest.approx(amplitude / (2j * OMEGA * penalty.tangential[0]), rel=1e-12, abs=0.0)
     else:
-        assert motion[0, 1] == pytest.approx(surplus[0, 1] / penalty.tangential[0], rel=1e-12)
+        assert motion[0, 1] == pytest.approx(surplus[0, 1] / penalty.tangential[0], rel=1e-12, abs=0.0)
