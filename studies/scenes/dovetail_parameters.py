@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from studies.scene_error import SceneError
 
+TRAVELLING_RETAINER = 1e7
+"""Retainer under a travelling wave, N/m: stiff against the slip of the flanks, soft against the flanks themselves."""
+
 
 class Parameters(BaseModel):
     """One sector of a bladed disk with a dovetail root. SI units but for rotation speed and angles.
@@ -23,6 +26,12 @@ class Parameters(BaseModel):
     rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
+    retention_stiffness: float | None = Field(
+        None,
+        ge=0,
+        description="stiffness of the retainer that keeps the root from sliding along its slot;"
+        " if not given 1e7 under a travelling wave and 0 at nodal diameter 0, N/m",
+    )
     mesh: int = Field(2, ge=1, le=3, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
     stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction, -")
@@ -66,6 +75,13 @@ class Parameters(BaseModel):
     root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")
     tip_stagger: float = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip, degrees")
     fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
+
+    @property
+    def retainer(self) -> float:
+        """Stiffness of the retainer, N/m, with its default filled in."""
+        if self.retention_stiffness is None:
+            return TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
+        return self.retention_stiffness
 
     @property
     def half_pitch(self) -> float:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
@@ -70,7 +70,7 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
             linear[k] = LinearModel(
                 mass=project(matrices.mass, nodes),
                 damping=damping * project(matrices.stiffness, nodes),
-                stiffness=project(stiffness, nodes),
+                stiffness=_retained(project(stiffness, nodes), pairs, parameters.retainer),
                 load_static=(nodes.real.T @ load) * (k == 0),
                 load_harmonic=(nodes.conj().T @ tip).astype(complex) * (k == excited),
                 response=(tip @ nodes)[None, :],
@@ -90,6 +90,19 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
         n_sectors=parameters.n_sectors,
         nodal_diameter=parameters.nodal_diameter,
     )
+
+
+def _retained(stiffness: Matrix, pairs: ContactPairs, retention_stiffness: float) -> Matrix:
+    """Reduced stiffness with the retainer: a spring on the mean axial relative displacement, weighted by area.
+
+    A prismatic slot holds the root along its axis by friction alone. Once every pair slips at some time of the period,
+    vibration carries the root along. Under a travelling wave it walks, and without a retainer there is no periodic
+    state (measured: at the resonance of nodal diameter 3 and 0.5 N of excitation a force of about 100 N holds it). At
+    nodal diameter 0 nothing drives it one way: only its mean position is not determined.
+    """
+    axial = np.zeros(len(stiffness))
+    axial[1 : 3 * len(pairs.area) : 3] = pairs.area / pairs.area.sum()
+    return stiffness + retention_stiffness * np.outer(axial, axial)
 
 
 def _sector_matrices(

@@ -244,5 +244,18 @@ def test_parameters_out_of_range(key, value):
 def test_every_parameter_is_described_with_a_unit():
     fields = Parameters.model_fields
     assert next(iter(fields)) == "friction_coefficient"
-    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees"}
+    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m"}
     assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units
+
+
+def test_a_retainer_holds_the_root_along_its_slot_under_a_travelling_wave():
+    free, held = (
+        build(Parameters(mesh=1, nodal_diameter=3, retention_stiffness=value), 1).linear[3].stiffness
+        for value in (0.0, None)
+    )
+    added = held - free
+    axial = np.zeros(len(added))
+    axial[1:48:3] = 1.0
+    assert axial @ added @ axial == pytest.approx(1e7, rel=1e-6)
+    assert np.linalg.matrix_rank(added, tol=1.0) == 1
+    assert Parameters().retainer == 0.0
