@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,25 +114,13 @@ def build_case(model: ReducedModel, friction_coefficient: float, omega: float, s
 def static_joint(joint: Joint, load_factor: float) -> Joint:
     """The same joint under a part of its static load alone: no harmonics, one sample."""
     structure = joint.structure
-    held = CondensedStructure(
-        static_stiffness=structure.static_stiffness,
+    held = replace(
+        structure,
         dynamic_stiffness=structure.dynamic_stiffness[:0],
-        static_force=load_factor * structure.static_force,
-        harmonic_force=structure.harmonic_force,
-        static_response=structure.static_response,
         dynamic_response=structure.dynamic_response[:0],
+        static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,
-        harmonic_offset=structure.harmonic_offset,
     )
-    return Joint(
-        omega=joint.omega,
-        excitation_amplitude=0.0,
-        friction_coefficient=joint.friction_coefficient,
-        structure=held,
-        contact=joint.contact,
-        basis=build_basis(0, 1),
-        slots=joint.slots,
-        # a static load has no velocity: every pair is held at displacement level
-        penalty=static_penalty(joint.penalty),
-        has_normal=joint.has_normal,
-    )
+    # a static load has no velocity: every pair is held at displacement level
+    penalty = static_penalty(joint.penalty)
+    return replace(joint, excitation_amplitude=0.0, structure=held, basis=build_basis(0, 1), penalty=penalty)

@@ -109,7 +109,7 @@ class _March:
         return bool(self.rate().max(initial=0.0) > 0.0)
 
     def planned_step(self, step: float, largest_depth: float | None) -> float:
-        """H in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
+        """Step h in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
         if largest_depth is None or self.scheme == "implicit":
             return step
         return largest_depth / float(self.rate().max())
