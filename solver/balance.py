@@ -21,11 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.joint import Joint
-from solver.kernels import march_period, march_tangent, mean_normal_force, wear_integral
+from solver.law import Marched, law_tangent, march_law
 from solver.model import FloatArray, IntArray
-
-CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
-MOST_PASSES = 400
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class Balance:
         """Predicted force (n_rel, m), N, that gives a motion, m, and contact force, N, (n_contact, 3, m) of a state."""
         motion = displacement_h.copy()
         motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
-        held = self.joint.penalty.at_velocity
+        held = self.joint.penalty.inertial
         motion[held, 1:, 0] -= self.history[held]
         return self.joint.to_relative(force_h + self.joint.surplus(motion))
 
@@ -54,83 +51,49 @@ class Balance:
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
         pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
-        predicted_t = pairs @ joint.basis.synthesis
-        at_velocity = joint.penalty.at_velocity
-        start = np.where(at_velocity[:, None], 0.0, self.history * joint.penalty.tangential[:, None])
-        limit = joint.friction_coefficient * max(float(predicted_t[:, 0].max(initial=0.0)), 0.0)
-        force_t, state_t, status_t, passes, drift = march_period(
-            predicted_t, joint.friction_coefficient, start, at_velocity, CLOSURE * limit, MOST_PASSES
-        )
-        slip_work = wear_integral(force_t, state_t, at_velocity) / joint.state_stiffness
-        wear_depth = self.wear_depth + self.wear_gain * slip_work
-        force_h = force_t @ joint.basis.analysis
-        force_h[:, 0] = mean_normal_force(predicted_t) @ joint.basis.analysis
-        displacement_h = joint.motion(pairs - force_h)
+        marched = march_law(joint, pairs, self.history)
+        wear_depth = self.wear_depth + self.wear_gain * marched.slip_work
+        displacement_h = joint.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
-        displacement_h[at_velocity, 1:, 0] += self.history[at_velocity]
-        motion, force = joint.to_relative(displacement_h), joint.to_relative(force_h)
+        inertial = joint.penalty.inertial
+        displacement_h[inertial, 1:, 0] += self.history[inertial]
+        motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
         reduced_force = joint.structure.force_h()
         residual = joint.structure.apply(motion) + force - reduced_force
         return Evaluation(
+            **vars(marched),
             predicted_h=predicted_h,
             residual=residual,
             scale=_residual_scale(reduced_force, force),
-            predicted_t=predicted_t,
             history=self.history,
-            start=start,
-            force_t=force_t,
-            state_t=state_t,
-            status_t=status_t,
-            passes=passes,
-            drift=float(drift.max(initial=0.0)),
-            force_h=force_h,
             displacement_h=displacement_h,
-            slip_work=slip_work,
             wear_depth=wear_depth,
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual: closure of the history and wear included."""
         joint = self.joint
-        force_tangent, wear_tangent = march_tangent(
-            at.predicted_t,
-            joint.friction_coefficient,
-            at.start,
-            joint.penalty.at_velocity,
-            at.passes,
-            joint.basis.synthesis,
-            joint.basis.analysis,
-            joint.has_normal,
-        )
+        force_tangent, slip_tangent = law_tangent(joint, at)
         m = joint.basis.synthesis.shape[0]
         surplus = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
         motion_tangent = joint.motion(surplus).reshape(-1, 3 * m, 3 * m)
-        motion_tangent[:, 0, :] += (self.wear_gain / joint.state_stiffness)[:, None] * wear_tangent
+        motion_tangent[:, 0, :] += self.wear_gain[:, None] * slip_tangent
         return Linearisation(joint, force_tangent, motion_tangent)
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """Residual (n_rel, 2H+1), N, and what led to it; arrays as in `kernels.march_period`.
+class Evaluation(Marched):
+    """Residual (n_rel, 2H+1), N, of a predicted force (n_rel, 2H+1), N, with what the pairs do under it.
 
-    scale: N, of the static and of the other harmonics. slip_work (n_contact,): integral of normal force times slip over
-    a period, N m. wear_depth (n_contact,): m. drift: N, change of the tangential state over the last pass.
+    scale: N, of the static and of the other harmonics. history (n_contact, 2): m, as in `Balance`.
+    displacement_h (n_contact, 3, 2H+1), wear_depth (n_contact,): m.
     """
 
     predicted_h: FloatArray
     residual: FloatArray
     scale: tuple[float, float]
-    predicted_t: FloatArray
     history: FloatArray
-    start: FloatArray
-    force_t: FloatArray
-    state_t: FloatArray
-    status_t: IntArray
-    passes: IntArray
-    drift: float
-    force_h: FloatArray
     displacement_h: FloatArray
-    slip_work: FloatArray
     wear_depth: FloatArray
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:

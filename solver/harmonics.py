@@ -17,34 +17,40 @@ from solver.model import ComplexArray, FloatArray
 
 @dataclass(frozen=True)
 class FourierBasis:
-    """Matrices between harmonics and time samples.
+    """Matrices between H harmonics, of any orders, and N time samples.
 
-    synthesis (2H+1, N): `x_t = x_h @ synthesis`. analysis (N, 2H+1): `x_h = x_t @ analysis`.
+    orders (H,): ascending. synthesis (2H+1, N): `x_t = x_h @ synthesis`. analysis (N, 2H+1): `x_h = x_t @ analysis`.
     """
 
-    n_harmonics: int
+    orders: tuple[int, ...]
     n_samples: int
     synthesis: FloatArray
     analysis: FloatArray
 
+    @property
+    def n_harmonics(self) -> int:
+        """Number H of harmonics above the static one."""
+        return len(self.orders)
 
-@lru_cache(maxsize=16)
-def build_basis(n_harmonics: int, n_samples: int) -> FourierBasis:
-    """Fourier basis, Eq. (5). Raises ValueError where `n_samples <= 2 n_harmonics`: samples would alias."""
-    if n_samples <= 2 * n_harmonics:
-        raise ValueError(f"{n_samples} samples cannot tell {n_harmonics} harmonics apart")
+
+@lru_cache(maxsize=32)
+def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
+    """Fourier basis, Eq. (5). Raises ValueError where the highest order is not below N/2: samples would alias."""
+    highest = max(orders, default=0)
+    if n_samples <= 2 * highest:
+        raise ValueError(f"{n_samples} samples cannot tell {highest} harmonics apart")
     phase = 2.0 * np.pi * np.arange(n_samples) / n_samples
-    synthesis = np.empty((2 * n_harmonics + 1, n_samples))
+    angle = np.array(orders, np.float64)[:, None] * phase
+    synthesis = np.empty((2 * len(orders) + 1, n_samples))
     synthesis[0] = 1.0
-    for harmonic in range(1, n_harmonics + 1):
-        synthesis[2 * harmonic - 1] = np.cos(harmonic * phase)
-        synthesis[2 * harmonic] = np.sin(harmonic * phase)
-    weight = np.full(2 * n_harmonics + 1, 2.0 / n_samples)
+    synthesis[1::2] = np.cos(angle)
+    synthesis[2::2] = np.sin(angle)
+    weight = np.full(2 * len(orders) + 1, 2.0 / n_samples)
     weight[0] = 1.0 / n_samples
     analysis = np.ascontiguousarray((synthesis * weight[:, None]).T)
     synthesis.flags.writeable = False
     analysis.flags.writeable = False
-    return FourierBasis(n_harmonics, n_samples, synthesis, analysis)
+    return FourierBasis(orders, n_samples, synthesis, analysis)
 
 
 def to_complex(values_h: FloatArray) -> ComplexArray:
@@ -61,18 +67,20 @@ def from_complex(static: FloatArray, amplitudes: ComplexArray) -> FloatArray:
     return values_h
 
 
-def derivative(values_h: FloatArray, omega: float) -> FloatArray:
-    """Time derivative (..., 2H+1) of a Fourier series; `omega` in rad/s."""
-    order = omega * np.arange(1, (values_h.shape[-1] - 1) // 2 + 1)
+def derivative(values_h: FloatArray, rates: FloatArray) -> FloatArray:
+    """Time derivative (..., 2H+1) of a Fourier series; rates (H,): angular frequencies of its harmonics, rad/s."""
     rate_h = np.zeros_like(values_h)
-    rate_h[..., 1::2] = order * values_h[..., 2::2]
-    rate_h[..., 2::2] = -order * values_h[..., 1::2]
+    rate_h[..., 1::2] = rates * values_h[..., 2::2]
+    rate_h[..., 2::2] = -rates * values_h[..., 1::2]
     return rate_h
 
 
-def pad_harmonics(values_h: FloatArray, n_harmonics: int) -> FloatArray:
-    """The same series with zeros above, or cut to, `n_harmonics`; (..., 2H+1)."""
-    padded = np.zeros((*values_h.shape[:-1], 2 * n_harmonics + 1))
-    kept = min(values_h.shape[-1], padded.shape[-1])
-    padded[..., :kept] = values_h[..., :kept]
-    return padded
+def change_orders(values_h: FloatArray, orders: tuple[int, ...], wanted: tuple[int, ...]) -> FloatArray:
+    """The same series (..., 2H+1) with other harmonics: zero where it had none, cut off where it has too many."""
+    changed = np.zeros((*values_h.shape[:-1], 2 * len(wanted) + 1))
+    changed[..., 0] = values_h[..., 0]
+    for place, order in enumerate(wanted):
+        if order in orders:
+            old = orders.index(order)
+            changed[..., 2 * place + 1 : 2 * place + 3] = values_h[..., 2 * old + 1 : 2 * old + 3]
+    return changed

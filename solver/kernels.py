@@ -8,10 +8,6 @@ section 2: the print has the sign of the normal test the other way round):
 - stick, `|p_T - x'| < mu p_N` with x' the state one sample earlier: `lambda_T = p_T - x'`, `x = x'`;
 - slip otherwise: `lambda_T = mu p_N n` along `n = (p_T - x') / |p_T - x'|`, `x = p_T - lambda_T`.
 
-A pair may be taken at velocity level instead (`at_velocity`): then p is the force at which its sliding velocity would
-vanish, the same law without a state acts at each sample on its own, and what it takes away, `p_T - lambda_T`, is the
-sliding velocity in force units; the state is its running sum.
-
 The state at the start of a period is history. The period is marched again from where it ended until it repeats, and at
 least twice where anything slips or opens, because the second pass is what carries the derivative of the start state.
 """
@@ -78,26 +74,35 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def mean_normal_tangent(normal_t: FloatArray, basis_t: FloatArray, analysis: FloatArray, tangent: FloatArray) -> None:
-    """Adds to `tangent` (m, m) the derivative of the harmonics of `mean_normal_force` of one pair, normal_t (N,)."""
-    n_samples, m = basis_t.shape
+def mean_normal_tangent(
+    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
+) -> FloatArray:
+    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    basis_t = np.ascontiguousarray(synthesis.T)
+    tangent = np.zeros((n_contact, m, m))
     row = np.empty(m)
-    for n in range(n_samples):
-        force = normal_t[n]
-        if force <= 0.0:
+    for pair in range(n_contact):
+        if not has_normal[pair]:
             continue
-        ahead = (n + 1) % n_samples
-        _, own_before, other_before = closed_share(force, normal_t[n - 1])
-        _, own_after, other_after = closed_share(force, normal_t[ahead])
-        for j in range(m):
-            row[j] = 0.5 * (
-                (own_before + own_after) * basis_t[n, j]
-                + other_before * basis_t[n - 1, j]
-                + other_after * basis_t[ahead, j]
-            )
-        for k in range(m):
+        for n in range(n_samples):
+            force = predicted_t[pair, 0, n]
+            if force <= 0.0:
+                continue
+            ahead = (n + 1) % n_samples
+            _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
+            _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
             for j in range(m):
-                tangent[k, j] += analysis[n, k] * row[j]
+                row[j] = 0.5 * (
+                    (own_before + own_after) * basis_t[n, j]
+                    + other_before * basis_t[n - 1, j]
+                    + other_after * basis_t[ahead, j]
+                )
+            for k in range(m):
+                for j in range(m):
+                    tangent[pair, k, j] += analysis[n, k] * row[j]
+    return tangent
 
 
 @njit(cache=True)
@@ -105,14 +110,13 @@ def march_period(
     predicted_t: FloatArray,
     friction: float,
     start: FloatArray,
-    at_velocity: BoolArray,
     closure: float,
     most_passes: int,
 ) -> tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray]:
     """March every pair through the period until its tangential state repeats.
 
     predicted_t (n_contact, 3, N): N, normal first. start (n_contact, 2): tangential state at the start of the first
-    pass, N. at_velocity (n_contact,). closure: N, accepted difference of the state over a period. Returns
+    pass, N. closure: N, accepted difference of the state over a period. Returns
 
     - force_t (n_contact, 3, N): contact force, N, compression positive;
     - state_t (n_contact, 2, N+1): tangential state of the last pass, its start first, N;
@@ -127,19 +131,6 @@ def march_period(
     passes = np.zeros(n_contact, np.int64)
     drift = np.zeros(n_contact)
     for pair in range(n_contact):
-        if at_velocity[pair]:
-            for n in range(n_samples):
-                normal, force_1, force_2, first, second, status = contact_sample(
-                    predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction, 0.0, 0.0
-                )
-                force_t[pair, 0, n] = normal
-                force_t[pair, 1, n] = force_1
-                force_t[pair, 2, n] = force_2
-                state_t[pair, 0, n + 1] = state_t[pair, 0, n] + first
-                state_t[pair, 1, n + 1] = state_t[pair, 1, n] + second
-                status_t[pair, n] = status
-            passes[pair] = 1
-            continue
         first = start[pair, 0]
         second = start[pair, 1]
         for sweep in range(most_passes):
@@ -165,12 +156,11 @@ def march_period(
 
 
 @njit(cache=True)
-def wear_integral(force_t: FloatArray, state_t: FloatArray, at_velocity: BoolArray) -> FloatArray:
+def wear_integral(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
     """Integral over a period of normal force times corrected slip, as force times state: N * N, (n_contact,).
 
     Eq. (21) with the sliding velocity, integrated as force times increments of the corrected slip: divided by the
-    tangential penalty it is N m. The trapezoidal rule takes the force of both ends of an increment; a sliding velocity
-    goes with the force of its own sample.
+    tangential penalty it is N m. The trapezoidal rule takes the force of both ends of an increment.
     """
     n_contact, _, n_samples = force_t.shape
     integral = np.zeros(n_contact)
@@ -180,8 +170,7 @@ def wear_integral(force_t: FloatArray, state_t: FloatArray, at_velocity: BoolArr
             slip = np.hypot(
                 state_t[pair, 0, n + 1] - state_t[pair, 0, n], state_t[pair, 1, n + 1] - state_t[pair, 1, n]
             )
-            old = force_t[pair, 0, n if at_velocity[pair] else before]
-            integral[pair] += 0.5 * (old + force_t[pair, 0, n]) * slip
+            integral[pair] += 0.5 * (force_t[pair, 0, before] + force_t[pair, 0, n]) * slip
     return integral
 
 
@@ -246,18 +235,17 @@ def march_tangent(
     predicted_t: FloatArray,
     friction: float,
     start: FloatArray,
-    at_velocity: BoolArray,
     passes: IntArray,
     synthesis: FloatArray,
     analysis: FloatArray,
     has_normal: BoolArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Exact derivative of `march_period`, `mean_normal_force` and `wear_integral` after the same number of passes.
+    """Exact derivative of `march_period` and `wear_integral` after the same number of passes.
 
     has_normal (n_contact,): False where the normal force is constant. Returns
 
-    - force_tangent (n_contact, 3m, 3m): d(harmonics of the contact force)/d(harmonics of the predicted force) of each
-      pair, harmonics as in `state_tangent`, dimensionless;
+    - force_tangent (n_contact, 3m, 3m): d(harmonics of the tangential force)/d(harmonics of the predicted force) of
+      each pair, harmonics as in `state_tangent`, dimensionless; the rows of the normal force are zero;
     - wear_tangent (n_contact, 3m): derivative of the wear integral (N * N), N.
     """
     n_contact, _, n_samples = predicted_t.shape
@@ -270,18 +258,12 @@ def march_tangent(
     before_dstate = np.empty((2, 3 * m))
     dforce = np.empty((2, 3 * m))
     for pair in range(n_contact):
-        if has_normal[pair]:
-            mean_normal_tangent(predicted_t[pair, 0], basis_t, analysis, force_tangent[pair, :m, :m])
         dstate[:, :] = 0.0
         first = start[pair, 0]
         second = start[pair, 1]
         for sweep in range(passes[pair]):
             last = sweep == passes[pair] - 1
             for n in range(n_samples):
-                if at_velocity[pair]:
-                    dstate[:, :] = 0.0
-                    first = 0.0
-                    second = 0.0
                 pre_1 = predicted_t[pair, 1, n] - first
                 pre_2 = predicted_t[pair, 2, n] - second
                 old_first = first
@@ -306,8 +288,6 @@ def march_tangent(
                 if slip == 0.0:
                     continue
                 before = n - 1 if n > 0 else n_samples - 1
-                if at_velocity[pair]:
-                    before = n
                 normal_before = max(predicted_t[pair, 0, before], 0.0)
                 mean = 0.5 * (normal_before + normal)
                 for column in range(3 * m):

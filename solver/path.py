@@ -44,11 +44,11 @@ class Effort:
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
     """Tangential history (n_contact, 2), m, for the next state: the corrected slip X_T at the end of the period, the
-    mean position of pairs at velocity level.
+    mean position of inertial pairs.
     """
     joint = balance.joint
     at_end = evaluation.state_t[:, :, -1] / joint.state_stiffness[:, None]
-    return np.where(joint.penalty.at_velocity[:, None], evaluation.displacement_h[:, 1:, 0], at_end)
+    return np.where(joint.penalty.inertial[:, None], evaluation.displacement_h[:, 1:, 0], at_end)
 
 
 def solve_balance(

@@ -1,13 +1,14 @@
 """The penalty of each pair and the formulation that suits it, from the scene alone.
 
-Both formulations are exact for any penalty as the number of harmonics grows; at a finite number they are as good as the
-harmonics of the *predicted* force that are left out are small. With the structure's stiffness `Z_n` these are
-`(1 - E_n / Z_n) lambda_n`, where E_n is the penalty as it acts on the displacement: eps at displacement level,
-`i n w eps` at velocity level. So
+With any penalty the balance is exact as the number of harmonics grows; at a finite number it is as good as the harmonics
+of the *predicted* force that are left out are small. With the structure's stiffness `Z_n` these are
+`(1 - E_n / Z_n) lambda_n`, where E_n is the penalty as it acts on the displacement. So E_n has to be near Z_n above the
+highest harmonic:
 
-- a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level with eps
-  near that stiffness: nearly nothing is left out;
-- a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is taken at velocity level, where stops are kept.
+- a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, Eq. (10),
+  with E_n = eps near that stiffness;
+- a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is marched with its mass (`solver.inertia`),
+  `E_n = -(n w)^2 m + i n w c`.
 """
 
 from __future__ import annotations
@@ -20,35 +21,45 @@ from solver.model import BoolArray, FloatArray, ReducedModel
 from solver.structure import condense, relative_indices
 
 INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
-STATIC_SHARE = 1e-6  # of the static stiffness: what holds the mean position of a pair at velocity level
+DRAG = 0.1  # of m w: forgets the start of a period to a half within the next
+STATIC_SHARE = 1e-6  # of the static stiffness: what holds the mean position of a marched mass
 
 
 @dataclass(frozen=True)
 class Penalty:
-    """normal (n_contact,): N/m. tangential (n_contact,): N/m, at velocity level N s/m. at_velocity (n_contact,).
+    """normal, tangential (n_contact,): N/m. inertial (n_contact,): whether the pair is marched with its mass.
 
-    mean (n_contact,): N/m, holds the mean tangential position of pairs at velocity level: their friction force alone
-    leaves it undetermined while they stick. It is so small that it does not hold one that slips.
+    mass (n_contact,): kg. drag (n_contact,): N s/m. mean (n_contact,): N/m, holds the mean tangential position of pairs
+    that are marched with their mass: their friction force alone leaves it undetermined while they stick. It is so small
+    that it does not hold one that slips. These three are used for inertial pairs only, `tangential` for the others.
     """
 
     normal: FloatArray
     tangential: FloatArray
-    at_velocity: BoolArray
+    inertial: BoolArray
+    mass: FloatArray
+    drag: FloatArray
     mean: FloatArray
 
 
-def build_penalty(model: ReducedModel, omega: float, n_harmonics: int) -> Penalty:
-    """Penalty from the condensed `K + s^2 M` at the real rate s of the first harmonic left out, `(H + 1) omega`.
+def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
+    """Penalty from the condensed `K + s^2 M` at the real rate s of the first harmonic left out, `(highest + 1) omega`.
 
     At a real rate the structure has no resonances: it shows an elastic joint its stiffness and a slider its mass.
     """
-    rate = (n_harmonics + 1) * omega
+    rate = (highest + 1) * omega
     size, twice = _stiffness_at(model, rate), _stiffness_at(model, 2.0 * rate)
-    at_velocity = twice[:, 1] > INERTIAL * size[:, 1]
+    has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
+    inertial = has_tangent & (twice[:, 1] > INERTIAL * size[:, 1])
+    mass = np.ones(size.shape[0])
+    if inertial.any():
+        mass[inertial] = _mass_at(model, rate)[inertial]
     return Penalty(
         normal=size[:, 0],
-        tangential=np.where(at_velocity, size[:, 1] / rate, size[:, 1]),
-        at_velocity=at_velocity,
+        tangential=size[:, 1],
+        inertial=inertial,
+        mass=mass,
+        drag=DRAG * mass * omega,
         mean=STATIC_SHARE * size[:, 1],
     )
 
@@ -60,16 +71,32 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     much takes four times the Newton iterations, half as much takes as many, all within 1 % in the response.
     """
     relative, slots = relative_indices(model.contact)
-    linear, _ = model.harmonic_structure(1)
-    full = linear.stiffness + rate**2 * linear.mass
-    reduced = condense(full, relative, np.zeros(full.shape[0])).stiffness
     size = np.zeros((model.contact.n_contact, 2))
-    np.maximum.at(size, (slots // 3, np.minimum(slots % 3, 1)), np.real(np.diag(reduced)))
+    diagonal = np.real(np.diag(_condensed_at(model, rate)))
+    np.maximum.at(size, (slots // 3, np.minimum(slots % 3, 1)), diagonal)
     # a pair without such a displacement, or one that nothing resists, still needs a number to divide by
     return np.where(size > 0.0, size, 1.0)
 
 
+def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
+    """Mass (n_contact,), kg, that a pair moves against a force along a tangent, all other pairs being free."""
+    _, slots = relative_indices(model.contact)
+    # 1 / G grows as k + m s^2 where it is inertial, G the compliance
+    low, high = (1.0 / np.real(np.diag(np.linalg.inv(_condensed_at(model, s)))) for s in (rate, 2.0 * rate))
+    mass = np.full(model.contact.n_contact, np.inf)
+    tangent = slots % 3 > 0
+    np.minimum.at(mass, slots[tangent] // 3, ((high - low) / (3.0 * rate**2))[tangent])
+    return mass
+
+
+def _condensed_at(model: ReducedModel, rate: float) -> FloatArray:
+    relative, _ = relative_indices(model.contact)
+    linear, _ = model.harmonic_structure(1)
+    full = linear.stiffness + rate**2 * linear.mass
+    return condense(full, relative, np.zeros(full.shape[0])).stiffness
+
+
 def static_penalty(penalty: Penalty) -> Penalty:
-    """The same penalty for a static state, which has no velocity: every pair at displacement level."""
-    stiffness = np.where(penalty.at_velocity, penalty.mean / STATIC_SHARE, penalty.tangential)
-    return Penalty(penalty.normal, stiffness, np.zeros_like(penalty.at_velocity), penalty.mean)
+    """The same penalty for a static state, in which nothing is inertial: every pair at displacement level."""
+    none = np.zeros_like(penalty.inertial)
+    return Penalty(penalty.normal, penalty.tangential, none, penalty.mass, penalty.drag, penalty.mean)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from solver.balance import Balance, Evaluation
-from solver.harmonics import from_complex, pad_harmonics, to_complex
+from solver.harmonics import change_orders, from_complex, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
@@ -73,7 +73,7 @@ def solve_first_state(
 
     still = balance_at(0.0, static.history)
     displacement_h, force_h = (
-        pad_harmonics(part, case.settings.harmonics)
+        change_orders(part, (), case.resolution.orders)
         for part in (static.evaluation.displacement_h, static.evaluation.force_h)
     )
     start = still.predict(displacement_h, force_h)

@@ -3,17 +3,66 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+Automatic = Literal["auto"]
 
 
 @dataclass(frozen=True)
 class SolverSettings:
     """How finely and how exactly a case is solved.
 
-    harmonics: number H of harmonics above the static one.
-    samples: N, equally spaced time samples in a period, at which the contact law is applied; more than 2 H.
+    harmonics: number H of harmonics above the static one, or "auto": those that the state needs for `rtol`.
+    samples: N, equally spaced time samples in a period, at which the contact law is applied, more than 2 H; or "auto".
     tolerance: largest accepted scaled residual of the harmonic balance.
+    rtol: relative error of response and wear rate that automatic harmonics and samples aim at.
     """
 
-    harmonics: int = 5
-    samples: int = 128
+    harmonics: int | Automatic = "auto"
+    samples: int | Automatic = "auto"
     tolerance: float = 1e-8
+    rtol: float = 1e-2
+
+    @property
+    def automatic(self) -> bool:
+        """Whether anything is chosen by the state."""
+        return self.harmonics == "auto" or self.samples == "auto"
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Harmonics and samples of one solve.
+
+    orders: harmonics above the static one, ascending, the first 1. samples: N, more than twice the highest.
+    """
+
+    orders: tuple[int, ...]
+    samples: int
+
+    @property
+    def highest(self) -> int:
+        """Highest harmonic."""
+        return self.orders[-1] if self.orders else 0
+
+
+def all_orders(n_harmonics: int) -> tuple[int, ...]:
+    """Every harmonic from the first one on."""
+    return tuple(range(1, n_harmonics + 1))
+
+
+FIRST_HARMONICS = 3
+FEWEST_SAMPLES = 64
+SAMPLES_A_HARMONIC = 8  # of the highest one
+
+
+def samples_for(highest: int) -> int:
+    """Samples, a power of two, with which the harmonics up to the highest one are resolved."""
+    wanted = max(FEWEST_SAMPLES, SAMPLES_A_HARMONIC * highest)
+    return 1 << (wanted - 1).bit_length()
+
+
+def first_resolution(settings: SolverSettings) -> Resolution:
+    """The resolution that the settings fix, or the one that automatic settings begin with."""
+    n_harmonics = FIRST_HARMONICS if settings.harmonics == "auto" else settings.harmonics
+    samples = samples_for(n_harmonics) if settings.samples == "auto" else settings.samples
+    return Resolution(all_orders(n_harmonics), samples)

@@ -18,10 +18,12 @@ class CondensedStructure:
 
     `n_rel` relative displacements, in the order pair by pair: closing, tangent 1, tangent 2, those that exist.
 
-    static_stiffness (n_rel, n_rel): N/m. dynamic_stiffness (H, n_rel, n_rel) complex: harmonics 1..H, N/m.
+    static_stiffness (n_rel, n_rel): N/m. dynamic_stiffness (H, n_rel, n_rel) complex: the harmonics above it, N/m.
     static_force (n_rel,): N. harmonic_force (n_rel,) complex: N, harmonic 1, for the actual excitation amplitude.
     static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
     static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
+    drive (n_rel,), drive_offset complex: `conj(F) . x` of the harmonic load F and its displacements x, N m, from u and
+    with u = 0.
     """
 
     static_stiffness: FloatArray
@@ -32,6 +34,8 @@ class CondensedStructure:
     dynamic_response: ComplexArray
     static_offset: FloatArray
     harmonic_offset: ComplexArray
+    drive: ComplexArray
+    drive_offset: complex
 
     def force_h(self) -> FloatArray:
         """Reduced force F_r (n_rel, 2H+1), N."""
@@ -54,6 +58,12 @@ class CondensedStructure:
             amplitudes[:, 0] += self.harmonic_offset
         return from_complex(self.static_response @ displacement_h[:, 0] + self.static_offset, amplitudes)
 
+    def input_work(self, displacement_h: FloatArray) -> float:
+        """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
+        if not self.dynamic_stiffness.shape[0]:
+            return 0.0
+        return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
+
 
 def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
     """Indices of the relative displacements in the linear model, (n_rel,), and their slots `3 pair + component`."""
@@ -62,9 +72,11 @@ def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
 
 
 def build_structure(
-    model: ReducedModel, omega: float, excitation_amplitude: float, n_harmonics: int
+    model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
-    """Dynamic stiffness `K + i n w C - (n w)^2 M` of every harmonic, condensed; omega in rad/s, amplitude in N.
+    """Dynamic stiffness `K + i n w C - (n w)^2 M` of the harmonics n, condensed; omega in rad/s, amplitude in N.
+
+    orders: harmonics above the static one, ascending; the excitation acts in the first of them, which is 1.
 
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
     """
@@ -72,22 +84,26 @@ def build_structure(
     still = model.linear[0]
     static = condense(np.real(still.stiffness), relative, still.load_static)
     n_response = still.response.shape[0]
-    stiffness = np.empty((n_harmonics, relative.size, relative.size), complex)
-    response = np.empty((n_harmonics, n_response, relative.size), complex)
+    stiffness = np.empty((len(orders), relative.size, relative.size), complex)
+    response = np.empty((len(orders), n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
-    for (linear, conjugate), harmonics in _by_structure(model, n_harmonics):
+    drive, drive_offset = np.zeros(relative.size, complex), 0.0 + 0.0j
+    for (linear, conjugate), places in _by_structure(model, orders):
         # a folded nodal diameter has the conjugate matrices, not the conjugate of the sum: damping stays positive
         mass, damping, elastic, shape, rows = (
             part.conj() if conjugate else part
             for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
         )
+        harmonics = np.array(orders)[places]
         frequency = omega * harmonics[:, None, None]
         full = elastic + 1j * frequency * damping - frequency**2 * mass
         moving = condense(full, relative, np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape)
-        stiffness[harmonics - 1] = moving.stiffness
-        response[harmonics - 1] = rows @ moving.motion
+        stiffness[places] = moving.stiffness
+        response[places] = rows @ moving.motion
         if harmonics[0] == 1:
             force, offset = moving.force[0], rows @ moving.held_motion[0]
+            load = excitation_amplitude * shape.conj()
+            drive, drive_offset = load @ moving.motion[0], complex(load @ moving.held_motion[0])
     return CondensedStructure(
         static_stiffness=np.real(static.stiffness),
         dynamic_stiffness=stiffness,
@@ -97,16 +113,18 @@ def build_structure(
         dynamic_response=response,
         static_offset=np.real(still.response @ static.held_motion),
         harmonic_offset=offset,
+        drive=drive,
+        drive_offset=drive_offset,
     )
 
 
-def _by_structure(model: ReducedModel, n_harmonics: int) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
-    """Linear model (and whether its conjugate holds) with the harmonics above the static one that see it."""
-    seen = [model.harmonic_structure(harmonic) for harmonic in range(1, n_harmonics + 1)]
+def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
+    """Linear model (and whether its conjugate holds) with the places of the harmonics that see it."""
+    seen = [model.harmonic_structure(harmonic) for harmonic in orders]
     for number, (linear, conjugate) in enumerate(seen):
         same = [other is linear and folded == conjugate for other, folded in seen]
         if same.index(True) == number:
-            yield (linear, conjugate), 1 + np.flatnonzero(same)
+            yield (linear, conjugate), np.flatnonzero(same)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,213 @@
+"""How wrong a state is for its harmonics and samples, and which of them it needs.
+
+The error of a state is estimated by solving it again with more harmonics and with more samples, each warm started: what
+changes is the error, up to the rest of the series (`SAFETY`). Automatic settings go up, one or the other, until the
+estimate is below `rtol`; a state that carries no even harmonics goes on without them, and one in which nothing slips
+or opens keeps the first harmonic alone, which is then exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance import Balance, Evaluation
+from solver.harmonics import change_orders, to_complex
+from solver.joint import Case, Joint
+from solver.kernels import STICK
+from solver.linear import JacobianSolver
+from solver.model import ComplexArray, FloatArray
+from solver.path import Effort, PathPoint, final_history, solve_balance
+from solver.settings import Resolution, all_orders, samples_for
+
+LADDER = (1, 3, 5, 9, 15, 25, 41, 69, 115)  # highest harmonics
+MOST_SAMPLES = 8192
+MOST_UNKNOWNS = 8000  # of a balance that "auto" may ask for: a dense factorisation of it takes half a gigabyte
+HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2.5 to 1.3 times the difference of two steps
+SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
+SMALL_WORK = 0.01  # of the work of the excitation: friction that takes less has its wear rate judged as if it took that
+SYMMETRIC = 1e-9
+SPARE = 0.1  # of rtol: a state so accurate may try with fewer
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated relative errors of a state: of the first harmonic of its response and of its total wear rate."""
+
+    response: float
+    wear_rate: float
+
+    @property
+    def largest(self) -> float:
+        """The larger one."""
+        return max(self.response, self.wear_rate)
+
+    def __add__(self, other: Estimate) -> Estimate:
+        """Errors of two causes, at their worst."""
+        return Estimate(self.response + other.response, self.wear_rate + other.wear_rate)
+
+    def times(self, factor: float) -> Estimate:
+        """Larger errors."""
+        return Estimate(factor * self.response, factor * self.wear_rate)
+
+
+NOTHING = Estimate(0.0, 0.0)
+UNKNOWN = Estimate(np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A state with the harmonics and samples that it needs, or as many as there may be.
+
+    case: with the resolution of the state. point: the state; its parameter is that of the point refined. estimate: of
+    its errors. accurate: whether it is below rtol; for fixed settings always true. spare: whether fewer might do.
+    """
+
+    case: Case
+    point: PathPoint
+    estimate: Estimate
+    accurate: bool
+    spare: bool
+
+
+def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoint, effort: Effort) -> Refined:
+    """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
+
+    omega: rad/s. excitation_amplitude: N.
+    """
+    settings = case.settings
+    here = _Level(case, case.joint(omega, excitation_amplitude), point)
+    while True:
+        if _nothing_happens(here.point.evaluation):
+            if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
+                first = here.solve_at(Resolution((1,), here.case.resolution.samples), effort)
+                here = first or here
+            return Refined(here.case, here.point, NOTHING, True, False)
+        if settings.harmonics == "auto":
+            here = here.without_even(effort) or here
+        resolution = here.case.resolution
+        finer = here.solve_at(Resolution(resolution.orders, 2 * resolution.samples), effort)
+        richer = here.solve_at(_richer(here, resolution), effort)
+        by_samples = UNKNOWN if finer is None else here.difference(finer).times(SAMPLES_SAFETY)
+        by_harmonics = UNKNOWN if richer is None else here.difference(richer).times(HARMONICS_SAFETY)
+        estimate = by_samples + by_harmonics
+        if not settings.automatic:
+            return Refined(here.case, here.point, estimate, True, False)
+        if estimate.largest <= settings.rtol:
+            spare = settings.harmonics == "auto" and estimate.largest < SPARE * settings.rtol
+            return Refined(here.case, here.point, estimate, True, spare)
+        more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
+        more_harmonics = settings.harmonics == "auto" and by_harmonics.largest > by_samples.largest / 3.0
+        wanted = Resolution(
+            _richer(here, resolution).orders if more_harmonics else resolution.orders,
+            2 * resolution.samples if more_samples else resolution.samples,
+        )
+        next_level = None
+        if _allowed(here, wanted) and wanted != resolution:
+            given = {(False, True): finer, (True, False): richer}.get((more_harmonics, more_samples))
+            next_level = (
+                given if given is not None and given.case.resolution == wanted else here.solve_at(wanted, effort)
+            )
+        if next_level is None:
+            return Refined(here.case, here.point, estimate, False, False)
+        here = next_level
+
+
+def coarser(case: Case) -> Case:
+    """The same case one step down the ladder, for a state that may do with fewer harmonics."""
+    resolution = case.resolution
+    lower = [step for step in LADDER if step < resolution.highest]
+    if not lower or case.settings.harmonics != "auto":
+        return case
+    orders = tuple(order for order in resolution.orders if order <= lower[-1])
+    samples = resolution.samples
+    if case.settings.samples == "auto":
+        samples = max(samples // 2, samples_for(lower[-1]))
+    return case.at(Resolution(orders, samples))
+
+
+def transfer(
+    case: Case, joint: Joint, evaluation: Evaluation, old_orders: tuple[int, ...]
+) -> tuple[Balance, FloatArray]:
+    """Balance and predicted force (n_rel, m), N, from which a state of other harmonics is solved in this case."""
+    balance = Balance(joint, evaluation.history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
+    orders = case.resolution.orders
+    return balance, balance.predict(
+        change_orders(evaluation.displacement_h, old_orders, orders),
+        change_orders(evaluation.force_h, old_orders, orders),
+    )
+
+
+@dataclass(frozen=True)
+class _Level:
+    """A state with the case that it was solved in."""
+
+    case: Case
+    joint: Joint
+    point: PathPoint
+
+    def solve_at(self, resolution: Resolution, effort: Effort) -> _Level | None:
+        """The same state with other harmonics and samples; None where it is not found."""
+        case = self.case.at(resolution)
+        joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        balance, start = transfer(case, joint, self.point.evaluation, self.case.resolution.orders)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, 15)
+        if not result.converged:
+            return None
+        point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
+        return _Level(case, joint, point)
+
+    def without_even(self, effort: Effort) -> _Level | None:
+        """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
+        orders = self.case.resolution.orders
+        odd = tuple(order for order in orders if order % 2)
+        if odd == orders or not _half_wave_symmetric(self.point.evaluation):
+            return None
+        return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
+
+    def response(self) -> ComplexArray:
+        """First harmonic of the responses (n_response,), m."""
+        structure = self.joint.structure
+        return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
+
+    def difference(self, better: _Level) -> Estimate:
+        """Relative differences of response and wear rate to a better state."""
+        mine, its = self.response(), better.response()
+        response = float(np.linalg.norm(mine - its) / max(np.linalg.norm(its), 1e-300))
+        mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
+        # where friction takes next to nothing, a relative error of it says nothing
+        input_work = better.joint.structure.input_work(better.joint.to_relative(better.point.evaluation.displacement_h))
+        least = SMALL_WORK * abs(input_work) / max(self.joint.friction_coefficient, 1e-300)
+        if max(its_slip, mine_slip) <= 1e-3 * least:
+            return Estimate(response, 0.0)
+        # no wear rate is surer than the motion that it comes from
+        return Estimate(response, max(response, abs(mine_slip - its_slip) / max(its_slip, least)))
+
+
+def _nothing_happens(evaluation: Evaluation) -> bool:
+    return bool((evaluation.status_t == STICK).all())
+
+
+def _half_wave_symmetric(evaluation: Evaluation) -> bool:
+    """Whether the contact force has no even harmonics but the static one."""
+    half = evaluation.force_t.shape[2] // 2
+    if evaluation.force_t.shape[2] % 2:
+        return False
+    total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
+    size = np.abs(evaluation.force_t).max(initial=0.0)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
+
+
+def _richer(here: _Level, resolution: Resolution) -> Resolution:
+    """The next step of the ladder, with samples enough for it; odd harmonics stay odd."""
+    highest = next((step for step in LADDER if step > resolution.highest), 2 * resolution.highest + 1)
+    orders = all_orders(highest)
+    if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
+        orders = orders[::2]
+    return Resolution(orders, max(resolution.samples, samples_for(highest)))
+
+
+def _allowed(here: _Level, resolution: Resolution) -> bool:
+    unknowns = here.joint.slots.size * (2 * len(resolution.orders) + 1)
+    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-1] and unknowns <= MOST_UNKNOWNS
