@@ -81,7 +81,7 @@ class Joint:
         moved[fast, 1:] = np.moveaxis(from_complex(mean, compliance * to_complex(force)), -1, 2)
 
     def surplus(self, motion: FloatArray) -> FloatArray:
-        """Predicted force beyond the contact force, N, from a motion (n_contact, 3, 2H+1), m: the inverse of `motion`."""
+        """Predicted force beyond the contact force, N, from a motion (n_contact, 3, 2H+1), m; undoes `motion`."""
         force = np.empty_like(motion)
         force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
         force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]

@@ -1,12 +1,12 @@
 """The penalty of each pair and the formulation that suits it, from the scene alone.
 
-With any penalty the balance is exact as the number of harmonics grows; at a finite number it is as good as the harmonics
-of the *predicted* force that are left out are small. With the structure's stiffness `Z_n` these are
+With any penalty the balance is exact as the number of harmonics grows; at a finite number it is as good as those of the
+*predicted* force that are left out are small. With the structure's stiffness `Z_n` these are
 `(1 - E_n / Z_n) lambda_n`, where E_n is the penalty as it acts on the displacement. So E_n has to be near Z_n above the
 highest harmonic:
 
-- a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, Eq. (10),
-  with E_n = eps near that stiffness;
+- a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
+  E_n = eps near that stiffness, Eq. (10);
 - a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is marched with its mass (`solver.inertia`),
   `E_n = -(n w)^2 m + i n w c`.
 """
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, ReducedModel
+from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure import condense, relative_indices
 
 INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
@@ -70,7 +70,7 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     The diagonal is what a pair shows that moves alone. Measured on the dovetail sector at resonance: three times as
     much takes four times the Newton iterations, half as much takes as many, all within 1 % in the response.
     """
-    relative, slots = relative_indices(model.contact)
+    _, slots = relative_indices(model.contact)
     size = np.zeros((model.contact.n_contact, 2))
     diagonal = np.real(np.diag(_condensed_at(model, rate)))
     np.maximum.at(size, (slots // 3, np.minimum(slots % 3, 1)), diagonal)
@@ -89,7 +89,7 @@ def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
     return mass
 
 
-def _condensed_at(model: ReducedModel, rate: float) -> FloatArray:
+def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
     relative, _ = relative_indices(model.contact)
     linear, _ = model.harmonic_structure(1)
     full = linear.stiffness + rate**2 * linear.mass
