@@ -15,7 +15,7 @@ import numpy as np
 from solver.balance import Balance, Evaluation
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
-from solver.kernels import STICK
+from solver.kernels import SEPARATED, STICK
 from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, final_history, solve_balance
@@ -26,7 +26,7 @@ MOST_SAMPLES = 8192
 MOST_UNKNOWNS = 8000  # of a balance that "auto" may ask for: a dense factorisation of it takes half a gigabyte
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
-SMALL_WORK = 0.01  # of the work of the excitation: friction that takes less has its wear rate judged as if it took that
+SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
 SYMMETRIC = 1e-9
 SPARE = 0.1  # of rtol: a state so accurate may try with fewer
 
@@ -175,7 +175,7 @@ class _Level:
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         # where friction takes next to nothing, a relative error of it says nothing
         input_work = better.joint.structure.input_work(better.joint.to_relative(better.point.evaluation.displacement_h))
-        least = SMALL_WORK * abs(input_work) / max(self.joint.friction_coefficient, 1e-300)
+        least = SMALL_WORK * abs(input_work)
         if max(its_slip, mine_slip) <= 1e-3 * least:
             return Estimate(response, 0.0)
         # no wear rate is surer than the motion that it comes from
@@ -183,7 +183,9 @@ class _Level:
 
 
 def _nothing_happens(evaluation: Evaluation) -> bool:
-    return bool((evaluation.status_t == STICK).all())
+    """Whether every pair sticks or is open all period long: the joint is linear."""
+    sticks, open_ = (evaluation.status_t == STICK).all(axis=1), (evaluation.status_t == SEPARATED).all(axis=1)
+    return bool((sticks | open_).all())
 
 
 def _half_wave_symmetric(evaluation: Evaluation) -> bool:

@@ -17,12 +17,13 @@ by a rank-one block a pair:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from solver.joint import Joint
 from solver.law import Marched, law_tangent, march_law
-from solver.model import FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -139,24 +140,26 @@ class Linearisation:
         force = np.matmul(self.force_tangent, spread).reshape(shape)
         return joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
 
-    def dense(self, pairs: IntArray) -> FloatArray:
-        """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic)."""
+    def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
+        """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic).
+
+        n_harmonics: where given, of the lowest harmonics only.
+        """
         joint = self.joint
-        m = joint.basis.synthesis.shape[0]
-        n_harmonics = joint.basis.n_harmonics
-        chosen = np.isin(joint.slots // 3, pairs)
-        rows = np.flatnonzero(chosen)
+        whole = joint.basis.synthesis.shape[0]
+        m = whole if n_harmonics is None else 2 * n_harmonics + 1
+        rows = np.flatnonzero(np.isin(joint.slots // 3, pairs))
         matrix = np.zeros((rows.size, m, rows.size, m))
         static = joint.structure.static_stiffness
         dynamic = joint.structure.dynamic_stiffness
         for pair in pairs:
             own = np.flatnonzero(joint.slots[rows] // 3 == pair)
             component = joint.slots[rows[own]] % 3
-            select = (component[:, None] * m + np.arange(m)).ravel()
+            select = (component[:, None] * whole + np.arange(m)).ravel()
             block = self.motion_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size * m)
             product = np.empty((rows.size, m, own.size * m))
             product[:, 0] = static[np.ix_(rows, rows[own])] @ block[:, 0]
-            for n in range(n_harmonics):
+            for n in range((m - 1) // 2):
                 amplitude = block[:, 2 * n + 1] - 1j * block[:, 2 * n + 2]
                 force = dynamic[n][np.ix_(rows, rows[own])] @ amplitude
                 product[:, 2 * n + 1] = force.real
@@ -165,3 +168,29 @@ class Linearisation:
             tangent = self.force_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size, m)
             matrix[own[:, None], :, own[None, :]] += tangent.transpose(0, 2, 1, 3)
         return matrix.reshape(rows.size * m, rows.size * m)
+
+    def dense_harmonic(self, pairs: IntArray, place: int) -> ComplexArray:
+        """What the Jacobian does within one harmonic above the static one: a complex matrix over the rows of `pairs`.
+
+        place: of the harmonic among those of the basis. The pairs' tangents mix its cosine and sine in any way; the
+        part that a complex factor can express is taken.
+        """
+        joint = self.joint
+        m = joint.basis.synthesis.shape[0]
+        rows = np.flatnonzero(np.isin(joint.slots // 3, pairs))
+        matrix = np.zeros((rows.size, rows.size), complex)
+        stiffness = joint.structure.dynamic_stiffness[place]
+        for pair in pairs:
+            own = np.flatnonzero(joint.slots[rows] // 3 == pair)
+            cosine = (joint.slots[rows[own]] % 3) * m + 2 * place + 1
+            motion, force = (_complex_part(part[pair], cosine) for part in (self.motion_tangent, self.force_tangent))
+            matrix[:, own] = stiffness[np.ix_(rows, rows[own])] @ motion
+            matrix[np.ix_(own, own)] += force
+        return matrix
+
+
+def _complex_part(tangent: FloatArray, cosine: IntArray) -> ComplexArray:
+    """Complex-linear part (k, k) of a real map between amplitudes `cosine - i sine` of k displacements."""
+    cc, cs = tangent[np.ix_(cosine, cosine)], tangent[np.ix_(cosine, cosine + 1)]
+    sc, ss = tangent[np.ix_(cosine + 1, cosine)], tangent[np.ix_(cosine + 1, cosine + 1)]
+    return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))

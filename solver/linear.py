@@ -6,23 +6,25 @@ from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
-import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.balance import Linearisation
+from solver.factor import Factor, build_factor
 from solver.model import FloatArray, IntArray
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
 KRYLOV = 30  # products after which a kept factorisation has aged too much
+RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
 FORCING = 1e-3  # relative residual of an iterative solve
 
 
 @dataclass
 class JacobianSolver:
-    """Solves with `Linearisation`; keeps one LU between calls as the preconditioner of GMRES on the exact Jacobian."""
+    """Solves with `Linearisation`; keeps one factorisation between calls, with which GMRES on the exact Jacobian is
+    preconditioned.
+    """
 
-    _factor: tuple[FloatArray, IntArray] | None = field(default=None, repr=False)
-    _pairs: IntArray = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
+    _factor: Factor | None = field(default=None, repr=False)
 
     def solve(self, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N."""
@@ -42,42 +44,41 @@ class JacobianSolver:
         return step
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
-        m = right.shape[1]
-        if self._factor is None or not np.isin(pairs, self._pairs).all():
-            self._refresh(tangent, pairs)
-            return self._precondition(tangent, rows, right)
-        full = np.zeros((tangent.joint.slots.size, m))
+        if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
+            solution, found = self._iterate(self._factor, tangent, rows, right, 1)
+            if found:
+                return solution
+        self._factor = build_factor(tangent, pairs)
+        if self._factor.exact:
+            return self._factor.solve(right)
+        # as far as it gets: Newton judges by the true residual
+        return self._iterate(self._factor, tangent, rows, right, RESTARTS)[0]
+
+    def _iterate(
+        self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray, restarts: int
+    ) -> tuple[FloatArray, bool]:
+        """Solution (n_rows, m) by GMRES, and whether it was found."""
+        full = np.zeros((tangent.joint.slots.size, right.shape[1]))
+        position = np.searchsorted(factor.rows, rows)
+        padded = np.zeros((factor.rows.size, right.shape[1]))
+
+        def precondition(vector: FloatArray) -> FloatArray:
+            padded[position] = vector.reshape(right.shape)
+            return factor.solve(padded)[position]
 
         def product(vector: FloatArray) -> FloatArray:
-            full[rows] = self._precondition(tangent, rows, vector.reshape(rows.size, m))
+            full[rows] = precondition(vector)
             return tangent.apply(full)[rows].ravel()
 
         # preconditioned from the right, so that the residual that GMRES watches is the true one
-        size = rows.size * m
         solution, failed = gmres(
-            LinearOperator((size, size), matvec=product, dtype=float),
+            LinearOperator((right.size, right.size), matvec=product, dtype=float),
             right.ravel(),
             rtol=FORCING,
             restart=KRYLOV,
-            maxiter=1,
+            maxiter=restarts,
         )
-        if failed:
-            self._refresh(tangent, pairs)
-            return self._precondition(tangent, rows, right)
-        return self._precondition(tangent, rows, solution.reshape(rows.size, m))
-
-    def _refresh(self, tangent: Linearisation, pairs: IntArray) -> None:
-        self._factor = scipy.linalg.lu_factor(tangent.dense(pairs), overwrite_a=True, check_finite=False)
-        self._pairs = pairs
-
-    def _precondition(self, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
-        assert self._factor is not None
-        kept = np.flatnonzero(np.isin(tangent.joint.slots // 3, self._pairs))
-        padded = np.zeros((kept.size, right.shape[1]))
-        position = np.searchsorted(kept, rows)
-        padded[position] = right
-        solved: FloatArray = scipy.linalg.lu_solve(self._factor, padded.ravel(), check_finite=False)
-        return solved.reshape(padded.shape)[position]
+        return precondition(solution), not failed
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

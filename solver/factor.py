@@ -1,0 +1,67 @@
+"""A factorisation of the balance's Jacobian, exact where it is small, else by groups of harmonics: a preconditioner.
+
+The harmonics of a balance are coupled by the pairs that slip or open. That coupling is strong among the lowest ones,
+which are factorised together as far as `DENSE` unknowns go; above, each harmonic is factorised on its own with the part
+of the pairs' tangents that keeps it to itself, a complex matrix of as many rows as there are relative displacements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from solver.balance import Linearisation
+from solver.model import ComplexArray, FloatArray, IntArray
+
+DENSE = 1700  # unknowns that are factorised together: 48 pairs with five harmonics
+
+RealFactor = tuple[FloatArray, IntArray]
+ComplexFactor = tuple[ComplexArray, IntArray]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """pairs: those whose rows (n_rows,) it holds, all harmonics of them, 2H+1.
+
+    low: factorisation of the lowest harmonics up to `n_low`. high: of each of the others.
+    """
+
+    pairs: IntArray
+    rows: IntArray
+    n_low: int
+    low: RealFactor
+    high: tuple[ComplexFactor, ...]
+
+    @property
+    def exact(self) -> bool:
+        """Whether this is the Jacobian itself."""
+        return not self.high
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Approximate (where `exact`: the) solution (n_rows, 2H+1) for a right-hand side (n_rows, 2H+1)."""
+        m_low = 2 * self.n_low + 1
+        solved = np.empty_like(right)
+        low = scipy.linalg.lu_solve(self.low, np.ascontiguousarray(right[:, :m_low]).ravel(), check_finite=False)
+        solved[:, :m_low] = low.reshape(-1, m_low)
+        for place, factor in enumerate(self.high):
+            column = m_low + 2 * place
+            amplitude = scipy.linalg.lu_solve(factor, right[:, column] - 1j * right[:, column + 1], check_finite=False)
+            solved[:, column], solved[:, column + 1] = amplitude.real, -amplitude.imag
+        return solved
+
+
+def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
+    """Factorisation of the rows and columns of `pairs`; singular matrices give infinities, not errors."""
+    rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+    n_harmonics = tangent.joint.basis.n_harmonics
+    n_low = n_harmonics
+    while n_low > 0 and rows.size * (2 * n_low + 1) > DENSE:
+        n_low -= 1
+    low = scipy.linalg.lu_factor(tangent.dense(pairs, n_low), overwrite_a=True, check_finite=False)
+    high = tuple(
+        scipy.linalg.lu_factor(tangent.dense_harmonic(pairs, place), overwrite_a=True, check_finite=False)
+        for place in range(n_low, n_harmonics)
+    )
+    return Factor(pairs, rows, n_low, low, high)
