@@ -23,7 +23,7 @@ from solver.settings import Resolution, all_orders, samples_for
 
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235)  # highest harmonics; "auto" takes all but the last two
 MOST_SAMPLES = 8192
-MOST_UNKNOWNS = 8000  # of a balance that "auto" may ask for: a dense factorisation of it takes half a gigabyte
+MOST_UNKNOWNS = 50_000  # of a balance that "auto" may ask for
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
@@ -88,9 +88,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             here = here.without_even(effort) or here
         resolution = here.case.resolution
         finer = here.solve_at(Resolution(resolution.orders, 2 * resolution.samples), effort)
-        richer = here.solve_at(_higher(resolution, 2), effort)
         by_samples = UNKNOWN if finer is None else here.difference(finer).times(SAMPLES_SAFETY)
-        by_harmonics = UNKNOWN if richer is None else here.difference(richer).times(HARMONICS_SAFETY)
+        by_harmonics = here.harmonics_error(effort)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
             return Refined(here.case, here.point, estimate, True, False)
@@ -100,7 +99,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
         more_harmonics = settings.harmonics == "auto" and by_harmonics.largest > by_samples.largest / 3.0
         wanted = Resolution(
-            _higher(resolution, 1).orders if more_harmonics else resolution.orders,
+            _on_ladder(resolution, 1).orders if more_harmonics else resolution.orders,
             2 * resolution.samples if more_samples else resolution.samples,
         )
         next_level = None
@@ -113,15 +112,13 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
 
 def coarser(case: Case) -> Case:
     """The same case one step down the ladder, for a state that may do with fewer harmonics."""
-    resolution = case.resolution
-    lower = [step for step in LADDER if step < resolution.highest]
-    if not lower or case.settings.harmonics != "auto":
+    if case.settings.harmonics != "auto":
         return case
-    orders = tuple(order for order in resolution.orders if order <= lower[-1])
-    samples = resolution.samples
+    lower = _on_ladder(case.resolution, -1)
+    samples = case.resolution.samples
     if case.settings.samples == "auto":
-        samples = max(samples // 2, samples_for(lower[-1]))
-    return case.at(Resolution(orders, samples))
+        samples = max(samples // 2, samples_for(lower.highest))
+    return case.at(Resolution(lower.orders, samples))
 
 
 def transfer(
@@ -163,6 +160,20 @@ class _Level:
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
 
+    def harmonics_error(self, effort: Effort) -> Estimate:
+        """Estimated error for want of harmonics: the difference to the state two steps up the ladder.
+
+        Where the scene does not hold the nodal diameters of so many, one step; where not even those, the difference to
+        the state one step down, which is larger.
+        """
+        for steps in (2, 1, -1):
+            other = _on_ladder(self.case.resolution, steps)
+            if other != self.case.resolution and self.case.model.holds(other.highest):
+                level = self.solve_at(other, effort)
+                if level is not None:
+                    return self.difference(level).times(HARMONICS_SAFETY)
+        return UNKNOWN
+
     def response(self) -> ComplexArray:
         """First harmonic of the responses (n_response,), m."""
         structure = self.joint.structure
@@ -198,10 +209,13 @@ def _half_wave_symmetric(evaluation: Evaluation) -> bool:
     return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
 
 
-def _higher(resolution: Resolution, steps: int) -> Resolution:
-    """Up the ladder, with samples enough for it; odd harmonics stay odd."""
-    above = [step for step in LADDER if step > resolution.highest]
-    highest = above[steps - 1] if len(above) >= steps else (steps + 1) * resolution.highest
+def _on_ladder(resolution: Resolution, steps: int) -> Resolution:
+    """Up (or with -1 down) the ladder, with samples enough for it; odd harmonics stay odd."""
+    if steps > 0:
+        above = [step for step in LADDER if step > resolution.highest]
+        highest = above[steps - 1] if len(above) >= steps else (steps + 1) * resolution.highest
+    else:
+        highest = max((step for step in LADDER if step < resolution.highest), default=resolution.highest)
     orders = all_orders(highest)
     if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
         orders = orders[::2]
@@ -210,4 +224,6 @@ def _higher(resolution: Resolution, steps: int) -> Resolution:
 
 def _allowed(here: _Level, resolution: Resolution) -> bool:
     unknowns = here.joint.slots.size * (2 * len(resolution.orders) + 1)
+    if not here.case.model.holds(resolution.highest):
+        return False
     return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and unknowns <= MOST_UNKNOWNS

@@ -94,6 +94,11 @@ class ReducedModel:
             return self.linear[self.n_sectors - wrapped], True
         return self.linear[wrapped], False
 
+    def holds(self, n_harmonics: int) -> bool:
+        """Whether the scene has the nodal diameter that each of the harmonics 0..n_harmonics moves in."""
+        wanted = needed_nodal_diameters(self.nodal_diameter, self.n_sectors, n_harmonics)
+        return all(k in self.linear for k in wanted)
+
 
 def needed_nodal_diameters(nodal_diameter: int, n_sectors: int, n_harmonics: int) -> tuple[int, ...]:
     """Folded nodal diameters that the harmonics 0..n_harmonics of a travelling wave see, ascending, each once."""
