@@ -28,7 +28,7 @@ HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 t
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
 SYMMETRIC = 1e-9
-SPARE = 0.1  # of rtol: a state so accurate may try with fewer
+SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,6 @@ class Refined:
     point: PathPoint
     estimate: Estimate
     accurate: bool
-    spare: bool
 
 
 def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoint, effort: Effort) -> Refined:
@@ -83,7 +82,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
                 first = here.solve_at(Resolution((1,), here.case.resolution.samples), effort)
                 here = first or here
-            return Refined(here.case, here.point, NOTHING, True, False)
+            return Refined(here.case, here.point, NOTHING, True)
         if settings.harmonics == "auto":
             here = here.without_even(effort) or here
         resolution = here.case.resolution
@@ -92,10 +91,10 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         by_harmonics = here.harmonics_error(effort)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
-            return Refined(here.case, here.point, estimate, True, False)
+            return Refined(here.case, here.point, estimate, True)
         if estimate.largest <= settings.rtol:
-            spare = settings.harmonics == "auto" and estimate.largest < SPARE * settings.rtol
-            return Refined(here.case, here.point, estimate, True, spare)
+            here, estimate = here.relaxed(estimate, effort)
+            return Refined(here.case, here.point, estimate, True)
         more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
         more_harmonics = settings.harmonics == "auto" and by_harmonics.largest > by_samples.largest / 3.0
         wanted = Resolution(
@@ -106,19 +105,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if wanted != resolution and _allowed(here, wanted):
             next_level = finer if finer is not None and not more_harmonics else here.solve_at(wanted, effort)
         if next_level is None:
-            return Refined(here.case, here.point, estimate, False, False)
+            return Refined(here.case, here.point, estimate, False)
         here = next_level
-
-
-def coarser(case: Case) -> Case:
-    """The same case one step down the ladder, for a state that may do with fewer harmonics."""
-    if case.settings.harmonics != "auto":
-        return case
-    lower = _on_ladder(case.resolution, -1)
-    samples = case.resolution.samples
-    if case.settings.samples == "auto":
-        samples = max(samples // 2, samples_for(lower.highest))
-    return case.at(Resolution(lower.orders, samples))
 
 
 def transfer(
@@ -174,6 +162,23 @@ class _Level:
                     return self.difference(level).times(HARMONICS_SAFETY)
         return UNKNOWN
 
+    def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[_Level, Estimate]:
+        """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.
+
+        Half of rtol is kept, so that the next state does not go up again at once.
+        """
+        here, enough = self, 0.5 * self.case.settings.rtol
+        while estimate.largest <= SPARE * enough:
+            lower = _fewer(here.case)
+            level = here.solve_at(lower, effort) if lower != here.case.resolution else None
+            if level is None:
+                break
+            larger = level.difference(here).times(HARMONICS_SAFETY) + estimate
+            if larger.largest > enough:
+                break
+            here, estimate = level, larger
+        return here, estimate
+
     def response(self) -> ComplexArray:
         """First harmonic of the responses (n_response,), m."""
         structure = self.joint.structure
@@ -220,6 +225,16 @@ def _on_ladder(resolution: Resolution, steps: int) -> Resolution:
     if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
         orders = orders[::2]
     return Resolution(orders, max(resolution.samples, samples_for(highest)))
+
+
+def _fewer(case: Case) -> Resolution:
+    """One step down: harmonics and samples, whichever are automatic."""
+    resolution = case.resolution
+    orders = _on_ladder(resolution, -1).orders if case.settings.harmonics == "auto" else resolution.orders
+    samples = resolution.samples
+    if case.settings.samples == "auto":
+        samples = max(samples // 2, samples_for(orders[-1]))
+    return Resolution(orders, samples)
 
 
 def _allowed(here: _Level, resolution: Resolution) -> bool:

@@ -15,7 +15,7 @@ import scipy.linalg
 from solver.balance import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 
-DENSE = 1700  # unknowns that are factorised together: 48 pairs with five harmonics
+DENSE = 800  # unknowns that are factorised together: 48 pairs with two harmonics
 
 RealFactor = tuple[FloatArray, IntArray]
 ComplexFactor = tuple[ComplexArray, IntArray]
