@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from solver.adapt import UNKNOWN, Refined, refine
 from solver.balance import Balance
 from solver.history import StartState
 from solver.joint import Case, build_case
@@ -46,12 +47,25 @@ def follow_branch(
     started = time.thread_time()
     for index in order:
         spent = line.effort.iterations
-        outcome, point = line.advance(float(omegas[index]), sweep)
+        outcome, refined = line.advance(float(omegas[index]), sweep)
         now = time.thread_time()
-        state = None
-        if point is not None:
-            state = periodic_state(line.case.joint(float(omegas[index]), excitation_amplitude), point)
-        yield int(index), StartState(outcome, state, penalty_omega, line.effort.iterations - spent, now - started)
+        state, estimate = None, UNKNOWN
+        if refined is not None:
+            joint = refined.case.joint(float(omegas[index]), excitation_amplitude)
+            state, estimate = periodic_state(joint, refined.point), refined.estimate
+        yield (
+            int(index),
+            StartState(
+                outcome=outcome,
+                state=state,
+                penalty_omega=penalty_omega,
+                resolution=line.case.resolution,
+                response_error=estimate.response,
+                wear_rate_error=estimate.wear_rate,
+                newton_iterations=line.effort.iterations - spent,
+                run_time=now - started,
+            ),
+        )
         started = now
 
 
@@ -67,19 +81,22 @@ class _Line:
         self.point: PathPoint | None = None
         self.failure = Outcome.START_FAILED
 
-    def advance(self, omega: float, sweep: Sweep) -> tuple[Outcome, PathPoint | None]:
-        """State at the next angular frequency, rad/s."""
+    def advance(self, omega: float, sweep: Sweep) -> tuple[Outcome, Refined | None]:
+        """State at the next angular frequency, rad/s, with the harmonics that it needs."""
         try:
             if self.point is None:
                 self.point = self._first(omega * (1.0 - LEAD_IN if sweep == "up" else 1.0 + LEAD_IN))
             reached = self._next(omega) if self.point is not None else None
             reached = reached or self._first(omega)
+            if reached is None:
+                return self.failure if self.point is None else Outcome.BRANCH_LOST, None
+            refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None
-        if reached is None:
-            return self.failure if self.point is None else Outcome.BRANCH_LOST, None
-        self.point = reached
-        return Outcome.CONVERGED, reached
+        if refined.case is not self.case:
+            self.solver = JacobianSolver()
+        self.case, self.point = refined.case, refined.point
+        return (Outcome.CONVERGED, refined) if refined.accurate else (Outcome.INACCURATE, None)
 
     def _first(self, omega: float) -> PathPoint | None:
         self.failure, found = solve_first_state(

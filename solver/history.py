@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
+from solver.settings import Resolution
 
 
 @dataclass(frozen=True)
@@ -32,13 +33,17 @@ class PeriodicState:
 class StartState:
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
-    penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line.
+    penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line. resolution: harmonics and
+    samples of the state. response_error, wear_rate_error: its estimated relative errors.
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
     """
 
     outcome: Outcome
     state: PeriodicState | None
     penalty_omega: float
+    resolution: Resolution
+    response_error: float
+    wear_rate_error: float
     newton_iterations: int
     run_time: float
 
