@@ -14,6 +14,9 @@ class Outcome(IntEnum):
     BRANCH_LOST = 3
     MARCH_FAILED = 4
     SINGULAR = 5
+    INACCURATE = 6
+    CERTIFICATE_FAILED = 7
+    UNSTABLE = 8
 
     @property
     def meaning(self) -> str:
@@ -34,6 +37,12 @@ _SENTENCES = {
     Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more frequencies or more harmonics.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller"
     " step or more harmonics.",
+    Outcome.INACCURATE: "The estimated error of response or wear rate stays above rtol with as many harmonics as may be"
+    " used: use a larger rtol, or a scene that holds nodal diameters for more harmonics.",
+    Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits:"
+    " use more samples or a smaller tolerance.",
+    Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"
+    " direction, use more frequencies or start elsewhere.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
 }
