@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from solver.model import ComplexArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.settings import Resolution
 
@@ -57,6 +58,13 @@ class WearHistory:
     response_peak (n_output, n_response) m. Output counts that were not reached hold NaN; where the point failed all do.
     jump_cycle: first cycle count at which the branch was lost, NaN if never.
     error_estimate: estimated relative error of the last worn volume.
+    residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,): the
+        certificate of the states, all relative; NaN where not estimated. stable (n_output,): bool.
+    harmonics_used, samples_used (n_output,): int, 0 where there is no state.
+    branch: number of folds that the sweep has jumped over since it began. fold_frequency: Hz, the fold at which the
+        sweep left its branch on the way to this point from the frequency before, NaN if there was none.
+    step_limit: cycles, predicted largest stable explicit step at cycle 0, inf where there is none.
+    oscillates: whether the wear rate oscillated from step to step as an unstable explicit scheme does.
     run_time: CPU seconds of the computing thread, start state included.
     """
 
@@ -74,4 +82,18 @@ class WearHistory:
     error_estimate: float
     newton_iterations: int
     run_time: float
+    residual: FloatArray
+    penetration: FloatArray
+    tension: FloatArray
+    cone_violation: FloatArray
+    energy_error: FloatArray
+    response_error: FloatArray
+    wear_rate_error: FloatArray
+    harmonics_used: IntArray
+    samples_used: IntArray
+    stable: BoolArray
+    branch: int = 0
+    fold_frequency: float = math.nan
+    step_limit: float = math.inf
+    oscillates: bool = False
     message: str = ""

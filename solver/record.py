@@ -74,6 +74,7 @@ class Recorder:
         self, outcome: Outcome, jump_cycle: float, error: float, iterations: int, run_time: float
     ) -> WearHistory:
         kept = self._kept
+        unknown, n_output = np.full(self.cycles.size, np.nan), self.cycles.size
         return WearHistory(
             outcome=outcome,
             cycles=self.cycles,
@@ -89,4 +90,14 @@ class Recorder:
             error_estimate=error,
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
+            residual=unknown,
+            penetration=unknown,
+            tension=unknown,
+            cone_violation=unknown,
+            energy_error=unknown,
+            response_error=unknown,
+            wear_rate_error=unknown,
+            harmonics_used=np.zeros(n_output, dtype=np.int64),
+            samples_used=np.zeros(n_output, dtype=np.int64),
+            stable=np.ones(n_output, dtype=np.bool_),
         )

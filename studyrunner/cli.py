@@ -219,6 +219,7 @@ def _compute(ranks: Ranks, study: Study, output: Path | None) -> int:
     )
     for line in summary.failures:
         print(f"  {line}")
+    print(summary.certificates)
     return SOME_FAILED if failed else CONVERGED
 
 

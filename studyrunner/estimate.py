@@ -15,6 +15,9 @@ ITERATIONS_A_STATE = 20
 ITERATIONS_A_STEP = 3
 """For one step on the slow time scale, explicit or implicit (measured: 2 to 4 where the joint slips)."""
 
+AUTOMATIC_HARMONICS = 5
+"""That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
+
 COMPILE_SECONDS = 15
 """For the kernels of the solver, once on a machine."""
 

@@ -16,8 +16,6 @@ from solver.settings import SolverSettings
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask, Settings
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Ending:
@@ -98,24 +96,34 @@ def build_result(task: MarchTask, history: WearHistory) -> MarchResult:
         rows = np.zeros(len(task.cycles), dtype=np.int64)
     else:
         rows = np.arange(len(history.cycles) - len(task.cycles), len(history.cycles))
+    failed = history.outcome is not Outcome.CONVERGED
     return MarchResult(
         points=task.points,
         outcome=int(history.outcome),
-        values={name: _variable(history, name)[rows] for name in task.variables},
+        values={name: _variable(history, name, failed)[rows] for name in task.variables},
         jump_cycle=history.jump_cycle,
         error_estimate=history.error_estimate,
         newton_iterations=history.newton_iterations,
         run_time=history.run_time,
+        branch=history.branch,
+        fold_frequency=history.fold_frequency,
+        step_limit=history.step_limit,
+        oscillates=history.oscillates,
     )
 
 
-def _variable(history: WearHistory, name: str) -> FloatArray:
-    """A variable of the result, its first dimension the output counts of the history."""
+def _variable(history: WearHistory, name: str, failed: bool) -> NDArray[np.generic]:
+    """A variable of the result, its first dimension the output counts of the history; empty of all where it failed."""
+    values: NDArray[np.generic]
     if name == "response_amplitude":
-        return np.abs(history.response)
-    if name == "response_phase":
-        return np.angle(history.response)
-    return cast("FloatArray", getattr(history, name))
+        values = np.abs(history.response)
+    elif name == "response_phase":
+        values = np.angle(history.response)
+    else:
+        values = getattr(history, name)
+    if failed:
+        return np.full_like(values, np.nan if values.dtype.kind == "f" else 0)
+    return values
 
 
 def _moves(start: StartState) -> bool:
@@ -127,7 +135,8 @@ def _moves(start: StartState) -> bool:
 
 
 def _solver_settings(settings: Settings) -> SolverSettings:
-    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance)
+    # "auto" goes through as it is: the solver has to know it.
+    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol)
 
 
 def describe_failures(outcomes: Sequence[int]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.certificates import summarise_certificates
 from studyrunner.evaluate import endings
 from studyrunner.output import partial_path
 from studyrunner.results import MarchResult
@@ -20,7 +21,6 @@ from studyrunner.study import Study
 from studyrunner.study_file import format_study
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
-_TYPES = {"outcome": np.int8, "newton_iterations": np.int32}
 _PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
 
 
@@ -33,12 +33,11 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult
     shape = tuple(len(values) for values in axes.values())
     sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
     asked = [name for name in ASKED if name in study.outputs.variables]
-    arrays: dict[str, NDArray[np.generic]] = {
-        name: np.full(shape + tuple(sizes[dimension] for dimension in ASKED[name].dimensions), np.nan) for name in asked
+    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
+    arrays = {
+        name: np.zeros(shape + tuple(sizes[dimension] for dimension in entry.dimensions), dtype=entry.dtype)
+        for name, entry in variables.items()
     }
-    for name in KEPT:
-        dtype = _TYPES.get(name, np.float64)
-        arrays[name] = np.full(shape, np.nan) if dtype is np.float64 else np.zeros(shape, dtype=dtype)
     filled = np.zeros(shape, dtype=np.int64)
     for result in results:
         for point in result.points:
@@ -49,11 +48,10 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult
                 arrays[name][point] = getattr(result, name)
     if not np.all(filled == 1):
         raise ValueError(f"{np.count_nonzero(filled != 1)} points were not computed exactly once")
-    variables = {**ASKED, **KEPT}
     dataset = xr.Dataset(
         {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
         coords=_coordinates(study, facts),
-        attrs=_attributes(study, facts),
+        attrs={**_attributes(study, facts), "certificate_summary": summarise_certificates(study, results)},
     )
     for name in map(str, dataset.variables):
         entry = COORDINATES.get(name) or variables[name]
@@ -63,6 +61,11 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult
             "long_name": entry.long_name,
             "coverage_content_type": content,
         }
+        if entry.flags:
+            dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
+            dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
+        if name in asked and not entry.dtype.startswith("float"):
+            dataset[name].attrs["comment"] = "0 where the point failed, see outcome"
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
@@ -100,8 +103,9 @@ def _coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArra
 
 
 def _labels(values: Sequence[object]) -> NDArray[np.generic]:
-    """Values of an axis; whole numbers in 32 bits, which every reader of NetCDF knows."""
-    array = np.array(values)
+    """Values of an axis: whole numbers in 32 bits, which every reader of NetCDF knows; all text where one is."""
+    texts = any(isinstance(value, str) for value in values)
+    array = np.array([str(value) for value in values] if texts else values)
     return array.astype(np.int32) if array.dtype.kind == "i" else array
 
 

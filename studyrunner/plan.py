@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 
-from studyrunner.estimate import COMPILE_SECONDS, ITERATIONS_A_STEP, memory_a_rank, seconds_an_iteration
+from studyrunner.estimate import (
+    AUTOMATIC_HARMONICS,
+    COMPILE_SECONDS,
+    ITERATIONS_A_STEP,
+    memory_a_rank,
+    seconds_an_iteration,
+)
 from studyrunner.progress import count, format_seconds
 from studyrunner.scene import SceneFacts
-from studyrunner.study import Study
+from studyrunner.study import AUTO, Study
 from studyrunner.tasks import TaskPlan
 from studyrunner.variables import ASKED, KEPT
 
@@ -37,7 +43,8 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
             f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept",
         ),
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
-        ("unknowns", f"{plan.n_unknowns} at most in one task"),
+        ("solver", _solver(study, facts)),
+        ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
         (
             "time",
@@ -47,6 +54,25 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {text}" for label, text in rows)
+
+
+def _solver(study: Study, facts: SceneFacts) -> str:
+    """How finely and how exactly, and how far automatic harmonics can go in this scene."""
+    values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
+    if AUTO in (*study.harmonics, *study.samples):
+        values["rtol"] = study.rtol
+    shown = [f"{key} {' or '.join(map(_setting, items))}" for key, items in values.items()]
+    if AUTO in study.harmonics and facts.largest_harmonics is not None:
+        shown[0] += f" (at most {facts.largest_harmonics}, for which the scene holds the nodal diameters)"
+    return ", ".join(shown)
+
+
+def _setting(value: float | str) -> str:
+    return "automatic" if value == AUTO else f"{value:g}"
+
+
+def _if_automatic(study: Study) -> str:
+    return f", with {AUTOMATIC_HARMONICS} for automatic harmonics" if AUTO in study.harmonics else ""
 
 
 def _on_two(plan: TaskPlan) -> str:

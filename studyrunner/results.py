@@ -28,13 +28,19 @@ class StartResult:
 class MarchResult:
     """History of the points of one task.
 
-    values: variable -> array with the dimensions of that variable after the axes; NaN where there is no result.
+    values: variable -> array with the dimensions of that variable after the axes; NaN, or 0 where the variable is a
+        whole number, where there is no result.
+    The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
     """
 
     points: tuple[Index, ...]
     outcome: int
-    values: Mapping[str, NDArray[np.float64]]
+    values: Mapping[str, NDArray[np.generic]]
     jump_cycle: float
     error_estimate: float
     newton_iterations: int
     run_time: float
+    branch: int
+    fold_frequency: float
+    step_limit: float
+    oscillates: bool

@@ -35,11 +35,12 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. failures: a line for each way in which points failed."""
+    """How a run ended. failures: a line for each way in which points failed. certificates: the table of the worst."""
 
     n_points: int
     n_converged: int
     failures: tuple[str, ...]
+    certificates: str
 
 
 def run_study(ranks: Ranks, study: Study, model: ReducedModel, path: Path, progress: RunProgress) -> RunSummary:
@@ -54,9 +55,12 @@ def run_study(ranks: Ranks, study: Study, model: ReducedModel, path: Path, progr
     # xarray takes most of a second to load: on rank 0 only, and after the other ranks have got their last task.
     from studyrunner.gather import build_dataset, write_dataset
 
-    write_dataset(build_dataset(study, facts, results), path)
+    dataset = build_dataset(study, facts, results)
+    write_dataset(dataset, path)
     outcomes = [result.outcome for result in results for _ in result.points]
-    return RunSummary(plan.n_points, outcomes.count(CONVERGED), describe_failures(outcomes))
+    return RunSummary(
+        plan.n_points, outcomes.count(CONVERGED), describe_failures(outcomes), dataset.attrs["certificate_summary"]
+    )
 
 
 def work_on_job(ranks: Ranks, job: Job) -> None:

@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 
 from studies.scene_error import SceneError
 from studies.scenes import build_scene
-from studyrunner.study import Study
+from studyrunner.study import AUTO, Study
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+
+
+AUTOMATIC_HARMONICS_OF_A_WAVE = 13
+"""Harmonics whose nodal diameters a bundled cyclic scene is built with where their number is automatic."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,7 @@ class SceneFacts:
     n_displacements: relative displacements of all pairs, the unknowns of one harmonic coefficient.
     position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
     digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
+    largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
     """
 
     n_displacements: int
@@ -35,22 +40,26 @@ class SceneFacts:
     surface: tuple[str, ...]
     response_names: tuple[str, ...]
     digest: str
+    largest_harmonics: int | None = None
 
 
 def build_study_scene(study: Study) -> ReducedModel:
-    """Reduced model of the study's scene, for the largest number of harmonics in the study.
+    """Reduced model of the study's scene, for the largest number of harmonics that the study gives.
 
+    Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
+    may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
     Raises UserError where the parameters or the scene file are wrong.
     """
-    n_harmonics = int(max(study.solver_values("harmonics")))
+    given = max(study.given_harmonics, default=1)
+    built = max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
     place, prefix = (str(study.scene_path), "") if study.scene.is_file else (study.source, "scene.")
     try:
         if not study.scene.is_file:
-            return build_scene(study.scene.model, study.scene.parameters, n_harmonics)
+            return build_scene(study.scene.model, study.scene.parameters, built)
         # h5py is loaded for scene files only: the bundled scenes do without it.
         from studies.scene_file import read_scene
 
-        return read_scene(study.scene_path, n_harmonics)
+        return read_scene(study.scene_path, given)
     except SceneError as error:
         raise UserError(place, prefix + error.key, Verbatim(error.value), error.remedy) from None
     except OSError as error:
@@ -74,7 +83,19 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         surface=contact.surface,
         response_names=model.response_names,
         digest=_digest(model),
+        largest_harmonics=largest_harmonics(model),
     )
+
+
+def largest_harmonics(model: ReducedModel) -> int | None:
+    """Most harmonics for which the model holds all nodal diameters; None where any number can be used."""
+    # After n_sectors harmonics the nodal diameters come again.
+    for harmonic in range(1, model.n_sectors):
+        try:
+            model.harmonic_structure(harmonic)
+        except KeyError:
+            return harmonic - 1
+    return None
 
 
 def _digest(model: ReducedModel) -> str:

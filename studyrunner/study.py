@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
     axis_of,
+    number_or,
     one_of,
     read_fraction,
     read_not_negative,
@@ -22,21 +23,24 @@ from studyrunner.values import (
 )
 from studyrunner.variables import ASKED, KEPT
 
-SOLVER_AXES = ("harmonics", "samples", "tolerance")
+Automatic = Literal["auto"]
+AUTO: Final = "auto"
+"""In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
+
+SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 
-_AUTO = 'give a number: "auto" is not part of this version'
-_read_harmonics = refuse_later("auto", _AUTO, whole_number(1))
-_read_samples = refuse_later("auto", _AUTO, whole_number(4))
+_read_harmonics = number_or(AUTO, whole_number(1))
+_read_samples = number_or(AUTO, whole_number(4))
 _read_scheme = refuse_later(
     "adaptive", 'give "implicit" or "explicit": "adaptive" is not part of this version', one_of("explicit", "implicit")
 )
 
 PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
 NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
-HarmonicsAxis = Annotated[tuple[int, ...], BeforeValidator(axis_of(_read_harmonics))]
-SamplesAxis = Annotated[tuple[int, ...], BeforeValidator(axis_of(_read_samples))]
-ToleranceAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
+HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_harmonics))]
+SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
+FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
 Scheme = Literal["explicit", "implicit"]
 Sweep = Literal["up", "down"]
 
@@ -110,7 +114,8 @@ class AxesSection(Section):
     )
     harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
     samples: SamplesAxis | None = Field(None, description="time samples in a period")
-    tolerance: ToleranceAxis | None = Field(None, description="of the scaled residual")
+    tolerance: FractionAxis | None = Field(None, description="of the scaled residual")
+    rtol: FractionAxis | None = Field(None, description="relative error that automatic settings aim at")
 
 
 class SlowTimeSection(Section):
@@ -130,8 +135,12 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: how finely and how exactly. A key that stands under [axes] is not used from here."""
 
-    harmonics: Annotated[int, BeforeValidator(_read_harmonics)] = Field(5, description="harmonics above the static one")
-    samples: Annotated[int, BeforeValidator(_read_samples)] = Field(128, description="time samples in a period")
+    harmonics: Annotated[int | Automatic, BeforeValidator(_read_harmonics)] = Field(
+        AUTO, description="harmonics above the static one"
+    )
+    samples: Annotated[int | Automatic, BeforeValidator(_read_samples)] = Field(
+        AUTO, description="time samples in a period"
+    )
     tolerance: Annotated[float, BeforeValidator(read_fraction)] = Field(1e-8, description="of the scaled residual")
     rtol: Annotated[float, BeforeValidator(read_fraction)] = Field(
         1e-2, description="relative error that automatic settings aim at"
@@ -187,14 +196,12 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _check_samples(self) -> Study:
-        most, fewest = max(self.solver_values("harmonics")), min(self.solver_values("samples"))
-        if fewest <= 2 * most:
+        most, given = max(self.given_harmonics, default=0), [n for n in self.samples if n != AUTO]
+        fewest = min(given, default=None)
+        if fewest is not None and fewest <= 2 * most:
             table = "solver" if self.axes.samples is None else "axes"
-            raise WrongValueError(
-                int(fewest),
-                f"give more than twice the {int(most)} harmonics, at least {2 * int(most) + 1}",
-                f"{table}.samples",
-            )
+            remedy = f"give more than twice the {most} harmonics, at least {2 * most + 1}"
+            raise WrongValueError(fewest, remedy, f"{table}.samples")
         return self
 
     @model_validator(mode="after")
@@ -234,13 +241,33 @@ class Study(Section):
             return (0.0,)
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
 
-    def solver_values(self, key: str) -> tuple[float, ...]:
-        """Values of a solver key, from its axis or the one under [solver]."""
-        values: tuple[float, ...] | None = getattr(self.axes, key)
-        return (getattr(self.solver, key),) if values is None else values
+    @property
+    def harmonics(self) -> tuple[int | Automatic, ...]:
+        """Values of `harmonics`, from its axis or the one under [solver]; so for the other solver keys."""
+        return (self.solver.harmonics,) if self.axes.harmonics is None else self.axes.harmonics
 
     @property
-    def dimensions(self) -> Mapping[str, tuple[float, ...] | tuple[str, ...]]:
+    def samples(self) -> tuple[int | Automatic, ...]:
+        """Values of `samples`."""
+        return (self.solver.samples,) if self.axes.samples is None else self.axes.samples
+
+    @property
+    def tolerance(self) -> tuple[float, ...]:
+        """Values of `tolerance`."""
+        return (self.solver.tolerance,) if self.axes.tolerance is None else self.axes.tolerance
+
+    @property
+    def rtol(self) -> tuple[float, ...]:
+        """Values of `rtol`."""
+        return (self.solver.rtol,) if self.axes.rtol is None else self.axes.rtol
+
+    @property
+    def given_harmonics(self) -> tuple[int, ...]:
+        """The values of `harmonics` that are numbers."""
+        return tuple(number for number in self.harmonics if number != AUTO)
+
+    @property
+    def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Name and values of the axes of the result, in its order; solver keys only where they are axes."""
         names = (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
         return {name: getattr(self.axes, name) for name in names}

@@ -7,19 +7,29 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from studyrunner.estimate import ITERATIONS_A_STATE, ITERATIONS_A_STEP, ITERATIONS_AT_FIRST, seconds_an_iteration
-from studyrunner.study import SOLVER_AXES, Study
+from studyrunner.estimate import (
+    AUTOMATIC_HARMONICS,
+    ITERATIONS_A_STATE,
+    ITERATIONS_A_STEP,
+    ITERATIONS_AT_FIRST,
+    seconds_an_iteration,
+)
+from studyrunner.study import AUTO, SOLVER_AXES, Automatic, Study
+from studyrunner.variables import ASKED, CERTIFICATE
 
 Index = tuple[int, ...]
+
+_FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
 
 
 @dataclass(frozen=True)
 class Settings:
     """Solver keys of a task."""
 
-    harmonics: int
-    samples: int
+    harmonics: int | Automatic
+    samples: int | Automatic
     tolerance: float
+    rtol: float
 
 
 @dataclass(frozen=True)
@@ -47,9 +57,10 @@ class MarchTask:
     """One wear history from a start state on a branch.
 
     branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
-    cycle 0 holds for all cycles; wear_coefficient, step and scheme are then those of the first point.
+    cycle 0 holds for all cycles; step and scheme are then those of the first point.
     cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
-    variables: what is kept. cost: estimated seconds, as if it wears until the start state says that nothing moves.
+    variables: what is handed back. cost: estimated seconds, as if it wears until the start state says that nothing
+        moves.
     start: start state, None until its branch has reached it.
     """
 
@@ -83,7 +94,11 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class TaskPlan:
-    """All tasks of a study. marches: for each branch, the tasks that start from it. n_unknowns: in the largest task."""
+    """All tasks of a study.
+
+    marches: for each branch, the tasks that start from it. n_unknowns: in the largest task; an estimate where the
+    number of harmonics is automatic.
+    """
 
     branches: tuple[BranchTask, ...]
     marches: tuple[tuple[MarchTask, ...], ...]
@@ -99,7 +114,7 @@ class TaskPlan:
 
 
 _HELD_FOR = {
-    "cycles": "slow_time.cycles = 0 asks for the unworn states, the same for every wear coefficient, step and scheme",
+    "cycles": "slow_time.cycles = 0 asks for the unworn states, the same for every step and scheme",
     "wear_coefficient": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
     "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
 }
@@ -118,7 +133,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
     counts = dict.fromkeys(_HELD_FOR, 0)
     for line in _lines(study):
         settings = _settings(study, line)
-        seconds = seconds_an_iteration(n_displacements * (2 * settings.harmonics + 1))
+        seconds = seconds_an_iteration(_unknowns(n_displacements, settings.harmonics))
         branches.append(
             BranchTask(
                 number=len(branches),
@@ -136,28 +151,30 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
                 for task in _marches(study, (len(marches), position), place, line, seconds, counts)
             )
         )
-    most_harmonics = int(max(study.solver_values("harmonics")))
     return TaskPlan(
         branches=tuple(branches),
         marches=tuple(marches),
         left_out=tuple(LeftOut(count, _HELD_FOR[cause]) for cause, count in counts.items() if count),
         n_points=math.prod(sizes),
-        n_unknowns=n_displacements * (2 * most_harmonics + 1),
+        n_unknowns=max(_unknowns(n_displacements, harmonics) for harmonics in study.harmonics),
     )
 
 
 def _lines(study: Study) -> Iterator[Index]:
     """Indices of excitation amplitude, sweep and solver keys: what a branch along the frequency is followed for."""
-    solver = [len(study.solver_values(key)) for key in SOLVER_AXES]
+    solver = [len(values) for values in (study.harmonics, study.samples, study.tolerance, study.rtol)]
     sizes = (len(study.axes.excitation_amplitude), len(study.axes.sweep), *solver)
     return itertools.product(*(range(size) for size in sizes))
 
 
 def _settings(study: Study, line: Index) -> Settings:
-    harmonics, samples, tolerance = (
-        study.solver_values(key)[place] for key, place in zip(SOLVER_AXES, line[2:], strict=True)
-    )
-    return Settings(int(harmonics), int(samples), float(tolerance))
+    harmonics, samples, tolerance, rtol = line[2:]
+    return Settings(study.harmonics[harmonics], study.samples[samples], study.tolerance[tolerance], study.rtol[rtol])
+
+
+def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
+    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
+    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
 
 
 def _marches(
@@ -172,9 +189,9 @@ def _marches(
         cause: str | None = None
         key: tuple[object, ...] = (wear, step, scheme)
         if slow_time.cycles == 0.0:
-            cause, key = "cycles", ("held",)
+            cause, key = "cycles", ("held", wear)
         elif axes.wear_coefficient[wear] == 0.0:
-            cause, key = "wear_coefficient", ("held",)
+            cause, key = "wear_coefficient", ("held", wear)
         elif slow_time.largest_depth is not None and axes.scheme[scheme] == "explicit":
             cause, key = "largest_depth", (wear, "explicit")
         if key in shared and cause is not None:
@@ -183,7 +200,7 @@ def _marches(
     tasks = []
     for key, members in shared.items():
         wear, step, scheme = members[0]
-        held = key == ("held",)
+        held = key[0] == "held"
         n_steps = 1 if held else math.ceil(study.cycles_kept[-1] / axes.step[step])
         tasks.append(
             MarchTask(
@@ -197,7 +214,7 @@ def _marches(
                 held=held,
                 cycles=study.cycles_kept,
                 points=tuple(_point(study, frequency, line, member) for member in members),
-                variables=study.outputs.variables,
+                variables=tuple(name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE),
                 cost=seconds * ITERATIONS_A_STEP * n_steps,
             )
         )

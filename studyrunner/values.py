@@ -86,6 +86,20 @@ def refuse_later(word: str, remedy: str, read: Callable[[object], T]) -> Callabl
     return read_or_refuse
 
 
+def number_or(word: str, read: Callable[[object], T]) -> Callable[[object], T | str]:
+    """`read`, or the word that stands in place of a number."""
+
+    def read_or_word(value: object) -> T | str:
+        if value == word:
+            return word
+        try:
+            return read(value)
+        except WrongValueError as error:
+            raise WrongValueError(error.value, f'{error.remedy}, or "{word}"') from None
+
+    return read_or_word
+
+
 def axis_of(read: Callable[[object], T]) -> Callable[[object], tuple[T, ...]]:
     """Check for an axis: one value, a list of them or {start, stop, num}, at least one value and each once.
 

@@ -7,11 +7,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of the result: its dimensions after the axes, its unit and what it means."""
+    """One variable of the result: its dimensions after the axes, its unit and what it means.
+
+    dtype: of numpy. Floating numbers are NaN where a point failed, whole ones 0. flags: what the values 0, 1, ... mean,
+    one word each.
+    """
 
     dimensions: tuple[str, ...]
     units: str
     long_name: str
+    dtype: str = "float64"
+    flags: tuple[str, ...] = ()
 
 
 ASKED = {
@@ -24,15 +30,50 @@ ASKED = {
     "response_peak": Variable(("cycle", "response"), "m", "largest magnitude of the response over a period"),
     "slip_range": Variable(("cycle", "contact"), "m", "range of the slip over a period"),
     "open_fraction": Variable(("cycle", "contact"), "1", "fraction of the period in which the pair is open"),
+    "residual": Variable(("cycle",), "1", "scaled residual of the harmonic balance"),
+    "penetration": Variable(("cycle",), "1", "largest penetration over the largest relative motion"),
+    "tension": Variable(("cycle",), "1", "largest tension over the largest normal force"),
+    "cone_violation": Variable(
+        ("cycle",), "1", "largest excess of a tangential force over its friction limit, over the largest friction limit"
+    ),
+    "energy_error": Variable(
+        ("cycle",), "1", "imbalance of energy in a period over the work of the excitation, or of the contact if less"
+    ),
+    "response_error": Variable(("cycle",), "1", "estimated relative truncation error of the response"),
+    "wear_rate_error": Variable(("cycle",), "1", "estimated relative truncation error of the wear rate"),
+    "harmonics_used": Variable(("cycle",), "1", "harmonics above the static one in the state", "int32"),
+    "samples_used": Variable(("cycle",), "1", "time samples in a period of the state", "int32"),
+    "stable": Variable(("cycle",), "1", "whether the state is stable", "int8", ("unstable", "stable")),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
 
+CERTIFICATE = {
+    "residual": "scaled residual",
+    "penetration": "penetration",
+    "tension": "tension",
+    "cone_violation": "violation of the friction cone",
+    "energy_error": "energy balance error",
+    "response_error": "estimated error of the response",
+    "wear_rate_error": "estimated error of the wear rate",
+}
+"""Those of them that say how right a state is, none of them negative and 0 the best: what a short table calls them."""
+
 KEPT = {
-    "outcome": Variable((), "1", "how the computation of the point ended"),
+    "outcome": Variable((), "1", "how the computation of the point ended", "int8"),
     "jump_cycle": Variable((), "1", "first cycle count at which the branch was lost"),
-    "newton_iterations": Variable((), "1", "Newton iterations of the point, start state included"),
+    "newton_iterations": Variable((), "1", "Newton iterations of the point, start state included", "int32"),
     "run_time": Variable((), "s", "CPU time of the computing thread, start state included"),
     "error_estimate": Variable((), "1", "estimated relative error of the last worn volume"),
+    "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
+    "fold_frequency": Variable((), "Hz", "fold at which the sweep left its branch on the way to this frequency"),
+    "step_limit": Variable((), "1", "predicted largest stable step of the explicit scheme at cycle 0, cycles"),
+    "oscillates": Variable(
+        (),
+        "1",
+        "whether the wear rate oscillates from step to step, as in an unstable explicit scheme",
+        "int8",
+        ("steady", "oscillating"),
+    ),
 }
 """Those that every result holds."""
 
@@ -46,6 +87,7 @@ COORDINATES = {
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
+    "rtol": Variable((), "1", "relative error that automatic settings aim at"),
     "cycle": Variable((), "1", "number of vibration cycles"),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),

@@ -46,16 +46,18 @@ def start(
 
 
 def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
-    results = {}
+    results, tables = {}, set()
     for n_ranks in (0, 1, 2, 4):
         done = start(n_ranks, [FAKED, *GRID, "-o", f"{n_ranks}.nc"], tmp_path)
         assert done.returncode == 0, done.stderr
-        (summary,) = done.stdout.splitlines()
+        summary, *table = done.stdout.splitlines()
+        tables.add("\n".join(table))
         assert summary.startswith(f"{n_ranks}.nc: 208 points, 208 computed to tolerance, 0 failed")
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results[n_ranks] = result.load().drop_vars("run_time")
     for n_ranks in (1, 2, 4):
         xr.testing.assert_identical(results[n_ranks], results[0])
+    assert tables == {results[0].attrs["certificate_summary"]}
 
 
 def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,7 +36,8 @@ def fake_evaluate(
 
 def fake_branch(task: BranchTask) -> Iterator[StartResult]:
     """Start states in the order of the sweep."""
-    settings = (task.settings.harmonics, task.settings.samples, task.settings.tolerance)
+    given = (task.settings.harmonics, task.settings.samples, task.settings.tolerance, task.settings.rtol)
+    settings = tuple(0.5 if value == "auto" else value for value in given)
     places = list(enumerate(task.frequencies))
     for position, frequency in places if task.sweep == "up" else reversed(places):
         start = (frequency, task.excitation_amplitude, task.sweep == "up", *settings)
@@ -45,16 +47,39 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0) -> MarchResult:
     """A history whose values tell the task."""
     assert isinstance(task.start, tuple)
-    fingerprint = float(np.dot(task.start, [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0]))
+    fingerprint = float(np.dot(task.start, [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
     fingerprint += task.wear_coefficient * 1e9 + task.step * 1e-4 + 0.5 * (task.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
-    values = {}
+    values: dict[str, np.ndarray] = {}
     for name in task.variables:
         shape = (len(task.cycles), *(sizes[dimension] for dimension in ASKED[name].dimensions[1:]))
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
-    return MarchResult(task.points, 0, values, np.nan, 0.01, round(fingerprint), pause)
+        if ASKED[name].flags:
+            values[name] = values[name] >= 0.0
+        values[name] = values[name].astype(ASKED[name].dtype)
+    return MarchResult(
+        points=task.points,
+        outcome=0,
+        values=values,
+        jump_cycle=np.nan,
+        error_estimate=0.01,
+        newton_iterations=round(fingerprint),
+        run_time=pause,
+        branch=0,
+        fold_frequency=np.nan,
+        step_limit=np.inf,
+        oscillates=False,
+    )
+
+
+def without_values(result: MarchResult, outcome: int) -> MarchResult:
+    """The result as it is where the point failed: NaN, or 0 where the variable is a whole number."""
+    values = {
+        name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0) for name, array in result.values.items()
+    }
+    return replace(result, outcome=outcome, values=values)
 
 
 def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:

@@ -18,6 +18,8 @@ model = "sdof_slider"
 frequency = [150.0]
 [slow_time]
 cycles = 0
+[solver]
+harmonics = 5
 """
 
 WRONG_KEYS = {
@@ -44,14 +46,19 @@ WRONG_KEYS = {
     "huge range": ("axes.frequency={start = 1, stop = 2, num = 1e9}", "axes.frequency", "1000000000.0", "at most"),
     "unknown word": ("axes.scheme=euler", "axes.scheme", '"euler"', "explicit"),
     "adaptive": ("axes.scheme=adaptive", "axes.scheme", '"adaptive"', "implicit"),
-    "automatic harmonics": ("solver.harmonics=auto", "solver.harmonics", '"auto"', "number"),
-    "automatic samples": ("solver.samples=auto", "solver.samples", '"auto"', "number"),
+    "word for harmonics": ("solver.harmonics=automatic", "solver.harmonics", '"automatic"', 'or "auto"'),
+    "word for samples": ("solver.samples=many", "solver.samples", '"many"', 'or "auto"'),
+    "word for the tolerance": ("solver.tolerance=auto", "solver.tolerance", '"auto"', "number"),
+    "word for rtol": ("axes.rtol=['auto']", "axes.rtol", '"auto"', "number"),
+    "automatic in quotes twice": ("axes.harmonics=['auto', 3, 'auto']", "axes.harmonics", '"auto"', "once"),
     "half a harmonic": ("solver.harmonics=1.5", "solver.harmonics", "1.5", "whole"),
     "no harmonic": ("solver.harmonics=0", "solver.harmonics", "0", "at least 1"),
     "too few samples": ("solver.samples=10", "solver.samples", "10", "at least 11"),
     "too few samples on an axis": ("axes.samples=[8, 64]", "axes.samples", "8", "at least 11"),
+    "too few samples beside automatic ones": ("axes.samples=['auto', 10]", "axes.samples", "10", "at least 11"),
     "tolerance 0": ("solver.tolerance=0", "solver.tolerance", "0", "between 0 and 1"),
     "rtol": ("solver.rtol=2", "solver.rtol", "2", "between 0 and 1"),
+    "rtol 0": ("axes.rtol=[0, 0.1]", "axes.rtol", "0", "between 0 and 1"),
     "step 0": ("axes.step=0.0", "axes.step", "0.0", "above 0"),
     "negative cycles": ("slow_time.cycles=-1", "slow_time.cycles", "-1", "0 or more"),
     "descending outputs": ("slow_time.outputs=[2, 1]", "slow_time.outputs", "[2, 1]", "ascending"),
@@ -118,7 +125,7 @@ def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.Captur
 
 
 def test_solver_key_given_twice(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[solver]\nharmonics = 5\n[slow_time]")
+    text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[slow_time]")
     (folder / "s.toml").write_text(text, encoding="utf-8")
     line = line_of(["s.toml"], capsys)
     assert "solver.harmonics = 5" in line

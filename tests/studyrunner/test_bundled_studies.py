@@ -20,16 +20,28 @@ SMALL = {
         "solver.harmonics=3",
         "solver.samples=64",
     ],
+    "extremes": [
+        "axes.frequency=212.86",
+        "axes.wear_coefficient=[1.1e-14, 1.1e-7]",
+        "axes.step=[5, 1000]",
+        "slow_time.cycles=20",
+        "slow_time.outputs=3",
+        "solver.harmonics=3",
+        "solver.samples=64",
+    ],
     "sdof_slider": ["axes.frequency=160.0", "slow_time.cycles=4000", "slow_time.outputs=5"],
     "two_masses": ["axes.frequency=0.0954929658551372"],
     "vibro_impact": ["axes.frequency=[0.17, 0.19, 0.21, 0.22]"],
 }
 
 
+MAY_FAIL = ("extremes",)
+
+
 def run_small(name: str, folder: Path) -> xr.Dataset:
     path = folder / f"{name}.nc"
     changes = [word for change in SMALL[name] for word in ("--set", change)]
-    assert main([name, *changes, "-o", str(path)]) == 0
+    assert main([name, *changes, "-o", str(path)]) in ((0, 3) if name in MAY_FAIL else (0,))
     with xr.open_dataset(path) as result:
         return result.load()
 
@@ -38,11 +50,26 @@ def test_all_bundled_studies_are_here():
     assert set(bundled_studies()) == set(SMALL)
 
 
-@pytest.mark.parametrize("name", sorted(SMALL))
+@pytest.mark.parametrize("name", sorted(set(SMALL) - set(MAY_FAIL)))
 def test_every_point_of_a_bundled_study_converges(name, tmp_path):
     result = run_small(name, tmp_path)
     assert (result.outcome == 0).all()
     assert np.isfinite(result.response_amplitude).all()
+
+
+def test_every_point_of_the_extremes_is_whole_or_says_why_not(tmp_path):
+    result = run_small("extremes", tmp_path)
+    failed = result.outcome != 0
+    assert not failed.sel(excitation_amplitude=[5e-5, 0.5], wear_coefficient=1.1e-14).any()
+    for name in ("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "slip_range"):
+        values = result[name]
+        others = [dimension for dimension in values.dims if dimension not in result.outcome.dims]
+        assert (values.isnull().all(others) == failed).all(), name
+        assert (values.notnull().all(others) == ~failed).all(), name
+    worn = result.wear_depth.where(~failed, drop=True)
+    assert (worn.isel(cycle=0).fillna(0.0) == 0.0).all()
+    assert (worn.diff("cycle").fillna(0.0) >= 0.0).all()
+    assert (result.harmonics_used.where(failed, 0) == 0).all()
 
 
 def test_the_dovetail_wears_near_its_resonance_only(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from studyrunner.gather import build_dataset, write_dataset
 from studyrunner.results import MarchResult
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts
+from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -60,6 +61,20 @@ CONTRACT = {
     "newton_iterations": ((), "1"),
     "run_time": ((), "s"),
     "error_estimate": ((), "1"),
+    "residual": (("cycle",), "1"),
+    "penetration": (("cycle",), "1"),
+    "tension": (("cycle",), "1"),
+    "cone_violation": (("cycle",), "1"),
+    "energy_error": (("cycle",), "1"),
+    "response_error": (("cycle",), "1"),
+    "wear_rate_error": (("cycle",), "1"),
+    "harmonics_used": (("cycle",), "1"),
+    "samples_used": (("cycle",), "1"),
+    "stable": (("cycle",), "1"),
+    "branch": ((), "1"),
+    "fold_frequency": ((), "Hz"),
+    "step_limit": ((), "1"),
+    "oscillates": ((), "1"),
 }
 
 
@@ -105,6 +120,62 @@ def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
     assert attributes["flag_values"].tolist() == [ending.number for ending in endings()]
     assert attributes["flag_meanings"].split()[0] == "converged"
     assert len(attributes["flag_meanings"].split()) == len(endings())
+
+
+def test_whole_numbers_stay_whole(opened: xr.Dataset) -> None:
+    types = {"harmonics_used": "int32", "samples_used": "int32", "branch": "int32", "newton_iterations": "int32"}
+    for name, dtype in {**types, "stable": "int8", "oscillates": "int8"}.items():
+        assert opened[name].dtype == np.dtype(dtype), name
+        assert "_FillValue" not in opened[name].encoding
+
+
+@pytest.mark.parametrize(("name", "meanings"), [("stable", "unstable stable"), ("oscillates", "steady oscillating")])
+def test_flags(name: str, meanings: str, opened: xr.Dataset) -> None:
+    assert opened[name].attrs["flag_values"].tolist() == [0, 1]
+    assert opened[name].attrs["flag_values"].dtype == opened[name].dtype
+    assert opened[name].attrs["flag_meanings"] == meanings
+
+
+def test_scalars_are_those_of_the_task(tmp_path: Path) -> None:
+    results = fake_results()
+    special = {"branch": 3, "fold_frequency": 155.5, "step_limit": 12.0, "oscillates": True}
+    results[1] = replace(results[1], **special)
+    write_dataset(build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, results), tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        for name, value in special.items():
+            (point,) = results[1].points
+            assert opened[name].values[point] == value
+        assert np.count_nonzero(opened.branch) == np.count_nonzero(opened.oscillates) == 1
+        assert np.isinf(opened.step_limit).sum() == opened.branch.size - 1
+        assert opened.fold_frequency.notnull().sum() == 1
+
+
+def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
+    results = fake_results()
+    results[0] = without_values(results[0], 6)
+    write_dataset(build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, results), tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        (point,) = results[0].points
+        assert opened.outcome.values[point] == 6
+        assert opened.outcome.attrs["flag_meanings"].split()[6:] == ["inaccurate", "certificate_failed", "unstable"]
+        for name, (dimensions, _) in CONTRACT.items():
+            if "cycle" in dimensions:
+                there = opened[name].values[point]
+                assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
+                assert "0 where the point failed" in opened[name].attrs.get("comment", "") or there.dtype.kind == "f"
+        assert opened.stable.sum() == opened.stable.size - 3
+
+
+@pytest.mark.parametrize("harmonics", ["axes.harmonics=auto", "axes.harmonics=[3, 'auto']"])
+def test_automatic_harmonics_on_an_axis_are_labels(harmonics: str, tmp_path: Path) -> None:
+    study = read_study("sdof_slider", (*OVERRIDES, harmonics, "axes.samples=[64, 128]"))
+    plan = build_tasks(study, FACTS.n_displacements)
+    results = [fake_march(task) for branch in plan.branches for task in fake_starts(plan, branch.number)]
+    write_dataset(build_dataset(study, FACTS, results), tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        assert opened.harmonics.values.tolist() == [str(value) for value in study.harmonics]
+        assert opened.samples.dtype == np.int32
+        assert opened.sel(harmonics="auto", samples=64).worn_volume.notnull().all()
 
 
 def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:

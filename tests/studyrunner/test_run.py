@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +11,17 @@ import xarray as xr
 
 from solver.history import WearHistory
 from solver.outcome import Outcome
+from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.evaluate import build_result
+from studyrunner.evaluate import _solver_settings, build_result
 from studyrunner.progress import RunProgress, format_seconds
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
-from tests.studyrunner.fakes import fake_evaluate
+from studyrunner.variables import ASKED
+from tests.studyrunner.fakes import fake_evaluate, without_values
 
 SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axes.scheme=implicit", "-o", "out.nc"]
 
@@ -49,21 +50,22 @@ def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, March
 def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     use_fake(monkeypatch, lambda _, result: result)
     assert main(SMALL) == 0
-    assert capsys.readouterr().out.startswith("out.nc: 3 points, 3 computed to tolerance, 0 failed, ")
+    first, *table = capsys.readouterr().out.splitlines()
+    assert first.startswith("out.nc: 3 points, 3 computed to tolerance, 0 failed, ")
+    with xr.open_dataset("out.nc") as result:
+        assert table == result.attrs["certificate_summary"].splitlines()
 
 
 def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def fail_one(task: MarchTask, result: MarchResult) -> MarchResult:
-        if task.position != 1:
-            return result
-        values = {name: np.full_like(array, np.nan) for name, array in result.values.items()}
-        return replace(result, outcome=int(Outcome.MARCH_FAILED), values=values)
+        return without_values(result, int(Outcome.MARCH_FAILED)) if task.position == 1 else result
 
     use_fake(monkeypatch, fail_one)
     assert main(SMALL) == 3
-    first, second = capsys.readouterr().out.splitlines()
+    first, second, third, *_ = capsys.readouterr().out.splitlines()
     assert "2 computed to tolerance, 1 failed" in first
     assert second.strip() == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    assert third.endswith(" 2 points computed to tolerance")
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
         assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]
@@ -88,7 +90,7 @@ def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.M
     assert main(SMALL) == 0
     assert main([*SMALL[:-2], "--write-scene", "scene.h5"]) == 0
     frequency = "[study]\nname = 'file'\n[axes]\nfrequency = [100, 110, 120]\nexcitation_amplitude = 10\n"
-    slow_time = "[slow_time]\ncycles = 20000\noutputs = 21\n[solver]\nharmonics = 21\nsamples = 256\n"
+    slow_time = "[slow_time]\ncycles = 20000\noutputs = 21\n"
     scene = "[scene]\nmodel = 'scene.h5'\nfriction_coefficient = 0.5\n"
     (folder / "sub").mkdir()
     (folder / "scene.h5").rename(folder / "sub" / "scene.h5")
@@ -99,11 +101,11 @@ def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.M
         assert bundled.attrs["scene_sha256"] == from_file.attrs["scene_sha256"]
 
 
-def history(cycles: list[float]) -> WearHistory:
+def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED) -> WearHistory:
     n = len(cycles)
     line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
     return WearHistory(
-        outcome=Outcome.CONVERGED,
+        outcome=outcome,
         cycles=np.array(cycles),
         worn_volume=line,
         wear_rate=line,
@@ -117,6 +119,20 @@ def history(cycles: list[float]) -> WearHistory:
         error_estimate=0.0,
         newton_iterations=7,
         run_time=0.5,
+        residual=1e-9 * line,
+        penetration=line,
+        tension=line,
+        cone_violation=line,
+        energy_error=line,
+        response_error=line,
+        wear_rate_error=np.full(n, np.nan),
+        harmonics_used=np.arange(n) + 3,
+        samples_used=np.full(n, 64),
+        stable=np.arange(n) < 2,
+        branch=2,
+        fold_frequency=101.5,
+        step_limit=250.0,
+        oscillates=True,
     )
 
 
@@ -135,6 +151,36 @@ def test_without_wear_the_first_state_holds() -> None:
     result = build_result(march_task("axes.wear_coefficient=0", "slow_time.outputs=3"), history([0.0]))
     assert result.values["worn_volume"].tolist() == [0.0, 0.0, 0.0]
     assert result.values["response_amplitude"].tolist() == [[1.0], [1.0], [1.0]]
+
+
+def test_certificates_and_branch_are_those_of_the_history() -> None:
+    result = build_result(march_task("slow_time.outputs=[10, 20]"), history([0.0, 10.0, 20.0]))
+    assert result.values["residual"].tolist() == [1e-9, 2e-9]
+    assert np.isnan(result.values["wear_rate_error"]).all()
+    assert result.values["harmonics_used"].tolist() == [4, 5]
+    assert result.values["stable"].tolist() == [True, False]
+    assert (result.branch, result.fold_frequency, result.step_limit, result.oscillates) == (2, 101.5, 250.0, True)
+
+
+def test_unworn_certificates_hold_for_all_cycles() -> None:
+    result = build_result(march_task("axes.wear_coefficient=0", "slow_time.outputs=3"), history([0.0]))
+    assert result.values["harmonics_used"].tolist() == [3, 3, 3]
+    assert result.values["stable"].tolist() == [True, True, True]
+
+
+def test_a_point_that_failed_holds_no_numbers_whatever_the_solver_got_to() -> None:
+    failed = history([0.0, 1e5], Outcome.CERTIFICATE_FAILED)
+    result = build_result(march_task("slow_time.outputs=2"), failed)
+    assert result.outcome == 7
+    for name, values in result.values.items():
+        empty = np.isnan(values) if ASKED[name].dtype == "float64" else values == 0
+        assert empty.all(), name
+    assert (result.branch, result.fold_frequency, result.newton_iterations) == (2, 101.5, 7)
+
+
+def test_settings_go_to_the_solver_as_they_are() -> None:
+    task = march_task("solver.harmonics=auto", "solver.samples=32", "solver.tolerance=1e-9", "solver.rtol=1e-3")
+    assert _solver_settings(task.settings) == SolverSettings("auto", 32, 1e-9, 1e-3)
 
 
 def test_response_is_amplitude_and_phase() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from studyrunner.study_file import bundled_studies, format_study, read_study
+from studyrunner.variables import ASKED
 
 SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
 
@@ -28,16 +29,22 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
         "scheme": ("implicit",),
         "sweep": ("up",),
     }
-    assert (study.solver.harmonics, study.solver.samples, study.solver.tolerance) == (5, 128, 1e-8)
+    assert study.solver.model_dump() == {"harmonics": "auto", "samples": "auto", "tolerance": 1e-8, "rtol": 1e-2}
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables
-    assert len(study.outputs.variables) == 9
+    assert study.outputs.variables == tuple(ASKED)
 
 
 @pytest.mark.parametrize("name", bundled_studies())
 def test_bundled_studies_are_called_like_their_files(name: str) -> None:
     assert read_study(name).study.name == name
+
+
+@pytest.mark.parametrize("name", bundled_studies())
+def test_bundled_studies_are_automatic(name: str) -> None:
+    solver = read_study(name).solver
+    assert (solver.harmonics, solver.samples, solver.rtol) == ("auto", "auto", 1e-2)
 
 
 def test_range_axis_is_that_of_numpy(tmp_path: Path) -> None:
@@ -66,8 +73,33 @@ def test_override_of_a_part_of_a_range() -> None:
 def test_solver_key_moves_to_the_axes_by_override() -> None:
     study = read_study("dovetail", ["axes.harmonics=[1, 3]", "axes.samples=64"])
     assert list(study.dimensions)[6:] == ["harmonics", "samples"]
-    assert study.solver_values("harmonics") == (1, 3)
-    assert study.solver_values("tolerance") == (1e-8,)
+    assert (study.harmonics, study.samples) == ((1, 3), (64,))
+    assert (study.tolerance, study.rtol) == ((1e-8,), (1e-2,))
+
+
+def test_every_solver_key_can_be_an_axis_in_the_order_of_the_file() -> None:
+    overrides = ["axes.rtol=[1e-3, 1e-2]", "axes.tolerance=1e-9", "axes.samples=['auto', 64]", "axes.harmonics=auto"]
+    study = read_study("dovetail", overrides)
+    assert dict(list(study.dimensions.items())[6:]) == {
+        "harmonics": ("auto",),
+        "samples": ("auto", 64),
+        "tolerance": (1e-9,),
+        "rtol": (1e-3, 1e-2),
+    }
+
+
+@pytest.mark.parametrize("key", ["harmonics", "samples"])
+def test_automatic_by_override_of_a_number(key: str, tmp_path: Path) -> None:
+    path = write(tmp_path, SMALLEST + "[solver]\nharmonics = 3\nsamples = 32\n")
+    assert getattr(read_study(path, [f"solver.{key}=auto"]), key) == ("auto",)
+    assert getattr(read_study(path, [f"axes.{key}=[auto]".replace("auto", "'auto'")]), key) == ("auto",)
+
+
+def test_only_numbers_of_samples_and_harmonics_are_held_against_each_other(tmp_path: Path) -> None:
+    path = write(tmp_path, SMALLEST)
+    assert read_study(path, ["solver.samples=4"]).samples == (4,)
+    assert read_study(path, ["solver.harmonics=100"]).harmonics == (100,)
+    assert read_study(path, ["axes.harmonics=['auto', 5]", "axes.samples=['auto', 11]"]).samples == ("auto", 11)
 
 
 def test_list_of_outputs(tmp_path: Path) -> None:
@@ -79,10 +111,10 @@ def test_no_cycles_keep_cycle_0_only(tmp_path: Path) -> None:
     assert read_study(write(tmp_path, SMALLEST), ["slow_time.cycles=0"]).cycles_kept == (0.0,)
 
 
-def test_effective_study_reads_back_the_same(tmp_path: Path) -> None:
-    study = read_study(
-        "dovetail", ["axes.harmonics=[1, 3]", "study.title='a \\ \"title\" with é'", "slow_time.outputs=[0, 10]"]
-    )
+@pytest.mark.parametrize("harmonics", ["solver.harmonics=3", "axes.harmonics=[1, 3]", "axes.harmonics=['auto', 3]"])
+def test_effective_study_reads_back_the_same(harmonics: str, tmp_path: Path) -> None:
+    overrides = [harmonics, "axes.rtol=[0.1, 0.2]", "study.title='a \\ \"title\" with é'", "slow_time.outputs=[0, 10]"]
+    study = read_study("dovetail", overrides)
     again = read_study(write(tmp_path, format_study(study)))
     assert again.model_dump() == study.model_dump()
     assert format_study(again) == format_study(study)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
+from collections.abc import Sequence
 
 import pytest
 
 from studyrunner.cli import main
+from studyrunner.estimate import AUTOMATIC_HARMONICS
 from studyrunner.results import StartResult
 from studyrunner.run import start_marches
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
-from studyrunner.tasks import TaskPlan, build_tasks
+from studyrunner.tasks import Settings, TaskPlan, build_tasks
+from studyrunner.variables import CERTIFICATE
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -73,12 +76,16 @@ def test_nothing_wears_without_a_wear_coefficient() -> None:
     assert [(item.n_points, item.reason.split(" ")[0]) for item in plan.left_out] == [(3 * 3 * 8, "wear_coefficient")]
 
 
-def test_unworn_states_are_computed_once() -> None:
+def test_unworn_states_are_computed_once_for_each_wear_coefficient() -> None:
+    """Their motion is the same, but not their wear rate."""
     study, plan = plan_of(*GRID, "slow_time.cycles=0")
     assert all(task.held and task.cycles == (0.0,) for line in plan.marches for task in line)
-    assert sum(len(line) for line in plan.marches) == 3 * 8
-    assert [item.n_points for item in plan.left_out] == [7 * 3 * 8]
+    assert sum(len(line) for line in plan.marches) == 2 * 3 * 8
+    assert [item.n_points for item in plan.left_out] == [3 * 2 * 3 * 8]
     assert_every_point_once(study, plan)
+    for line in plan.marches:
+        for task in line:
+            assert {study.axes.wear_coefficient[point[1]] for point in task.points} == {task.wear_coefficient}
 
 
 def test_largest_depth_makes_the_step_axis_idle_for_the_explicit_scheme() -> None:
@@ -106,14 +113,43 @@ def test_marches_cost_little_and_go_last_where_nothing_moves() -> None:
     assert [task.cost for task in planned] == [long.cost, short.cost]
 
 
-def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_automatic_settings_are_those_of_the_task_and_estimated_for_the_plan() -> None:
+    study, plan = plan_of("axes.frequency=150", "axes.harmonics=[3, 'auto']", "axes.rtol=[1e-2, 1e-3]")
+    assert [branch.settings for branch in plan.branches] == [
+        Settings(harmonics, "auto", 1e-8, rtol) for harmonics, rtol in itertools.product((3, "auto"), (1e-2, 1e-3))
+    ]
+    assert plan.n_unknowns == 2 * (2 * AUTOMATIC_HARMONICS + 1)
+    assert plan.branches[0].cost < plan.branches[2].cost
+    assert_every_point_once(study, plan)
+
+
+def test_certificates_are_always_handed_back() -> None:
+    _, plan = plan_of("outputs.variables=['worn_volume']")
+    (variables,) = {task.variables for line in plan.marches for task in line}
+    assert variables == ("worn_volume", *CERTIFICATE, "stable")
+
+
+def test_plan_says_what_is_automatic(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed_plan(["axes.harmonics=[3, 'auto']"], capsys)
+    assert lines["solver"] == "harmonics 3 or automatic, samples automatic, tolerance 1e-08, rtol 0.01"
+    assert lines["unknowns"] == "22 at most in one task, with 5 for automatic harmonics"
+    assert printed_plan(["solver.harmonics=3", "solver.samples=32"], capsys)["solver"] == (
+        "harmonics 3, samples 32, tolerance 1e-08"
+    )
+
+
+def printed_plan(overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     arguments = ["sdof_slider", "--plan"]
-    for override in GRID:
+    for override in overrides:
         arguments += ["--set", override]
     assert main(arguments) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
-    lines = {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
+    return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
+
+
+def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed_plan(GRID, capsys)
     assert lines["points"].startswith("192 = 3 frequency x 2 wear_coefficient")
     assert lines["tasks"].startswith("128: 8 branches")
     assert lines["unknowns"].startswith("22 ")

@@ -1,0 +1,155 @@
+"""The table of the worst certificates: against a plain loop over all points and cycles, and its wording."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studyrunner.certificates import summarise_certificates
+from studyrunner.results import MarchResult
+from studyrunner.study import Study
+from studyrunner.study_file import read_study
+from studyrunner.tasks import build_tasks
+from studyrunner.variables import CERTIFICATE
+from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
+
+GRID = (
+    "axes.frequency=[160, 150, 155]",
+    "axes.wear_coefficient=[0, 1e-11]",
+    "axes.step=[100, 1000]",
+    "axes.scheme=['implicit', 'explicit']",
+    "axes.sweep=['up', 'down']",
+    "axes.harmonics=['auto', 3]",
+    "slow_time.outputs=[0, 100, 1000]",
+)
+
+
+def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[MarchResult]]:
+    """Random certificates, some of them not estimated."""
+    study = read_study("sdof_slider", overrides)
+    plan = build_tasks(study, FACTS.n_displacements)
+    rng = np.random.default_rng(7)
+    results = []
+    for branch in plan.branches:
+        for task in fake_starts(plan, branch.number):
+            result = fake_march(task)
+            drawn = {name: rng.random(len(study.cycles_kept)).round(1) for name in CERTIFICATE}
+            for values in drawn.values():
+                values[rng.random(values.size) < 0.3] = np.nan
+            stable = np.ones(len(study.cycles_kept), dtype=np.int8)
+            results.append(replace(result, values={**result.values, **drawn, "stable": stable}))
+    return study, results
+
+
+def table_of(study: Study, results: Sequence[MarchResult]) -> dict[str, str]:
+    lines = summarise_certificates(study, results).splitlines()
+    width = len(lines[0]) - len(lines[0].split("  ")[-1].lstrip())
+    return {line[:width].strip(): line[width:].strip() for line in lines}
+
+
+def worst_by_plain_loop(study: Study, results: Sequence[MarchResult], name: str) -> str:
+    """Walks through the points in the order of the file, then through the cycles; the first of equal values counts."""
+    by_point = {point: result for result in results for point in result.points}
+    best, where = -1.0, ""
+    for point in itertools.product(*(range(len(values)) for values in study.dimensions.values())):
+        result = by_point[point]
+        if result.outcome != 0:
+            continue
+        for cycle, value in zip(study.cycles_kept, result.values[name].tolist(), strict=True):
+            if value > best:
+                frequency, wear, _, step, scheme, sweep, harmonics = (
+                    values[place] for place, values in zip(point, study.dimensions.values(), strict=True)
+                )
+                best = value
+                where = (
+                    f"frequency {frequency:g} Hz, wear_coefficient {wear:g} 1/Pa, step {step:g}, scheme {scheme},"
+                    f" sweep {sweep}, harmonics {harmonics}, cycle {cycle:g}"
+                )
+    return f"{best:.1e} at {where}"
+
+
+@pytest.mark.parametrize("name", CERTIFICATE)
+def test_worst_of_all_converged_points_and_where(name: str) -> None:
+    study, results = study_with_results()
+    place = next(index for index, result in enumerate(results) if np.nanmax(result.values[name]) > 0.8)
+    results[place] = without_values(results[place], 4)
+    assert table_of(study, results)[CERTIFICATE[name]] == worst_by_plain_loop(study, results, name)
+
+
+def test_order_of_the_results_does_not_matter() -> None:
+    study, results = study_with_results()
+    for place, jump in ((3, 700.0), (5, 700.0), (9, 900.0)):
+        results[place] = replace(results[place], jump_cycle=jump, fold_frequency=150.0 + place, oscillates=True)
+    forwards = summarise_certificates(study, results)
+    assert summarise_certificates(study, results[::-1]) == forwards
+    shuffled = [results[place] for place in np.random.default_rng(1).permutation(len(results))]
+    assert summarise_certificates(study, shuffled) == forwards
+
+
+def test_nothing_special() -> None:
+    study, results = study_with_results()
+    table = table_of(study, results)
+    assert table["worst certificate of"] == "96 points computed to tolerance"
+    labels = ("folds in the sweeps", "jumps while wearing", "explicit steps too long", "oscillating wear rate")
+    for label in (*labels, "unstable states"):
+        assert table[label] == "none"
+
+
+def test_points_of_one_sweep_share_its_fold() -> None:
+    study, results = study_with_results()
+    sweep, harmonics = 5, 6
+    folded = [
+        replace(result, fold_frequency=157.5, branch=1)
+        if any((point[0], point[sweep], point[harmonics]) == (0, 1, 1) for point in result.points)
+        else result
+        for result in results
+    ]
+    assert sum(not np.isnan(result.fold_frequency) for result in folded) > 1
+    assert table_of(study, folded)["folds in the sweeps"] == "1, at 157.5 Hz"
+    both = [replace(result, fold_frequency=140.0) if result.points[0][sweep] == 0 else result for result in folded]
+    assert table_of(study, both)["folds in the sweeps"] == "7, at 140 Hz, 157.5 Hz"
+
+
+def test_jumps_oscillation_and_unstable_states_are_counted() -> None:
+    study, results = study_with_results(("axes.frequency=[150, 160]", "axes.scheme=implicit", "slow_time.outputs=3"))
+    results[0] = replace(results[0], jump_cycle=900.0)
+    results[1] = replace(results[1], jump_cycle=800.0, oscillates=True)
+    table = table_of(study, results)
+    assert table["jumps while wearing"] == "2, the first at cycle 800 at frequency 160 Hz"
+    assert table["oscillating wear rate"].startswith("1, the first at frequency 160 Hz: use a smaller step")
+    results[0] = replace(results[0], values={**results[0].values, "stable": np.array([1, 0, 1], dtype=np.int8)})
+    assert table_of(study, results)["unstable states"].startswith("1, the first at frequency 150 Hz")
+
+
+def test_explicit_steps_beyond_their_limit_are_counted() -> None:
+    overrides = ("axes.frequency=150", "axes.step=[100, 1000, 1e6]", "axes.scheme=['implicit', 'explicit']")
+    study, results = study_with_results((*overrides, "slow_time.cycles=5000"))
+    limited = [replace(result, step_limit=500.0) for result in results]
+    found = table_of(study, limited)["explicit steps too long"]
+    assert found == "2, the first at step 1000, scheme explicit: longer than step_limit"
+    # No step is longer than all cycles.
+    limited = [replace(result, step_limit=5000.0) for result in results]
+    assert table_of(study, limited)["explicit steps too long"] == "none"
+    study, results = study_with_results((*overrides, "slow_time.largest_depth=1e-6"))
+    limited = [replace(result, step_limit=500.0) for result in results]
+    assert table_of(study, limited)["explicit steps too long"] == "none"
+
+
+def test_no_point_was_computed() -> None:
+    study, results = study_with_results(("axes.frequency=150", "axes.scheme=implicit"))
+    table = table_of(study, [without_values(result, 4) for result in results])
+    assert table["worst certificate of"] == "0 points computed to tolerance"
+    assert table["scaled residual"] == "none"
+
+
+def test_estimates_that_were_not_made() -> None:
+    study, (result,) = study_with_results(("axes.frequency=150", "axes.scheme=implicit", "slow_time.outputs=2"))
+    missing = np.full(2, np.nan)
+    values = {**result.values, "response_error": missing, "residual": np.array([np.nan, 3e-9])}
+    table = table_of(study, [replace(result, values=values)])
+    assert table["estimated error of the response"] == "not estimated"
+    assert table["scaled residual"] == "3.0e-09 at cycle 20000"

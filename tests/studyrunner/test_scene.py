@@ -1,0 +1,91 @@
+"""For how many harmonics a scene is built, and how many one can be solved with, where their number is automatic."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from solver.model import ReducedModel, needed_nodal_diameters
+from studies.scene_file import write_scene
+from studyrunner.cli import main
+from studyrunner.scene import AUTOMATIC_HARMONICS_OF_A_WAVE, build_study_scene, describe_scene, largest_harmonics
+from studyrunner.study_file import read_study
+from studyrunner.user_error import UserError
+from tests.studies.scene_models import plain, sector
+
+WAVE = ("scene.mesh=1", "scene.nodal_diameter=3", "scene.stuck_modes=2", "scene.stress_stiffening=false")
+STUDY = """
+[study]
+name = "s"
+[scene]
+model = "wave.h5"
+friction_coefficient = 0.3
+[axes]
+frequency = 200.0
+"""
+
+
+def holding(model: ReducedModel, n_harmonics: int) -> ReducedModel:
+    """The model with the nodal diameters that this number of harmonics needs, and no others."""
+    needed = needed_nodal_diameters(model.nodal_diameter, model.n_sectors, n_harmonics)
+    filled = next(iter(model.linear.values()))
+    return replace(model, linear={k: model.linear.get(k, filled) for k in needed})
+
+
+@pytest.mark.parametrize("n_harmonics", [1, 2, 5])
+def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics: int) -> None:
+    wave = replace(sector(), n_sectors=47, nodal_diameter=4)
+    assert largest_harmonics(holding(wave, n_harmonics)) == n_harmonics
+
+
+def test_any_number_of_harmonics_where_all_nodal_diameters_are_held() -> None:
+    # Of 12 sectors in a wave of nodal diameter 4 the harmonics see 0 and 4 only, in turn.
+    assert largest_harmonics(holding(replace(sector(), n_sectors=12, nodal_diameter=4), 1)) is None
+    assert largest_harmonics(holding(replace(sector(), n_sectors=12, nodal_diameter=5), 12)) is None
+
+
+def test_any_number_of_harmonics_where_there_is_no_wave() -> None:
+    assert largest_harmonics(plain()) is None
+    assert largest_harmonics(replace(plain(), n_sectors=47)) is None
+
+
+def test_a_wave_is_built_for_automatic_harmonics() -> None:
+    study = read_study("dovetail", WAVE)
+    assert describe_scene(build_study_scene(study)).largest_harmonics == AUTOMATIC_HARMONICS_OF_A_WAVE
+
+
+@pytest.mark.parametrize(("harmonics", "largest"), [("[2, 4]", 4), ("['auto', 2]", 13), ("['auto', 14]", 14)])
+def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, largest: int) -> None:
+    study = read_study("dovetail", (*WAVE, f"axes.harmonics={harmonics}"))
+    assert describe_scene(build_study_scene(study)).largest_harmonics == largest
+
+
+@pytest.fixture
+def wave_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Study of a scene file with the nodal diameters of 3 harmonics."""
+    monkeypatch.chdir(tmp_path)
+    write_scene(build_study_scene(read_study("dovetail", (*WAVE, "solver.harmonics=3"))), tmp_path / "wave.h5")
+    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
+    return "s.toml"
+
+
+def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert describe_scene(build_study_scene(read_study(wave_file))).largest_harmonics == 3
+    assert main([wave_file, "--plan"]) == 0
+    assert "harmonics automatic (at most 3, for which the scene holds the nodal diameters)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("override", ["solver.harmonics=4", "axes.harmonics=['auto', 4]"])
+def test_a_number_of_harmonics_needs_its_nodal_diameters(override: str, wave_file: str) -> None:
+    with pytest.raises(UserError, match=r"wave\.h5: nd/12 = missing: give this group, .* fewer than 4 harmonics"):
+        build_study_scene(read_study(wave_file, [override]))
+
+
+def test_a_written_scene_with_automatic_harmonics_is_the_same_scene(tmp_path: Path) -> None:
+    model = build_study_scene(read_study("dovetail", WAVE))
+    write_scene(model, tmp_path / "wave.h5")
+    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
+    again = build_study_scene(read_study(str(tmp_path / "s.toml")))
+    assert describe_scene(again).digest == describe_scene(model).digest
