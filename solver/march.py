@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from solver.adapt import Estimate, refine
 from solver.balance import Balance, Evaluation
+from solver.certificate import certify
 from solver.history import StartState, WearHistory
 from solver.joint import Case, Joint, build_case
 from solver.linear import JacobianSolver
@@ -18,6 +20,8 @@ from solver.path import BalanceAt, Effort, PathPoint, final_history, follow_arc,
 from solver.record import Recorder
 from solver.response import StateReport, report_state, solve_first_state
 from solver.settings import SolverSettings
+
+RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 Scheme = Literal["explicit", "implicit"]
 
@@ -43,22 +47,22 @@ def march_wear(
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time)
     if start.state is None:
         return recorder.failed(start.outcome, 0.0)
-    case = build_case(model, friction_coefficient, start.penalty_omega, settings)
+    case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = _March(case, start, wear_coefficient, scheme)
     outcome = Outcome.CONVERGED
     try:
-        march.begin()
+        outcome = march.begin()
         recorder.add(0.0, march.report(), wear_coefficient)
         end = float(cycles[-1])
-        while march.cycle < end:
+        while outcome is Outcome.CONVERGED and march.cycle < end:
             if not march.wears():
                 recorder.add(end, march.report(), wear_coefficient)
                 break
             planned = march.planned_step(step, largest_depth)
             # a remainder below round-off of the count is no step of its own
             reach = end if march.cycle + planned >= end * (1.0 - 1e-12) else march.cycle + planned
-            if not march.advance(reach):
-                outcome = Outcome.MARCH_FAILED
+            outcome = march.advance(reach)
+            if outcome is not Outcome.CONVERGED:
                 break
             recorder.add(march.cycle, march.report(), wear_coefficient)
     except np.linalg.LinAlgError:
@@ -86,8 +90,9 @@ class _March:
         self.jump_cycle = float("nan")
         self.still = np.zeros(self.case.model.contact.n_contact)
         self.last_change: tuple[float, FloatArray] | None = None
+        self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
 
-    def begin(self) -> None:
+    def begin(self) -> Outcome:
         """Take up the unworn state: it is evaluated, not solved again."""
         state = self.start.state
         assert state is not None
@@ -95,10 +100,36 @@ class _March:
         predicted = balance.predict(state.displacement_h, state.contact_force_h)
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
+        self.estimated_for = evaluation.predicted_h
+        return self.certify()
+
+    def certify(self) -> Outcome:
+        """Certificate of the current state."""
+        self.certificate = replace(
+            certify(self.joint, self.point.evaluation),
+            response_error=self.estimate.response,
+            wear_rate_error=self.estimate.wear_rate,
+        )
+        holds = self.certificate.holds(self.case.settings.tolerance)
+        return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
+
+    def refine(self) -> bool:
+        """Estimate the errors again, where the state has changed enough; False where they cannot be kept below rtol."""
+        now = self.point.evaluation.predicted_h[:, 1:]
+        changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
+        if changed <= RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
+            return True
+        refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
+        self.estimate, self.point = refined.estimate, refined.point
+        if refined.case is not self.case:
+            self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None
+            self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        self.estimated_for = self.point.evaluation.predicted_h
+        return refined.accurate
 
     def report(self) -> StateReport:
         """What is reported of the current state."""
-        return report_state(self.joint, self.point.evaluation)
+        return report_state(self.joint, self.point.evaluation, self.certificate)
 
     def rate(self) -> FloatArray:
         """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21)."""
@@ -114,8 +145,8 @@ class _March:
             return step
         return largest_depth / float(self.rate().max())
 
-    def advance(self, reach: float) -> bool:
-        """One Euler step to the cycle count `reach`; False where no state was found there."""
+    def advance(self, reach: float) -> Outcome:
+        """One Euler step to the cycle count `reach`, and how it ended."""
         length = reach - self.cycle
         balance_at = self._explicit(length) if self.scheme == "explicit" else self._implicit(length)
         tolerance = self.case.settings.tolerance
@@ -127,13 +158,13 @@ class _March:
             )
             found = last.evaluation if arrived else self._jump(balance_at, last, length)
         if found is None:
-            return False
+            return Outcome.MARCH_FAILED
         balance = balance_at(1.0, base.history)
         change = found.predicted_h - self.point.evaluation.predicted_h
         self.last_change = (length, change)
         self.point = PathPoint(0.0, found, final_history(balance, found))
         self.cycle = reach
-        return True
+        return self.certify() if self.refine() else Outcome.INACCURATE
 
     def _explicit(self, length: float) -> BalanceAt:
         before, grown = self.point.evaluation.wear_depth, length * self.rate()

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.history import WearHistory
 from solver.model import FloatArray, ReducedModel
@@ -14,6 +13,15 @@ from solver.outcome import Outcome
 from solver.response import StateReport
 
 REPORTED = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response", "response_peak")
+CERTIFIED = (
+    "residual",
+    "penetration",
+    "tension",
+    "cone_violation",
+    "energy_error",
+    "response_error",
+    "wear_rate_error",
+)
 
 
 @dataclass
@@ -24,7 +32,7 @@ class Recorder:
     cycles: FloatArray
     start_iterations: int
     start_time: float
-    _kept: dict[str, NDArray[Any]] = field(init=False, repr=False)
+    _kept: dict[str, Any] = field(init=False, repr=False)
     _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
     _local_errors: float = field(init=False, default=0.0, repr=False)
 
@@ -36,7 +44,9 @@ class Recorder:
             name: np.full((n_output, width), np.nan, complex if name == "response" else float)
             for name, width in widths.items()
         }
-        self._kept["wear_rate"] = np.full(n_output, np.nan)
+        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", *CERTIFIED)}
+        self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
+        self._kept["stable"] = np.ones(n_output, np.bool_)
 
     def add(self, cycle: float, report: StateReport, wear_coefficient: float) -> None:
         """State at the end of a step; `cycle` never falls."""
@@ -54,6 +64,13 @@ class Recorder:
             old, new = getattr(before_report, name), getattr(report, name)
             self._kept[name][wanted] = old + share[:, None] * (new - old)
         self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
+        for name in CERTIFIED:
+            # what holds for both states holds in between
+            worse = max(getattr(before_report.certificate, name), getattr(report.certificate, name))
+            self._kept[name][wanted] = worse
+        self._kept["harmonics_used"][wanted] = report.resolution.highest
+        self._kept["samples_used"][wanted] = report.resolution.samples
+        self._kept["stable"][wanted] = report.certificate.stable
         self._last = (cycle, report, rate)
 
     def failed(self, outcome: Outcome, run_time: float) -> WearHistory:
@@ -63,8 +80,8 @@ class Recorder:
     def finish(self, outcome: Outcome, jump_cycle: float, iterations: int, run_time: float) -> WearHistory:
         """The whole history; NaN everywhere where the point failed: an unfinished history is no result."""
         if outcome is not Outcome.CONVERGED:
-            for kept in self._kept.values():
-                kept[:] = np.nan
+            for name, kept in self._kept.items():
+                kept[:] = False if name in ("harmonics_used", "samples_used", "stable") else np.nan
             return self._history(outcome, jump_cycle, np.nan, iterations, run_time)
         volume = float(self._kept["wear_depth"][-1] @ self.model.contact.area)
         error = self._local_errors / volume if volume > 0.0 else 0.0
@@ -74,30 +91,13 @@ class Recorder:
         self, outcome: Outcome, jump_cycle: float, error: float, iterations: int, run_time: float
     ) -> WearHistory:
         kept = self._kept
-        unknown, n_output = np.full(self.cycles.size, np.nan), self.cycles.size
         return WearHistory(
             outcome=outcome,
             cycles=self.cycles,
             worn_volume=kept["wear_depth"] @ self.model.contact.area,
-            wear_rate=kept["wear_rate"],
-            wear_depth=kept["wear_depth"],
-            mean_pressure=kept["mean_pressure"],
-            slip_range=kept["slip_range"],
-            open_fraction=kept["open_fraction"],
-            response=kept["response"],
-            response_peak=kept["response_peak"],
             jump_cycle=jump_cycle,
             error_estimate=error,
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
-            residual=unknown,
-            penetration=unknown,
-            tension=unknown,
-            cone_violation=unknown,
-            energy_error=unknown,
-            response_error=unknown,
-            wear_rate_error=unknown,
-            harmonics_used=np.zeros(n_output, dtype=np.int64),
-            samples_used=np.zeros(n_output, dtype=np.int64),
-            stable=np.ones(n_output, dtype=np.bool_),
+            **kept,
         )

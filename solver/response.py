@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from solver.balance import Balance, Evaluation
+from solver.certificate import Certificate
 from solver.harmonics import change_orders, from_complex, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
@@ -16,6 +17,7 @@ from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.settings import Resolution
 
 LOAD_STEPS = 20
 
@@ -125,9 +127,11 @@ class StateReport:
     open_fraction: FloatArray
     response: ComplexArray
     response_peak: FloatArray
+    certificate: Certificate
+    resolution: Resolution
 
 
-def report_state(joint: Joint, evaluation: Evaluation) -> StateReport:
+def report_state(joint: Joint, evaluation: Evaluation, certificate: Certificate) -> StateReport:
     """Pressures, slip and responses of a converged state."""
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     response_t = response_h @ joint.basis.synthesis
@@ -139,6 +143,8 @@ def report_state(joint: Joint, evaluation: Evaluation) -> StateReport:
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
         response_peak=np.abs(response_t).max(axis=1),
+        certificate=certificate,
+        resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
     )
 
 
