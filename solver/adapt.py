@@ -28,6 +28,7 @@ HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 t
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
 SYMMETRIC = 1e-9
+AIM = 0.8  # of rtol: an estimate is one within a factor
 SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
 
 
@@ -88,24 +89,28 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         resolution = here.case.resolution
         finer = here.solve_at(Resolution(resolution.orders, 2 * resolution.samples), effort)
         by_samples = UNKNOWN if finer is None else here.difference(finer).times(SAMPLES_SAFETY)
-        by_harmonics = here.harmonics_error(effort)
+        by_harmonics, richer = here.harmonics_error(effort)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
             return Refined(here.case, here.point, estimate, True)
-        if estimate.largest <= settings.rtol:
+        if estimate.largest <= AIM * settings.rtol:
             here, estimate = here.relaxed(estimate, effort)
             return Refined(here.case, here.point, estimate, True)
         more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
         more_harmonics = settings.harmonics == "auto" and by_harmonics.largest > by_samples.largest / 3.0
-        wanted = Resolution(
-            _on_ladder(resolution, 1).orders if more_harmonics else resolution.orders,
-            2 * resolution.samples if more_samples else resolution.samples,
-        )
+        wanted = resolution
+        if more_harmonics:
+            higher = _on_ladder(resolution, 1)
+            wanted = higher if settings.samples == "auto" else Resolution(higher.orders, resolution.samples)
+        if more_samples:
+            wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
         if wanted != resolution and _allowed(here, wanted):
             next_level = finer if finer is not None and not more_harmonics else here.solve_at(wanted, effort)
+            if next_level is None and settings.harmonics == settings.samples and richer is not None:
+                next_level = richer if _allowed(here, richer.case.resolution) else None
         if next_level is None:
-            return Refined(here.case, here.point, estimate, False)
+            return Refined(here.case, here.point, estimate, estimate.largest <= settings.rtol)
         here = next_level
 
 
@@ -148,19 +153,19 @@ class _Level:
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
 
-    def harmonics_error(self, effort: Effort) -> Estimate:
-        """Estimated error for want of harmonics: the difference to the state two steps up the ladder.
+    def harmonics_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
+        """Estimated error for want of harmonics, and the state with more of them that it comes from.
 
-        Where the scene does not hold the nodal diameters of so many, one step; where not even those, the difference to
-        the state one step down, which is larger.
+        It is the difference to the state two steps up the ladder; where that is not found, or the scene does not hold
+        the nodal diameters of so many, one step; where not even those, to the state one step down, which is larger.
         """
         for steps in (2, 1, -1):
             other = _on_ladder(self.case.resolution, steps)
-            if other != self.case.resolution and self.case.model.holds(other.highest):
+            if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest):
                 level = self.solve_at(other, effort)
                 if level is not None:
-                    return self.difference(level).times(HARMONICS_SAFETY)
-        return UNKNOWN
+                    return self.difference(level).times(HARMONICS_SAFETY), level if steps > 0 else None
+        return UNKNOWN, None
 
     def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[_Level, Estimate]:
         """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.

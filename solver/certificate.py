@@ -151,7 +151,7 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
     """Size (...) of the vibration in a series (..., m); below a millionth of the mean it is round-off."""
-    return np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), 1e-6 * np.abs(values_h[..., 0]))
+    return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), 1e-6 * np.abs(values_h[..., 0])))
 
 
 def _energy_error(joint: Joint, evaluation: Evaluation) -> float:

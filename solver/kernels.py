@@ -54,8 +54,9 @@ def closed_share(force: float, neighbour: float) -> tuple[float, float, float]:
     """
     if neighbour >= 0.0:
         return force, 1.0, 0.0
-    fall = force - neighbour
-    return force * force / fall, force * (fall - neighbour) / (fall * fall), force * force / (fall * fall)
+    share = force / (force - neighbour)
+    # in shares, not squares: predicted forces of pairs without preload may be as small as numbers get
+    return share * force, share * (2.0 - share), share * share
 
 
 @njit(cache=True)

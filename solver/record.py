@@ -59,6 +59,9 @@ class Recorder:
             wanted = (self.cycles > before) & (self.cycles <= cycle)
             # Euler against the trapezoidal rule: the leading error of the step, whose share of the volume is reported
             self._local_errors += 0.5 * (cycle - before) * abs(rate - before_rate)
+            # and what each wear rate is wrong by for want of harmonics and samples
+            for value, of in ((before_rate, before_report), (rate, report)):
+                self._local_errors += 0.5 * (cycle - before) * value * np.nan_to_num(of.certificate.wear_rate_error)
         share = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         for name in REPORTED:
             old, new = getattr(before_report, name), getattr(report, name)
