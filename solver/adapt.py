@@ -92,7 +92,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         by_harmonics, richer = here.harmonics_error(effort)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
-            return Refined(here.case, here.point, estimate, True)
+            known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
+            return Refined(here.case, here.point, known, True)
         if estimate.largest <= AIM * settings.rtol:
             here, estimate = here.relaxed(estimate, effort)
             return Refined(here.case, here.point, estimate, True)

@@ -69,8 +69,9 @@ class Recorder:
         self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
         for name in CERTIFIED:
             # what holds for both states holds in between
-            worse = max(getattr(before_report.certificate, name), getattr(report.certificate, name))
-            self._kept[name][wanted] = worse
+            self._kept[name][wanted] = np.fmax(
+                getattr(before_report.certificate, name), getattr(report.certificate, name)
+            )
         self._kept["harmonics_used"][wanted] = report.resolution.highest
         self._kept["samples_used"][wanted] = report.resolution.samples
         self._kept["stable"][wanted] = report.certificate.stable
