@@ -17,13 +17,14 @@ by a rank-one block a pair:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.joint import Joint
 from solver.law import Marched, law_tangent, march_law
-from solver.model import ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray, Matrix
 
 
 @dataclass(frozen=True)
@@ -145,29 +146,24 @@ class Linearisation:
 
         n_harmonics: where given, of the lowest harmonics only.
         """
-        joint = self.joint
-        whole = joint.basis.synthesis.shape[0]
+        whole = self.joint.basis.synthesis.shape[0]
         m = whole if n_harmonics is None else 2 * n_harmonics + 1
-        rows = np.flatnonzero(np.isin(joint.slots // 3, pairs))
-        matrix = np.zeros((rows.size, m, rows.size, m))
-        static = joint.structure.static_stiffness
-        dynamic = joint.structure.dynamic_stiffness
-        for pair in pairs:
-            own = np.flatnonzero(joint.slots[rows] // 3 == pair)
-            component = joint.slots[rows[own]] % 3
-            select = (component[:, None] * whole + np.arange(m)).ravel()
-            block = self.motion_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size * m)
-            product = np.empty((rows.size, m, own.size * m))
-            product[:, 0] = static[np.ix_(rows, rows[own])] @ block[:, 0]
-            for n in range((m - 1) // 2):
-                amplitude = block[:, 2 * n + 1] - 1j * block[:, 2 * n + 2]
-                force = dynamic[n][np.ix_(rows, rows[own])] @ amplitude
-                product[:, 2 * n + 1] = force.real
-                product[:, 2 * n + 2] = -force.imag
-            matrix[:, :, own] = product.reshape(rows.size, m, own.size, m)
-            tangent = self.force_tangent[pair][np.ix_(select, select)].reshape(own.size, m, own.size, m)
-            matrix[own[:, None], :, own[None, :]] += tangent.transpose(0, 2, 1, 3)
-        return matrix.reshape(rows.size * m, rows.size * m)
+        rows, pair, component = self._rows(pairs)
+        n_rows, n_pairs = rows.size, pairs.size
+        motion, force = (
+            part[pairs].reshape(n_pairs, 3, whole, 3, whole)[:, :, :m, :, :m]
+            for part in (self.motion_tangent, self.force_tangent)
+        )
+        matrix = np.empty((n_rows, m, n_pairs, 3, m))
+        structure = self.joint.structure
+        matrix[:, 0] = self._spread(structure.static_stiffness, rows, pair, component, motion[:, :, 0])
+        for place in range((m - 1) // 2):
+            amplitude = motion[:, :, 2 * place + 1] - 1j * motion[:, :, 2 * place + 2]
+            moved = self._spread(structure.dynamic_stiffness[place], rows, pair, component, amplitude)
+            matrix[:, 2 * place + 1], matrix[:, 2 * place + 2] = moved.real, -moved.imag
+        matrix[np.arange(n_rows), :, pair] += force[pair, component]
+        chosen = matrix.reshape(n_rows, m, 3 * n_pairs, m)[:, :, 3 * pair + component]
+        return chosen.reshape(n_rows * m, n_rows * m)
 
     def dense_harmonic(self, pairs: IntArray, place: int) -> ComplexArray:
         """What the Jacobian does within one harmonic above the static one: a complex matrix over the rows of `pairs`.
@@ -175,22 +171,36 @@ class Linearisation:
         place: of the harmonic among those of the basis. The pairs' tangents mix its cosine and sine in any way; the
         part that a complex factor can express is taken.
         """
-        joint = self.joint
-        m = joint.basis.synthesis.shape[0]
-        rows = np.flatnonzero(np.isin(joint.slots // 3, pairs))
-        matrix = np.zeros((rows.size, rows.size), complex)
-        stiffness = joint.structure.dynamic_stiffness[place]
-        for pair in pairs:
-            own = np.flatnonzero(joint.slots[rows] // 3 == pair)
-            cosine = (joint.slots[rows[own]] % 3) * m + 2 * place + 1
-            motion, force = (_complex_part(part[pair], cosine) for part in (self.motion_tangent, self.force_tangent))
-            matrix[:, own] = stiffness[np.ix_(rows, rows[own])] @ motion
-            matrix[np.ix_(own, own)] += force
-        return matrix
+        whole = self.joint.basis.synthesis.shape[0]
+        rows, pair, component = self._rows(pairs)
+        cosine = 2 * place + 1
+        motion, force = (
+            _complex_part(
+                part[pairs].reshape(-1, 3, whole, 3, whole)[:, :, cosine : cosine + 2, :, cosine : cosine + 2]
+            )
+            for part in (self.motion_tangent, self.force_tangent)
+        )
+        matrix = self._spread(self.joint.structure.dynamic_stiffness[place], rows, pair, component, motion[..., None])
+        matrix[np.arange(rows.size), pair] += force[pair, component][..., None]
+        return cast("ComplexArray", matrix.reshape(rows.size, -1)[:, 3 * pair + component])
+
+    def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Rows of `pairs`, and for each its place in `pairs` and its component."""
+        rows = np.flatnonzero(np.isin(self.joint.slots // 3, pairs))
+        return rows, np.searchsorted(pairs, self.joint.slots[rows] // 3), self.joint.slots[rows] % 3
+
+    def _spread(
+        self, stiffness: Matrix, rows: IntArray, pair: IntArray, component: IntArray, motion: Matrix
+    ) -> NDArray[Any]:
+        """`stiffness motion` (n_rows, n_pairs, 3, k) of blocks (n_pairs, 3, 3, k) that act within a pair."""
+        n_pairs = motion.shape[0]
+        spread = np.zeros((n_pairs, 3, rows.size), stiffness.dtype)
+        spread[pair, component] = stiffness[np.ix_(rows, rows)].T
+        moved = np.matmul(spread.transpose(0, 2, 1), motion.reshape(n_pairs, 3, -1))
+        return moved.transpose(1, 0, 2).reshape(rows.size, n_pairs, 3, -1)
 
 
-def _complex_part(tangent: FloatArray, cosine: IntArray) -> ComplexArray:
-    """Complex-linear part (k, k) of a real map between amplitudes `cosine - i sine` of k displacements."""
-    cc, cs = tangent[np.ix_(cosine, cosine)], tangent[np.ix_(cosine, cosine + 1)]
-    sc, ss = tangent[np.ix_(cosine + 1, cosine)], tangent[np.ix_(cosine + 1, cosine + 1)]
+def _complex_part(tangent: FloatArray) -> ComplexArray:
+    """Complex-linear part (..., 3, 3) of a real map (..., 3, 2, 3, 2) between amplitudes `cosine - i sine`."""
+    cc, cs, sc, ss = tangent[:, :, 0, :, 0], tangent[:, :, 0, :, 1], tangent[:, :, 1, :, 0], tangent[:, :, 1, :, 1]
     return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))
