@@ -197,7 +197,7 @@ class Linearisation:
         spread = np.zeros((n_pairs, 3, rows.size), stiffness.dtype)
         spread[pair, component] = stiffness[np.ix_(rows, rows)].T
         moved = np.matmul(spread.transpose(0, 2, 1), motion.reshape(n_pairs, 3, -1))
-        return moved.transpose(1, 0, 2).reshape(rows.size, n_pairs, 3, -1)
+        return np.asarray(moved.transpose(1, 0, 2).reshape(rows.size, n_pairs, 3, -1))
 
 
 def _complex_part(tangent: FloatArray) -> ComplexArray:
