@@ -1,92 +1,56 @@
-"""Errors against the exact references, at 21 harmonics.
+"""Errors of automatic states against the exact references, with what was estimated of them.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.accuracy
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.accuracy [RTOL ...]
 
-Prints the deviation in the first harmonic of the displacement, in per cent, over frequency, for the textbook scenes.
+Prints a line for each state of the textbook scenes and each relative tolerance (by default 1e-2 and 1e-3): the error of
+the amplitude and of the complex first harmonic, its estimate and the ratio of the two; the same for the wear rate; the
+highest harmonic, with `odd` where the even ones were left out, the samples in a period and the Newton iterations. Stars
+mark an error above the tolerance or above twice its estimate.
 """
 
 from __future__ import annotations
 
-import math
+import sys
 
-import numpy as np
-
-from solver.continuation import follow_branch
-from solver.harmonics import to_complex
-from solver.joint import build_case
-from solver.model import ReducedModel
 from solver.settings import SolverSettings
-from studies.scenes import build_scene, scene_parameters
-from tests import references
 from tests.event_driven import NoPeriodicMotionError
+from tests.solver.exact import ExactState, errors_of, states
 
-SETTINGS = SolverSettings(harmonics=21, samples=256)
-
-
-def first_harmonics(
-    model: ReducedModel, friction: float, amplitude: float, omegas: list[float]
-) -> dict[float, np.ndarray]:
-    """Amplitudes of all responses, m, along a sweep upwards; NaN where there is no state."""
-    frequencies = np.array(omegas) / (2.0 * math.pi)
-    found = {}
-    for index, start in follow_branch(model, friction, amplitude, frequencies, "up", SETTINGS):
-        values = np.full(len(model.response_names), np.nan)
-        if start.state is not None:
-            joint = build_case(model, friction, start.penalty_omega, SETTINGS).joint(start.state.omega, amplitude)
-            response_h = joint.structure.response_h(joint.to_relative(start.state.displacement_h))
-            values = np.abs(to_complex(response_h))[:, 0]
-        found[omegas[index]] = values
-    return found
+HEAD = (
+    f"{'state':26s} {'amplitude':>10s} {'response':>10s} {'estimate':>10s} {'ratio':>6s}"
+    f" {'wear rate':>10s} {'estimate':>10s} {'ratio':>6s} {'H':>6s} {'N':>5s} {'Newton':>6s}"
+)
 
 
-def report(title: str, found: dict[float, np.ndarray], exact: dict[float, np.ndarray]) -> None:
-    """One line a frequency."""
-    print(title)
-    for omega, values in found.items():
-        errors = 100.0 * (values / exact[omega] - 1.0)
-        print(f"  omega {omega:10.4f} rad/s: " + "  ".join(f"{error:+.3f} %" for error in errors))
+def ratio(estimate: float, error: float) -> str:
+    """Estimate over error; nothing where the state is exact."""
+    return f"{estimate / error:6.1f}" if error > 1e-10 else f"{'-':>6s}"
 
 
-def slider() -> None:
-    """Slider with constant normal load, against the event-driven motion (Den Hartog's where it holds)."""
-    parameters = scene_parameters("sdof_slider")(normal_stiffness=0.0)
-    model = build_scene("sdof_slider", parameters, SETTINGS.harmonics)
-    natural = math.sqrt(1.6e5 / 0.1)
-    for force in (10.0, 7.0, 5.5):
-        exact = {}
-        for ratio in (0.6, 0.8, 0.9, 1.1, 1.25, 1.4):
+def line(name: str, exact: ExactState, rtol: float) -> str:
+    """A line of the table."""
+    errors = errors_of(exact, SolverSettings(rtol=rtol))
+    odd = len(errors.orders) > 1 and all(order % 2 for order in errors.orders)
+    good = errors.accurate and errors.safe and max(errors.response, errors.wear) <= rtol
+    return (
+        f"{name:26s} {errors.amplitude:10.1e} {errors.response:10.1e} {errors.estimate.response:10.1e}"
+        f" {ratio(errors.estimate.response, errors.response)} {errors.wear:10.1e} {errors.estimate.wear_rate:10.1e}"
+        f" {ratio(errors.estimate.wear_rate, errors.wear)} {f'{errors.orders[-1]}' + ('odd' if odd else ''):>6s}"
+        f" {errors.samples:5d} {errors.iterations:6d}{'' if good else ' ***'}"
+    )
+
+
+def main() -> None:
+    """Prints the tables."""
+    for rtol in [float(argument) for argument in sys.argv[1:]] or [1e-2, 1e-3]:
+        print(f"rtol {rtol:g}")
+        print(HEAD)
+        for name, state in states().items():
             try:
-                orbit = references.slider_orbit(0.1, 0.0, 1.6e5, force, 5.0, ratio * natural)
+                print(line(name, state(), rtol))
             except NoPeriodicMotionError:
-                continue
-            exact[ratio * natural] = np.array([abs(orbit.harmonic(0))])
-        report(
-            f"sdof_slider, {force} N against 5 N of friction", first_harmonics(model, 0.5, force, list(exact)), exact
-        )
-
-
-def two_masses() -> None:
-    """Two masses, against the event-driven motion."""
-    model = build_scene("two_masses", scene_parameters("two_masses")(), SETTINGS.harmonics)
-    damping, stiffness = [[0.04, -0.02], [-0.02, 0.02]], [[2.0, -1.0], [-1.0, 1.0]]
-    exact = {}
-    for omega in (0.3, 0.4, 0.5, 0.6, 0.7, 1.0, 1.3, 1.6, 1.8):
-        orbit = references.coulomb_orbit(np.eye(2), damping, stiffness, [20.0, 0.0], 1, 7.2, omega)
-        exact[omega] = np.abs([orbit.harmonic(0), orbit.harmonic(1)])
-    report("two_masses, 20 N against 7.2 N of friction", first_harmonics(model, 0.5, 20.0, list(exact)), exact)
-
-
-def vibro_impact() -> None:
-    """Vibro-impact, upper branch, against the event-driven motion."""
-    model = build_scene("vibro_impact", scene_parameters("vibro_impact")(), SETTINGS.harmonics)
-    exact = {}
-    for omega in (0.95, 1.1, 1.2, 1.3, 1.4, 1.5, 1.55):
-        orbit = references.vibro_impact_orbit(1.0, 0.05, 1.0, 0.02, 100.0, 0.1, omega, sweep_start=0.85)
-        exact[omega] = np.array([abs(orbit.harmonic(0))])
-    report("vibro_impact, upper branch", first_harmonics(model, 0.0, 0.02, list(exact)), exact)
+                print(f"{name:26s} has no periodic motion")
 
 
 if __name__ == "__main__":
-    slider()
-    two_masses()
-    vibro_impact()
+    main()

@@ -41,8 +41,8 @@ def median_time(run: Callable[[], object]) -> float:
 
 def main() -> None:
     """Prints the table."""
-    settings = SolverSettings()
-    model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(), settings.harmonics)
+    settings = SolverSettings(harmonics=5, samples=128)
+    model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(), 5)
     ((_, start),) = follow_branch(model, FRICTION, AMPLITUDE, np.array([FREQUENCY]), "up", settings)
     if start.state is None:
         raise RuntimeError(start.outcome.sentence)

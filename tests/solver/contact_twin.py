@@ -37,15 +37,6 @@ def pair_period(predicted: FloatArray, friction: float, slip: FloatArray, passes
     return force, np.array(trace).T
 
 
-def pair_period_at_velocity(predicted: FloatArray, friction: float) -> tuple[FloatArray, FloatArray]:
-    """The same at velocity level: contact force (3, N), sliding velocity (2, N) in force units."""
-    force = np.zeros_like(predicted)
-    for n in range(predicted.shape[1]):
-        force[0, n] = max(predicted[0, n], 0.0)
-        force[1:, n] = project(predicted[1:, n], friction * force[0, n])
-    return force, predicted[1:] - force[1:]
-
-
 def status(predicted: FloatArray, friction: float, slip: FloatArray) -> FloatArray:
     """0 separated, 1 stick, 2 slip, by the states before each sample (2, N); N integers."""
     pull = np.hypot(*(predicted[1:] - slip))

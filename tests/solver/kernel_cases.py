@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from solver.harmonics import build_basis
-from solver.kernels import march_period, march_tangent, mean_normal_force, wear_integral
-from solver.model import BoolArray, FloatArray
+from solver.harmonics import FourierBasis, build_basis
+from solver.inertia import march_masses, mass_tangent
+from solver.kernels import march_period, march_tangent, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.model import BoolArray, FloatArray, IntArray
 
 FRICTION = 0.4
 PERIODS = 3
-BASIS = build_basis(3, 20)
+ORDERS = (1, 2, 3)
+BASIS = build_basis(ORDERS, 20)
+MASS_BASIS = build_basis(ORDERS, 32)
 
 
 @dataclass(frozen=True)
@@ -23,11 +26,10 @@ class KernelCase:
     predicted_h: FloatArray
     predicted_t: FloatArray
     start: FloatArray
-    at_velocity: BoolArray
     has_normal: BoolArray
 
 
-def kernel_case(n_contact: int, n_samples: int, seed: int, at_velocity: bool) -> KernelCase:
+def kernel_case(n_contact: int, n_samples: int, seed: int) -> KernelCase:
     random = np.random.default_rng(seed)
     predicted_h = random.normal(size=(n_contact, 3, 7)) * 10.0
     predicted_h[:, 0, 0] = 15.0
@@ -36,46 +38,111 @@ def kernel_case(n_contact: int, n_samples: int, seed: int, at_velocity: bool) ->
     predicted_h[-1, 0, 1:] = 0.0
     return KernelCase(
         predicted_h=predicted_h,
-        predicted_t=predicted_h @ build_basis(3, n_samples).synthesis,
+        predicted_t=predicted_h @ build_basis(ORDERS, n_samples).synthesis,
         start=random.normal(size=(n_contact, 2)) * 5.0,
-        at_velocity=np.full(n_contact, at_velocity),
         has_normal=has_normal,
     )
 
 
+@dataclass(frozen=True)
+class MassCase:
+    """Masses on sliders, of which one in three has the first tangent only and one the second only.
+
+    step_share (m,): harmonics of the mean over a step, over those of the samples.
+    """
+
+    predicted_h: FloatArray
+    mass: FloatArray
+    drag: FloatArray
+    line: IntArray
+    has_normal: BoolArray
+    basis: FourierBasis
+    omega: float
+    step_share: FloatArray
+
+    @property
+    def step(self) -> float:
+        return 2.0 * np.pi / self.omega / self.basis.n_samples
+
+    def predicted_t(self, predicted_h: FloatArray) -> FloatArray:
+        values = predicted_h @ self.basis.synthesis
+        values[:, 1:] = (predicted_h[:, 1:] * self.step_share) @ self.basis.synthesis
+        return values
+
+
+def mass_case(n_contact: int, seed: int, basis: FourierBasis = MASS_BASIS, opens: bool = True) -> MassCase:
+    """Masses that stick, turn at once, slip and (with `opens`) open; the last one has a constant normal force."""
+    random = np.random.default_rng(seed)
+    m = basis.synthesis.shape[0]
+    predicted_h = random.normal(size=(n_contact, 3, m)) * 4.0
+    predicted_h[:, 1:, 0] *= 0.1
+    predicted_h[:, 0] *= 2.0 if opens else 0.5
+    predicted_h[:, 0, 0] = 15.0
+    has_normal = np.ones(n_contact, bool)
+    has_normal[-1] = False
+    predicted_h[-1, 0, 1:] = 0.0
+    line = np.arange(n_contact) % 3 - 1
+    predicted_h[line == 0, 2] = 0.0
+    predicted_h[line == 1, 1] = 0.0
+    mass = random.uniform(0.5, 2.0, n_contact)
+    omega = 3.0
+    angle = np.pi * np.array(basis.orders) / basis.n_samples
+    share = np.ones(m)
+    share[1::2] = share[2::2] = np.sin(angle) / angle
+    return MassCase(predicted_h, mass, 0.1 * mass * omega, line, has_normal, basis, omega, share)
+
+
+def run_masses(
+    case: MassCase, predicted_h: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
+    return march_masses(case.predicted_t(predicted_h), FRICTION, case.mass, case.drag, case.line, case.step)
+
+
+def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return mass_tangent(
+        case.predicted_t(case.predicted_h),
+        FRICTION,
+        case.mass,
+        case.drag,
+        case.line,
+        case.step,
+        start,
+        case.basis.synthesis,
+        case.basis.synthesis * case.step_share[:, None],
+        case.basis.analysis / case.step_share,
+        case.has_normal,
+    )
+
+
 def kernel_results() -> dict[str, FloatArray]:
-    results: dict[str, FloatArray] = {}
-    for at_velocity in (False, True):
-        case = kernel_case(3, BASIS.n_samples, seed=20, at_velocity=at_velocity)
-        force_t, state_t, status_t, passes, drift = march_period(
-            case.predicted_t, FRICTION, case.start, case.at_velocity, 1e-9, 6
-        )
-        force_tangent, wear_tangent = march_tangent(
-            case.predicted_t,
-            FRICTION,
-            case.start,
-            case.at_velocity,
-            passes,
-            BASIS.synthesis,
-            BASIS.analysis,
-            case.has_normal,
-        )
-        level = "velocity" if at_velocity else "displacement"
-        results |= {
-            f"{level}_{name}": np.asarray(values, float)
-            for name, values in (
-                ("force", force_t),
-                ("state", state_t),
-                ("status", status_t),
-                ("passes", passes),
-                ("drift", drift),
-                ("wear", wear_integral(force_t, state_t, case.at_velocity)),
-                ("mean_normal", mean_normal_force(case.predicted_t)),
-                ("force_tangent", force_tangent),
-                ("wear_tangent", wear_tangent),
-            )
-        }
-    return results
+    case = kernel_case(3, BASIS.n_samples, seed=20)
+    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 6)
+    force_tangent, wear_tangent = march_tangent(
+        case.predicted_t, FRICTION, case.start, passes, BASIS.synthesis, BASIS.analysis, case.has_normal
+    )
+    masses = mass_case(6, seed=21)
+    mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)
+    mass_force_tangent, mass_wear_tangent = masses_tangent(masses, velocity_t[:, :, 0])
+    results = {
+        "force": force_t,
+        "state": state_t,
+        "status": status_t,
+        "passes": passes,
+        "drift": drift,
+        "wear": wear_integral(force_t, state_t),
+        "mean_normal": mean_normal_force(case.predicted_t),
+        "normal_tangent": mean_normal_tangent(case.predicted_t, BASIS.synthesis, BASIS.analysis, case.has_normal),
+        "force_tangent": force_tangent,
+        "wear_tangent": wear_tangent,
+        "mass_force": mass_force_t,
+        "mass_velocity": velocity_t,
+        "mass_place": place_t,
+        "mass_status": mass_status_t,
+        "mass_slip_work": slip_work,
+        "mass_force_tangent": mass_force_tangent,
+        "mass_wear_tangent": mass_wear_tangent,
+    }
+    return {name: np.asarray(values, float) for name, values in results.items()}
 
 
 def save_results(path: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
 from solver.response import solve_first_state
-from solver.settings import SolverSettings
+from solver.settings import Resolution, SolverSettings, first_resolution
 from studies.scenes import build_scene, scene_parameters
 
 STIFFNESS = 1e7  # N/m
@@ -93,6 +94,24 @@ def random_model(seed: int, kinds: Sequence[str] = ("3d", "3d", "3d"), n_inner: 
     return ReducedModel({0: random_linear(random, contact, n)}, contact, ("first", "second"))
 
 
+def with_free_masses(model: ReducedModel, pairs: Sequence[int]) -> ReducedModel:
+    """The same structure, with the tangents of some pairs soft and heavy: masses directly on sliders."""
+    free = model.contact.dofs[list(pairs), 1:].ravel()
+    free = free[free >= 0]
+
+    def scaled(linear: LinearModel) -> LinearModel:
+        soft, heavy = np.ones(linear.load_static.size), np.ones(linear.load_static.size)
+        soft[free], heavy[free] = 0.02, 10.0
+        return replace(
+            linear,
+            stiffness=linear.stiffness * np.outer(soft, soft),
+            damping=linear.damping * np.outer(soft, soft),
+            mass=linear.mass * np.outer(heavy, heavy),
+        )
+
+    return replace(model, linear={k: scaled(linear) for k, linear in model.linear.items()})
+
+
 def cyclic_model(
     seed: int, kinds: Sequence[str], n_sectors: int, nodal_diameter: int, n_harmonics: int = 3
 ) -> ReducedModel:
@@ -115,10 +134,12 @@ def random_balance(
     wear: bool,
     friction: float = 0.4,
     amplitude: float = 60.0,
+    resolution: Resolution | None = None,
 ) -> tuple[Balance, FloatArray]:
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)
-    case = build_case(model, friction, OMEGA, settings)
+    resolution = resolution or first_resolution(settings)
+    case = build_case(model, friction, OMEGA, settings, resolution)
     joint = case.joint(OMEGA, amplitude)
     n_contact = model.contact.n_contact
     history = 0.3 * friction * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
@@ -126,8 +147,8 @@ def random_balance(
     # so much wear in a step that its part of the Jacobian is as large as the others
     gain = random.uniform(0.1, 0.3, n_contact) / PRELOAD if wear else np.zeros(n_contact)
     balance = Balance(joint, history, random.uniform(0.0, 2e-6, n_contact), gain)
-    predicted = random.normal(size=(joint.slots.size, 2 * settings.harmonics + 1))
-    order = (np.arange(predicted.shape[1]) + 1) // 2
+    order = np.concatenate([[0], np.repeat(resolution.orders, 2)])
+    predicted = random.normal(size=(joint.slots.size, order.size))
     predicted *= 1.2 * PRELOAD / (1.0 + order) ** 1.5
     predicted[joint.slots % 3 == 0, 0] += PRELOAD
     return balance, predicted

@@ -8,8 +8,8 @@ import pytest
 from solver.balance import Balance
 from solver.kernels import SEPARATED, SLIP, STICK
 from solver.model import FloatArray
-from solver.settings import SolverSettings
-from tests.solver.models import cyclic_model, random_balance, random_model, scene
+from solver.settings import Resolution, SolverSettings
+from tests.solver.models import cyclic_model, random_balance, random_model, scene, with_free_masses
 
 SETTINGS = SolverSettings(3, 24)
 MODELS = {
@@ -114,19 +114,64 @@ def test_predict_is_the_inverse_of_evaluate(kinds: str, wear: bool) -> None:
     assert np.abs(stored.evaluate(back).residual - at.residual).max() < 1e-10 * np.abs(at.residual).max()
 
 
-def test_predict_is_the_inverse_at_velocity_level() -> None:
-    balance, predicted = random_balance(scene("sdof_slider"), SETTINGS, 6, wear=False)
-    assert balance.joint.penalty.at_velocity.all()
+MASSES = {"all": [0, 1, 2, 3, 5], "some": [0, 1], "one_elastic": [0, 2, 3, 5]}  # of MODELS["mixed"]; 4 has no tangent
+
+
+def mass_balance(free: str, seed: int, wear: bool, resolution: Resolution) -> tuple[Balance, FloatArray]:
+    """Elastic pairs and masses on sliders in one joint."""
+    model = with_free_masses(random_model(seed, MODELS["mixed"]), MASSES[free])
+    balance, predicted = random_balance(model, SETTINGS, seed + 100, wear=wear, resolution=resolution)
+    assert np.flatnonzero(balance.joint.penalty.inertial).tolist() == MASSES[free]
+    predicted[balance.joint.slots % 3 == 0, 1:] *= 2.0  # so that pairs open
+    return balance, predicted
+
+
+@pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 32), Resolution((1, 3, 5), 48)])
+@pytest.mark.parametrize("wear", [False, True])
+@pytest.mark.parametrize("free", MASSES)
+def test_predict_is_the_inverse_for_masses_on_sliders(free: str, wear: bool, resolution: Resolution) -> None:
+    balance, predicted = mass_balance(free, 6, wear, resolution)
     at = balance.evaluate(predicted)
-    back = balance.predict(at.displacement_h, at.force_h)
+    stored = Balance(balance.joint, balance.history, at.wear_depth, np.zeros_like(at.wear_depth))
+    back = stored.predict(at.displacement_h, at.force_h)
     assert back == pytest.approx(predicted, abs=1e-10 * np.abs(predicted).max())
 
 
+@pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 32), Resolution((1, 3, 5), 48)])
+@pytest.mark.parametrize("wear", [False, True])
+@pytest.mark.parametrize("free", MASSES)
+@pytest.mark.parametrize("seed", [4, 8])
+def test_jacobian_of_elastic_pairs_and_masses_on_sliders(
+    free: str, wear: bool, resolution: Resolution, seed: int
+) -> None:
+    balance, predicted = mass_balance(free, seed, wear, resolution)
+    at = balance.evaluate(predicted)
+    inertial = balance.joint.penalty.inertial
+    assert SLIP in at.status_t[inertial]
+    assert {SEPARATED, STICK} <= set(at.status_t[inertial if free != "some" else ~inertial].ravel())
+    differences = jacobian_by_differences(balance, predicted, 1e-4)
+    dense = balance.linearise(at).dense(np.arange(balance.joint.contact.n_contact))
+    # row by row: those of the normal force are far larger than those of a mass
+    assert (np.abs(dense - differences).max(axis=1) < 1e-6 * np.abs(differences).max(axis=1)).all()
+
+
+@pytest.mark.parametrize("wear", [False, True])
+def test_jacobian_of_odd_harmonics_alone(wear: bool) -> None:
+    balance, predicted = random_balance(
+        random_model(2, MODELS["mixed"]), SETTINGS, 102, wear=wear, resolution=Resolution((1, 3, 5), 32)
+    )
+    assert not balance.joint.penalty.inertial.any()
+    differences = jacobian_by_differences(balance, predicted, 1e-4)
+    dense = balance.linearise(balance.evaluate(predicted)).dense(np.arange(6))
+    assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
+
+
+@pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 24), Resolution((1, 3, 7), 64)])
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("name", ["sdof_slider", "two_masses"])
-def test_jacobian_at_velocity_level(name: str, wear: bool) -> None:
-    balance, predicted = random_balance(scene(name), SETTINGS, 7, wear=wear)
-    assert balance.joint.penalty.at_velocity.all()
+def test_jacobian_of_a_mass_on_a_slider(name: str, wear: bool, resolution: Resolution) -> None:
+    balance, predicted = random_balance(scene(name), SETTINGS, 7, wear=wear, resolution=resolution)
+    assert balance.joint.penalty.inertial.all()
     at = balance.evaluate(predicted)
     assert SLIP in at.status_t
     differences = jacobian_by_differences(balance, predicted, 1e-4)

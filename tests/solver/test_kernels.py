@@ -21,6 +21,7 @@ from solver.kernels import (
     march_period,
     march_tangent,
     mean_normal_force,
+    mean_normal_tangent,
     wear_integral,
 )
 from tests.solver import contact_twin
@@ -70,10 +71,8 @@ def test_the_three_states_of_a_sample() -> None:
 
 @pytest.mark.parametrize("most_passes", [1, 2, 5])
 def test_displacement_level_is_that_of_the_plain_twin(most_passes: int) -> None:
-    case = kernel_case(4, 24, seed=1, at_velocity=False)
-    force_t, state_t, status_t, passes, drift = march_period(
-        case.predicted_t, FRICTION, case.start, case.at_velocity, 0.0, most_passes
-    )
+    case = kernel_case(4, 24, seed=1)
+    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 0.0, most_passes)
     for pair in range(4):
         force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, case.start[pair], passes[pair])
         assert force_t[pair] == pytest.approx(force, abs=1e-11)
@@ -84,45 +83,26 @@ def test_displacement_level_is_that_of_the_plain_twin(most_passes: int) -> None:
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
 
 
-def test_velocity_level_is_that_of_the_plain_twin() -> None:
-    case = kernel_case(4, 24, seed=2, at_velocity=True)
-    force_t, state_t, status_t, passes, _ = march_period(
-        case.predicted_t, FRICTION, case.start, case.at_velocity, 0.0, 8
-    )
-    for pair in range(4):
-        force, sliding = contact_twin.pair_period_at_velocity(case.predicted_t[pair], FRICTION)
-        assert force_t[pair] == pytest.approx(force, abs=1e-11)
-        assert np.diff(state_t[pair]) == pytest.approx(sliding, abs=1e-11)
-        expected = contact_twin.status(case.predicted_t[pair], FRICTION, np.zeros_like(sliding))
-        assert np.array_equal(status_t[pair], expected)
-    assert np.array_equal(passes, np.ones(4))
-    assert not state_t[:, :, 0].any()
-    assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
-
-
 def test_a_period_is_marched_until_its_state_repeats() -> None:
     # Separation forgets the history within one pass, slip under constant pressure within two.
-    case = kernel_case(6, 48, seed=3, at_velocity=False)
-    *_, passes, drift = march_period(case.predicted_t, FRICTION, case.start, case.at_velocity, 1e-9, 50)
+    case = kernel_case(6, 48, seed=3)
+    *_, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 50)
     assert (drift <= 1e-9).all()
     assert (passes >= 2).all()
-    again = march_period(case.predicted_t, FRICTION, case.start, case.at_velocity, 1e-9, 60)
+    again = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 60)
     assert np.array_equal(again[3], passes)
 
 
 def test_a_stuck_pair_keeps_its_history_and_wears_exactly_zero() -> None:
-    case = kernel_case(3, 64, seed=4, at_velocity=False)
+    case = kernel_case(3, 64, seed=4)
     predicted = case.predicted_t.copy()
     predicted[:, 0] = 1e3  # far above what the tangents need
-    for at_velocity in (False, True):
-        levels = np.full(3, at_velocity)
-        force_t, state_t, status_t, passes, drift = march_period(predicted, FRICTION, case.start, levels, 0.0, 8)
-        assert (status_t == STICK).all()
-        assert np.array_equal(wear_integral(force_t, state_t, levels), np.zeros(3))
-        assert np.array_equal(passes, np.ones(3))
-        assert not drift.any()
-        if not at_velocity:
-            assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
+    force_t, state_t, status_t, passes, drift = march_period(predicted, FRICTION, case.start, 0.0, 8)
+    assert (status_t == STICK).all()
+    assert np.array_equal(wear_integral(force_t, state_t), np.zeros(3))
+    assert np.array_equal(passes, np.ones(3))
+    assert not drift.any()
+    assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
 
 
 def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() -> None:
@@ -132,28 +112,27 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     predicted = np.zeros((1, 3, n))
     predicted[0, 0] = pressure
     predicted[0, 1] = amplitude * np.cos(2 * np.pi * np.arange(n) / n)
-    levels = np.zeros(1, bool)
-    force_t, state_t, _, _, drift = march_period(predicted, FRICTION, np.full((1, 2), 3.0), levels, 1e-12, 8)
+    force_t, state_t, _, _, drift = march_period(predicted, FRICTION, np.full((1, 2), 3.0), 1e-12, 8)
     assert drift[0] == pytest.approx(0, abs=1e-12)
     expected = 4 * pressure * (amplitude - FRICTION * pressure)
-    assert wear_integral(force_t, state_t, levels)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert wear_integral(force_t, state_t)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
     work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
     assert work <= FRICTION * expected * (1 + 1e-12)
 
 
 def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_increment() -> None:
-    force_t = np.zeros((2, 3, 3))
+    force_t = np.zeros((1, 3, 3))
     force_t[:, 0] = [1.0, 3.0, 5.0]
-    state_t = np.zeros((2, 2, 4))
+    state_t = np.zeros((1, 2, 4))
     state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
     state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
-    expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6, 1 * 5 + 5 * 6]
-    assert wear_integral(force_t, state_t, np.array([False, True])) == pytest.approx(expected, rel=1e-15, abs=0.0)
+    expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6]
+    assert wear_integral(force_t, state_t) == pytest.approx(expected, rel=1e-15, abs=0.0)
 
 
 def test_a_pair_that_stays_pressed_keeps_its_samples_of_the_normal_force() -> None:
-    predicted_t = kernel_case(3, 24, seed=6, at_velocity=False).predicted_t
+    predicted_t = kernel_case(3, 24, seed=6).predicted_t
     pressed = predicted_t - predicted_t[:, :1].min(axis=2, keepdims=True) + 1.0
     assert np.array_equal(mean_normal_force(pressed), pressed[:, 0])
     assert not mean_normal_force(-pressed).any()
@@ -174,7 +153,7 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
     for samples in (32, 64, 128, 256):
         predicted_t = np.zeros((1, 3, samples))
         predicted_t[0, 0] = np.cos(2 * np.pi * np.arange(samples) / samples - 1.0) - 0.3
-        force_h = mean_normal_force(predicted_t)[0] @ build_basis(1, samples).analysis
+        force_h = mean_normal_force(predicted_t)[0] @ build_basis((1,), samples).analysis
         errors.append(max(abs(force_h[0] - exact[0]), abs(force_h[1] - exact[1] * np.cos(1.0))))
     # kinks of slope sin a: at most (2 pi / N)^2 sin a, two of them, over the period
     assert all(
@@ -190,23 +169,24 @@ def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, fl
 
     def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS)
+        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, 0.0, PERIODS)
         force_h = force_t @ basis.analysis
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
-        return force_h, wear_integral(force_t, state_t, case.at_velocity), status_t
+        return force_h, wear_integral(force_t, state_t), status_t
 
     predicted_t = case.predicted_h @ basis.synthesis
-    *_, passes, _ = march_period(predicted_t, FRICTION, case.start, case.at_velocity, 0.0, PERIODS)
+    *_, passes, _ = march_period(predicted_t, FRICTION, case.start, 0.0, PERIODS)
     force_tangent, wear_tangent = march_tangent(
         predicted_t,
         FRICTION,
         case.start,
-        case.at_velocity,
         passes,
         basis.synthesis,
         basis.analysis,
         case.has_normal,
     )
+    assert not force_tangent[:, :m].any()
+    force_tangent[:, :m, :m] = mean_normal_tangent(predicted_t, basis.synthesis, basis.analysis, case.has_normal)
     force_error, wear_error, same = 0.0, 0.0, True
     _, _, status = run(case.predicted_h)
     step = 1e-4
@@ -227,10 +207,9 @@ def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, fl
     return force_error, wear_error, float(np.abs(wear_tangent).max())
 
 
-@pytest.mark.parametrize("at_velocity", [False, True])
 @pytest.mark.parametrize("seed", [10, 12, 13])
-def test_tangents_are_those_of_central_differences(at_velocity: bool, seed: int) -> None:
-    case = kernel_case(4, BASIS.n_samples, seed=seed, at_velocity=at_velocity)
+def test_tangents_are_those_of_central_differences(seed: int) -> None:
+    case = kernel_case(4, BASIS.n_samples, seed=seed)
     assert not case.has_normal.all()
     force_error, wear_error, wear_size = derivative_error(case, 4)
     # truncation: step^2 / pull^2 with pulls above 0.1 N; round-off: 1e-16 * 100 N / step
@@ -241,8 +220,8 @@ def test_tangents_are_those_of_central_differences(at_velocity: bool, seed: int)
 
 def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
     # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
-    case = kernel_case(4, BASIS.n_samples, seed=10, at_velocity=False)
-    arguments = (case.predicted_t, FRICTION, case.start, case.at_velocity)
+    case = kernel_case(4, BASIS.n_samples, seed=10)
+    arguments = (case.predicted_t, FRICTION, case.start)
     rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
     one, _ = march_tangent(*arguments, np.full(4, 1), *rest)
     two, _ = march_tangent(*arguments, np.full(4, 2), *rest)
@@ -250,16 +229,19 @@ def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
 
 
 def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
-    basis = build_basis(0, 1)
+    basis = build_basis((), 1)
     predicted_t = np.array([[[2.0], [0.5], [3.0]]])
-    start, level = np.zeros((1, 2)), np.zeros(1, bool)
-    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, level, 0.0, 8)
+    start = np.zeros((1, 2))
+    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 8)
     assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
-    tangent, _ = march_tangent(
-        predicted_t, FRICTION, start, level, np.array([2]), basis.synthesis, basis.analysis, np.ones(1, bool)
-    )
-    assert tangent[0, 0] == pytest.approx([1.0, 0.0, 0.0])
-    assert wear_integral(force_t, state_t, level)[0] == 0.0
+    everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
+    tangent, _ = march_tangent(predicted_t, FRICTION, start, np.array([1]), *everything)
+    # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
+    along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
+    across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))
+    assert tangent[0, 1:] == pytest.approx(np.column_stack([FRICTION * along, across]), rel=1e-12)
+    assert mean_normal_tangent(predicted_t, *everything)[0, 0] == pytest.approx([1.0])
+    assert wear_integral(force_t, state_t)[0] == 0.0
 
 
 def test_kernels_give_the_same_numbers_without_compilation(tmp_path: Path) -> None:

@@ -163,10 +163,10 @@ def test_the_history_is_the_corrected_slip_at_the_end_of_the_period() -> None:
     assert final_history(balance, at) == pytest.approx(expected, rel=1e-15, abs=0.0)
 
 
-def test_the_history_at_velocity_level_is_the_mean_position() -> None:
+def test_the_history_of_a_mass_on_a_slider_is_its_mean_position() -> None:
     case = build_case(scene("sdof_slider"), 0.5, 1000.0, SolverSettings(3, 64))
     joint = case.joint(1000.0, 10.0)
-    assert joint.penalty.at_velocity.all()
+    assert joint.penalty.inertial.all()
     balance = Balance(joint, np.array([[2e-5, 0.0]]), np.zeros(1), np.zeros(1))
     at = balance.evaluate(np.random.default_rng(4).normal(size=(joint.slots.size, 7)) * 10.0)
     assert np.array_equal(final_history(balance, at), at.displacement_h[:, 1:, 0])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.harmonics import from_complex, to_complex
+from solver.harmonics import change_orders, from_complex, to_complex
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.structure import build_structure, relative_indices
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 HARMONICS = 3
+ORDERS = (1, 2, 3)
 AMPLITUDE = 60.0
 
 
@@ -19,7 +20,7 @@ AMPLITUDE = 60.0
 def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner: int) -> None:
     model = random_model(1, KINDS, n_inner)
     linear = model.linear[0]
-    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
     relative, _ = relative_indices(model.contact)
     force_h = np.random.default_rng(2).normal(size=(relative.size, 2 * HARMONICS + 1)) * 10.0
     force = np.column_stack([force_h[:, 0], to_complex(force_h)])
@@ -58,7 +59,7 @@ def test_a_harmonic_sees_its_own_nodal_diameter(harmonic: int) -> None:
     # 6 sectors, d = 2: harmonics 1, 2, 3 see nodal diameters 2, 4 (folded to 2) and 0
     model = cyclic_model(3, KINDS, 6, 2)
     assert sorted(model.linear) == [0, 2]
-    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
     relative, _ = relative_indices(model.contact)
     linear = model.linear[{1: 2, 2: 2, 3: 0}[harmonic]]
     stiffness, damping, mass = linear.stiffness, linear.damping, linear.mass
@@ -72,10 +73,56 @@ def test_a_harmonic_sees_its_own_nodal_diameter(harmonic: int) -> None:
     assert error < 1e-10 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(6, 2), (5, 2), (5, 1), (6, 3), (7, 0)])
+@pytest.mark.parametrize("orders", [(1, 3), (1, 3, 5), (1, 2, 5), (1,)])
+def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter: int, orders: tuple[int, ...]) -> None:
+    # each order sees the nodal diameter of its own, not of its place
+    model = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5)
+    every = build_structure(model, OMEGA, AMPLITUDE, (1, 2, 3, 4, 5))
+    some = build_structure(model, OMEGA, AMPLITUDE, orders)
+    places = np.array(orders) - 1
+    for name in ("dynamic_stiffness", "dynamic_response"):
+        expected = getattr(every, name)[places]
+        assert getattr(some, name) == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max()), name
+    for name in ("static_stiffness", "static_force", "harmonic_force", "static_response", "harmonic_offset", "drive"):
+        assert getattr(some, name) == pytest.approx(getattr(every, name), rel=1e-12), name
+    assert some.drive_offset == pytest.approx(every.drive_offset, rel=1e-12)
+    displacement_h = np.random.default_rng(10).normal(size=(some.static_force.size, 2 * len(orders) + 1))
+    full_h = change_orders(displacement_h, orders, (1, 2, 3, 4, 5))
+    for ours, theirs in (
+        (some.apply(displacement_h), every.apply(full_h)),
+        (some.response_h(displacement_h), every.response_h(full_h)),
+        (some.force_h(), every.force_h()),
+    ):
+        theirs_h = change_orders(theirs, (1, 2, 3, 4, 5), orders)
+        assert ours == pytest.approx(theirs_h, rel=1e-12, abs=1e-12 * np.abs(theirs_h).max())
+    assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
+
+
+def test_input_work_is_that_of_the_load_on_the_full_motion() -> None:
+    model = random_model(11, KINDS)
+    linear = model.linear[0]
+    structure = build_structure(model, OMEGA, AMPLITUDE, (1, 3))
+    relative, _ = relative_indices(model.contact)
+    amplitude = np.random.default_rng(12).normal(size=(relative.size, 2)) @ np.array([1.0, 1.0j])
+    matrix = linear.stiffness + 1j * OMEGA * linear.damping - OMEGA**2 * linear.mass
+    moved = np.zeros(matrix.shape[0], complex)
+    moved[relative] = amplitude
+    inner = np.setdiff1d(np.arange(moved.size), relative)
+    load = AMPLITUDE * linear.load_harmonic
+    moved[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ moved)[inner])
+    phase = 2 * np.pi * np.arange(64) / 64
+    rate_t = np.real(1j * OMEGA * moved[:, None] * np.exp(1j * phase))
+    work = float((np.real(load[:, None] * np.exp(1j * phase)) * rate_t).sum() * 2 * np.pi / OMEGA / 64)
+    displacement_h = np.zeros((relative.size, 5))
+    displacement_h[:, 1], displacement_h[:, 2] = amplitude.real, -amplitude.imag
+    assert structure.input_work(displacement_h) == pytest.approx(work, rel=1e-10)
+
+
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 1), (5, 2), (6, 2), (6, 3), (7, 3)])
 def test_every_harmonic_of_every_wave_loses_energy_to_the_damping(n_sectors: int, nodal_diameter: int) -> None:
     model = cyclic_model(4, KINDS, n_sectors, nodal_diameter)
-    structure = build_structure(model, OMEGA, AMPLITUDE, HARMONICS)
+    structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
     for n, stiffness in enumerate(structure.dynamic_stiffness, 1):
         taken = (stiffness - stiffness.conj().T) / 2j
         assert np.linalg.eigvalsh(taken).min() > 0, f"harmonic {n} is driven by its damping"
@@ -128,7 +175,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
         for k in needed_nodal_diameters(wave, n_sectors, n_harmonics)
     }
     model = ReducedModel(linear, contact, ("free",), n_sectors, wave)
-    structure = build_structure(model, OMEGA, AMPLITUDE, n_harmonics)
+    structure = build_structure(model, OMEGA, AMPLITUDE, tuple(range(1, n_harmonics + 1)))
     for n in range(1, n_harmonics + 1):
         rate = n * OMEGA
         whole = ring("k") + 1j * rate * ring("c") - rate**2 * ring("m")
@@ -153,7 +200,7 @@ def test_a_wave_with_nodal_diameter_0_shows_all_harmonics_the_same_structure() -
     assert sorted(model.linear) == [0]
     plain = ReducedModel(model.linear, model.contact, model.response_names)
     for name in ("static_stiffness", "dynamic_stiffness", "static_force", "harmonic_force", "dynamic_response"):
-        ours, theirs = (getattr(build_structure(m, OMEGA, AMPLITUDE, HARMONICS), name) for m in (model, plain))
+        ours, theirs = (getattr(build_structure(m, OMEGA, AMPLITUDE, ORDERS), name) for m in (model, plain))
         assert np.array_equal(ours, theirs)
 
 
@@ -169,7 +216,7 @@ def test_a_missing_nodal_diameter_is_loud() -> None:
     model = cyclic_model(7, KINDS, 6, 2)
     short = ReducedModel({0: model.linear[0]}, model.contact, model.response_names, 6, 2)
     with pytest.raises(KeyError):
-        build_structure(short, OMEGA, AMPLITUDE, HARMONICS)
+        build_structure(short, OMEGA, AMPLITUDE, ORDERS)
 
 
 def test_a_structure_that_nothing_holds_is_singular() -> None:
@@ -180,4 +227,4 @@ def test_a_structure_that_nothing_holds_is_singular() -> None:
         **free, load_static=linear.load_static, load_harmonic=linear.load_harmonic, response=linear.response
     )
     with pytest.raises(np.linalg.LinAlgError):
-        build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, 1)
+        build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, (1,))

@@ -1,0 +1,268 @@
+"""How states choose their harmonics and samples, and their error estimates against much finer states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from solver import adapt
+from solver.adapt import Estimate, Refined, coarser, refine, transfer
+from solver.harmonics import to_complex
+from solver.joint import Case, build_case
+from solver.kernels import SLIP, STICK
+from solver.linear import JacobianSolver
+from solver.model import ReducedModel
+from solver.path import Effort, PathPoint, final_history, solve_balance
+from solver.settings import (
+    Resolution,
+    SolverSettings,
+    all_orders,
+    first_resolution,
+    samples_for,
+)
+from tests.solver.models import OMEGA, first_point, random_model, scene
+
+SLIDER_OMEGA = 0.6 * float(np.sqrt(1.6e6))
+SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
+FRICTION = 0.4
+
+
+def started(
+    model: ReducedModel,
+    friction: float,
+    omega: float,
+    amplitude: float,
+    settings: SolverSettings,
+    resolution: Resolution | None = None,
+) -> tuple[Case, PathPoint]:
+    case = build_case(model, friction, omega, settings, resolution)
+    return case, first_point(case, omega, amplitude, np.zeros(model.contact.n_contact))
+
+
+def slider(settings: SolverSettings, force: float = 10.0) -> tuple[Case, PathPoint]:
+    return started(scene("sdof_slider", normal_stiffness=0.0), 0.5, SLIDER_OMEGA, force, settings)
+
+
+def solved_at(case: Case, omega: float, amplitude: float, point: PathPoint, resolution: Resolution) -> PathPoint:
+    """The same state with other harmonics and samples, which must be found."""
+    other = case.at(resolution)
+    balance, start = transfer(other, other.joint(omega, amplitude), point.evaluation, case.resolution.orders)
+    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, Effort(), 60)
+    assert result.converged
+    return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
+
+
+def response(case: Case, omega: float, amplitude: float, point: PathPoint) -> np.ndarray:
+    joint = case.joint(omega, amplitude)
+    return to_complex(joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h)))[:, 0]
+
+
+# ---------------------------------------------------------------------------------------------------------- resolution
+
+
+@pytest.mark.parametrize("highest", [1, 3, 8, 9, 15, 25, 41, 115])
+def test_samples_are_a_power_of_two_with_eight_a_harmonic(highest: int) -> None:
+    samples = samples_for(highest)
+    assert samples & (samples - 1) == 0
+    assert samples >= max(64, 8 * highest)
+    assert samples == 64 or samples < 16 * highest
+
+
+def test_settings_fix_what_they_name() -> None:
+    assert first_resolution(SolverSettings(5, 48)) == Resolution((1, 2, 3, 4, 5), 48)
+    assert first_resolution(SolverSettings(harmonics=20)) == Resolution(all_orders(20), samples_for(20))
+    assert first_resolution(SolverSettings(samples=200)) == Resolution((1, 2, 3), 200)
+    assert not SolverSettings(5, 48).automatic
+    assert SolverSettings(harmonics=5).automatic
+    assert SolverSettings(samples=48).automatic
+
+
+def test_a_coarser_case_is_one_step_down_the_ladder() -> None:
+    model = random_model(1)
+    case = build_case(model, FRICTION, OMEGA, SolverSettings(), Resolution(all_orders(15), 512))
+    seen = []
+    while (lower := coarser(case)) is not case:
+        assert lower.resolution.samples <= case.resolution.samples
+        assert lower.resolution.samples >= samples_for(lower.resolution.highest)
+        seen.append(lower.resolution.highest)
+        case = lower
+    assert seen == [9, 5, 3, 1]
+    assert case.resolution.orders == (1,)
+
+
+def test_a_coarser_case_keeps_odd_harmonics_odd_and_its_penalty_its_own() -> None:
+    model = random_model(1)
+    case = build_case(model, FRICTION, OMEGA, SolverSettings(), Resolution((1, 3, 5, 7, 9), 128))
+    lower = coarser(case)
+    assert lower.resolution == Resolution((1, 3, 5), 64)
+    again = build_case(model, FRICTION, OMEGA, SolverSettings(), lower.resolution)
+    assert np.array_equal(lower.penalty.tangential, again.penalty.tangential)
+
+
+def test_fixed_harmonics_do_not_get_coarser_and_fixed_samples_stay() -> None:
+    model = random_model(1)
+    fixed = build_case(model, FRICTION, OMEGA, SolverSettings(harmonics=9))
+    assert coarser(fixed) is fixed
+    samples = build_case(model, FRICTION, OMEGA, SolverSettings(samples=300), Resolution(all_orders(9), 300))
+    assert coarser(samples).resolution == Resolution(all_orders(5), 300)
+
+
+# -------------------------------------------------------------------------------------------------------------- states
+
+
+def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> None:
+    case, point = slider(SolverSettings())
+    assert case.resolution.orders == (1, 2, 3)
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    orders = refined.case.resolution.orders
+    assert len(orders) > 1
+    assert all(order % 2 for order in orders)
+    assert orders == tuple(range(1, orders[-1] + 1, 2))
+    # nothing is lost: with all harmonics it is the same state
+    every = solved_at(
+        refined.case,
+        SLIDER_OMEGA,
+        10.0,
+        refined.point,
+        Resolution(all_orders(orders[-1]), refined.case.resolution.samples),
+    )
+    other = refined.case.at(Resolution(all_orders(orders[-1]), refined.case.resolution.samples))
+    ours = response(refined.case, SLIDER_OMEGA, 10.0, refined.point)
+    assert response(other, SLIDER_OMEGA, 10.0, every) == pytest.approx(ours, rel=1e-6)
+
+
+def test_a_state_with_even_harmonics_keeps_them() -> None:
+    case, point = started(random_model(2), FRICTION, OMEGA, SLIPPING, SolverSettings())
+    refined = refine(case, OMEGA, SLIPPING, point, Effort())
+    orders = refined.case.resolution.orders
+    assert orders == all_orders(orders[-1])
+    assert 2 in orders
+
+
+@pytest.mark.parametrize("settings", [SolverSettings(), SolverSettings(samples=128)])
+def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) -> None:
+    amplitude = 1e-2
+    case, point = started(random_model(1), FRICTION, OMEGA, amplitude, settings)
+    # the second solve starts from where the first one slipped to: everything sticks
+    again = solved_at(case, OMEGA, amplitude, PathPoint(1.0, point.evaluation, point.history), case.resolution)
+    assert (again.evaluation.status_t == STICK).all()
+    refined = refine(case, OMEGA, amplitude, again, Effort())
+    assert refined.case.resolution == Resolution((1,), case.resolution.samples)
+    assert refined.estimate == Estimate(0.0, 0.0)
+    assert refined.accurate
+    assert not refined.point.evaluation.slip_work.any()
+    assert response(refined.case, OMEGA, amplitude, refined.point) == pytest.approx(
+        response(case, OMEGA, amplitude, again), rel=1e-7
+    )
+
+
+def test_a_stuck_state_of_fixed_harmonics_keeps_them() -> None:
+    case, point = slider(SolverSettings(harmonics=5), force=2.0)
+    assert (point.evaluation.status_t == STICK).all()
+    refined = refine(case, SLIDER_OMEGA, 2.0, point, Effort())
+    assert refined.case is case
+    assert refined.estimate == Estimate(0.0, 0.0)
+
+
+def test_fixed_settings_return_only_an_estimate() -> None:
+    case, point = slider(SolverSettings(3, 64))
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    assert refined.case is case
+    assert refined.point is point
+    assert refined.accurate
+    assert not refined.spare
+    assert 1e-4 < refined.estimate.response < 0.1
+    assert 1e-4 < refined.estimate.wear_rate < 0.1
+
+
+@pytest.mark.parametrize("settings", [SolverSettings(harmonics=9, rtol=1e-3), SolverSettings(samples=256, rtol=1e-3)])
+def test_what_the_settings_fix_is_not_changed(settings: SolverSettings) -> None:
+    case, point = slider(settings)
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    if settings.harmonics != "auto":
+        assert refined.case.resolution.orders == all_orders(9)
+        assert refined.case.resolution.samples >= case.resolution.samples
+    else:
+        assert refined.case.resolution.samples == 256
+        assert refined.case.resolution.highest > case.resolution.highest
+    assert refined.accurate == (refined.estimate.largest <= 1e-3)
+
+
+def test_three_harmonics_that_do_not_suffice_are_not_called_accurate() -> None:
+    case, point = slider(SolverSettings(harmonics=1, rtol=1e-3))
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    assert refined.case.resolution.orders == (1,)
+    assert not refined.accurate
+    assert refined.estimate.response > 1e-3
+
+
+@pytest.mark.parametrize(("name", "most"), [("MOST_SAMPLES", 64), ("MOST_UNKNOWNS", 5)])
+def test_a_state_that_is_not_allowed_what_it_needs_says_so(
+    name: str, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case, point = slider(SolverSettings(rtol=1e-4))
+    monkeypatch.setattr(adapt, name, most)
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    assert not refined.accurate
+    assert refined.estimate.largest > 1e-4
+    assert refined.point.evaluation.scaled_residual() <= 1e-8
+    resolution = refined.case.resolution
+    if name == "MOST_SAMPLES":
+        assert resolution.samples <= 64
+    else:
+        assert refined.point.evaluation.predicted_h.size <= 7  # what it began with
+    assert adapt.LADDER[-1] >= resolution.highest
+
+
+def test_a_state_far_better_than_needed_may_do_with_less() -> None:
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    case, point = started(model, 0.5, SLIDER_OMEGA, 10.0, SolverSettings(rtol=0.05), Resolution((1, 3, 5, 7, 9), 256))
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    assert refined.spare
+    assert refined.case is case
+    case, point = started(model, 0.5, SLIDER_OMEGA, 10.0, SolverSettings(rtol=1e-2))
+    assert not refine(case, SLIDER_OMEGA, 10.0, point, Effort()).spare
+
+
+def test_the_point_keeps_its_parameter_and_the_iterations_are_counted() -> None:
+    case, point = slider(SolverSettings(rtol=1e-3))
+    effort = Effort()
+    refined = refine(case, SLIDER_OMEGA, 10.0, PathPoint(42.0, point.evaluation, point.history), effort)
+    assert refined.point.parameter == 42.0
+    assert effort.iterations > 0
+
+
+# ----------------------------------------------------------------------------------------------------------- estimates
+
+# constant normal loads: with impacts as well, states of a random model have too many neighbours to be told apart
+KINDS: Sequence[str] = ("constant_load", "constant_load_one_tangent", "constant_load")
+
+
+def true_error(refined: Refined, amplitude: float, fine: Resolution) -> Estimate:
+    """Error against the same state with far more harmonics and samples."""
+    case = refined.case
+    steps = (Resolution(all_orders(25), 4096), fine)
+    best, at = refined.point, case
+    for step in steps:
+        if step.highest > at.resolution.highest:
+            best, at = solved_at(at, OMEGA, amplitude, best, step), at.at(step)
+    exact = response(case.at(fine), OMEGA, amplitude, best)
+    error = np.linalg.norm(response(case, OMEGA, amplitude, refined.point) - exact) / np.linalg.norm(exact)
+    work, its_work = (float(p.evaluation.slip_work.sum()) for p in (refined.point, best))
+    return Estimate(float(error), abs(work / its_work - 1.0) if its_work else 0.0)
+
+
+@pytest.mark.parametrize(("rtol", "fine"), [(1e-2, 25), (1e-3, 69)])
+@pytest.mark.parametrize("amplitude", [100.0, 200.0, 400.0, 800.0])
+def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: float, rtol: float, fine: int) -> None:
+    case, point = started(random_model(4, KINDS), FRICTION, OMEGA, amplitude, SolverSettings(rtol=rtol))
+    assert SLIP in point.evaluation.status_t
+    assert not case.penalty.inertial.any()
+    refined = refine(case, OMEGA, amplitude, point, Effort())
+    assert refined.accurate
+    assert fine > refined.case.resolution.highest
+    error = true_error(refined, amplitude, Resolution(all_orders(fine), 4096))
+    assert 1e-6 < error.response <= min(rtol, 2.0 * refined.estimate.response)
+    assert error.wear_rate <= min(rtol, 2.0 * refined.estimate.wear_rate)
