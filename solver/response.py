@@ -9,7 +9,7 @@ from numba import njit
 
 from solver.balance import Balance, Evaluation
 from solver.certificate import Certificate
-from solver.harmonics import change_orders, from_complex, to_complex
+from solver.harmonics import build_basis, change_orders, from_complex, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
@@ -20,6 +20,7 @@ from solver.path import Effort, PathPoint, final_history, follow_arc, follow_nat
 from solver.settings import Resolution
 
 LOAD_STEPS = 20
+PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
 
 
 def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
@@ -134,7 +135,7 @@ class StateReport:
 def report_state(joint: Joint, evaluation: Evaluation, certificate: Certificate) -> StateReport:
     """Pressures, slip and responses of a converged state."""
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
-    response_t = response_h @ joint.basis.synthesis
+    response_t = response_h @ build_basis(joint.basis.orders, PEAK_POINTS).synthesis
     return StateReport(
         wear_depth=evaluation.wear_depth,
         slip_work=evaluation.slip_work,

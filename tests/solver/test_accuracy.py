@@ -32,7 +32,7 @@ def test_a_smaller_tolerance_takes_more_harmonics_or_samples() -> None:
     for exact in (slider(10.0, 0.6), two_masses(0.4)):
         coarse, fine = (errors_of(exact, SolverSettings(rtol=rtol)) for rtol in (1e-2, 1e-3))
         assert fine.orders[-1] > coarse.orders[-1]
-        assert fine.samples > coarse.samples
+        assert fine.samples >= coarse.samples
         assert fine.response < coarse.response
 
 

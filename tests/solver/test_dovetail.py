@@ -52,7 +52,7 @@ def state_at(nodal_diameter: int, offset: float, amplitude: float) -> tuple[Star
 def law(nodal_diameter: int, start: StartState, state: PeriodicState, passes: int) -> tuple[np.ndarray, np.ndarray]:
     """Contact forces (n_contact, 3, N) of the plain law for what a state stores, and its predicted forces."""
     penalty = build_penalty(dovetail(3, nodal_diameter), start.penalty_omega, 3)
-    assert not penalty.at_velocity.any()
+    assert not penalty.inertial.any()
     moved = state.displacement_h.copy()
     moved[:, 0, 0] -= state.wear_depth
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])

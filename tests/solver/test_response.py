@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from solver.balance import Balance, Evaluation
+from solver.certificate import certify
 from solver.harmonics import build_basis
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, build_case
 from solver.model import FloatArray, ReducedModel
 from solver.path import Effort, PathPoint
-from solver.response import largest_distance, periodic_state, report_state, solve_static_state
+from solver.response import PEAK_POINTS, largest_distance, periodic_state, report_state, solve_static_state
 from solver.settings import SolverSettings
 from tests.solver.contact_twin import pair_period, status
 from tests.solver.models import OMEGA, dovetail, first_point, random_model
@@ -139,7 +140,7 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds: str, s
     model = case_of(kinds, seed).model
     motion = full_motion(model, state)
     penalty = joint.penalty
-    assert not penalty.at_velocity.any()
+    assert not penalty.inertial.any()
     # the contact force from the plain law alone, from what the state stores
     moved = state.displacement_h.copy()
     moved[:, 0, 0] -= model.contact.gap + state.wear_depth
@@ -197,13 +198,13 @@ def test_the_random_states_stick_slip_and_open() -> None:
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     joint, point, state = periodic(kinds, 1)
-    report = report_state(joint, point.evaluation)
+    report = report_state(joint, point.evaluation, certify(joint, point.evaluation))
     model = case_of(kinds, 1).model
     at = point.evaluation
     motion = full_motion(model, state)
     assert report.response == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
     static = np.real(model.linear[0].response @ motion.displacement[0])
-    phase = 2 * np.pi * np.arange(SETTINGS.samples) / SETTINGS.samples
+    phase = 2 * np.pi * np.arange(PEAK_POINTS) / PEAK_POINTS
     waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
     assert report.mean_pressure == pytest.approx(
