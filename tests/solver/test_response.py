@@ -16,7 +16,7 @@ from solver.joint import Case, Joint, build_case
 from solver.model import FloatArray, ReducedModel
 from solver.path import Effort, PathPoint
 from solver.response import PEAK_POINTS, largest_distance, periodic_state, report_state, solve_static_state
-from solver.settings import SolverSettings
+from solver.settings import SolverSettings, all_orders
 from tests.solver.contact_twin import pair_period, status
 from tests.solver.models import OMEGA, dovetail, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series
@@ -158,7 +158,7 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds: str, s
     assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
     # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
     many = np.maximum(series(predicted_h[:, 0], 64 * SETTINGS.samples), 0.0)
-    exact = many @ build_basis(SETTINGS.harmonics, many.shape[1]).analysis
+    exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
     kink = np.abs(np.diff(predicted_t[:, 0])).max()
     assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
     forces[:, 0] = series(state.contact_force_h[:, 0], SETTINGS.samples)
