@@ -1,4 +1,39 @@
-"""What a state violates: numbers from what is handed out, not from the iteration that found it."""
+"""What a state violates: numbers from what is handed out, not from the iteration that found it.
+
+Samples obey the contact law by construction, and the series made of them obey it but for what is cut off. So each
+number asks what the samples and the series together can still get wrong:
+
+- residual: equilibrium of the motion and force that are handed out; mean forces are its static harmonic.
+- penetration: of the series of the motion, which is what a user plots, also between samples. Over the largest relative
+  motion in the joint, without its mean: a long way of closing hides nothing. Falls as harmonics are added.
+- tension, cone_violation: of the samples, and of the Fejer mean of the series: the mean of its truncations. Its kernel
+  is positive, so the Fejer mean of any force that obeys the law lies in the cone, too, which is convex: the truncated
+  series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
+  that no such force has are seen.
+- energy_error: work of the excitation on the joint, less what the damping takes, less `mu` times normal force times
+  slip as it wears. At displacement level what is cut off neither gives nor takes, and the error is that of the
+  sampling; at velocity level it is the dissipation of what is cut off, and falls as harmonics are added. Over the
+  largest of these works, the elastic one times a loss factor of 1e-3 at least: less does no structure notice.
+- drift: change of the slip over a period.
+
+Largest values measured on good states (0 stands for below 1e-12):
+
+| states | H | penetration | tension | cone | energy | drift |
+|---|---|---|---|---|---|---|
+| slider, 10 N, 160 Hz | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 3e-2, 1e-2, 4e-3, 9e-4, 4e-4, 1e-4 | 0 |
+| two masses, 0.4 to 0.6 rad/s | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 7e-2, 2e-2, 8e-3, 2e-3, 7e-4, 2e-4 | 0 |
+| vibro-impact, 0.9 to 1.5 rad/s | 1, 3, 5, 11, 21, 41 | .13, .08, .05, .016, .007, .003 | 0 | 0 | 1e-2 | 0 |
+| coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
+| dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
+| 99 % of 1000 random scenes | 9 | 2e-2 | 0 | 1e-4 | 2e-2 | 5e-5 |
+
+With the limits below all of these hold but two masses at 0.4 rad/s and vibro-impact from 1.1 rad/s on at one harmonic,
+which are 24 % off and more, and three of the random scenes: two at the onset of slip at velocity level, where half of
+the dissipation is cut off, and one whose mean position drifts by 3e-3. They say nothing of smaller truncation errors: a
+slider at one harmonic is 8 % off and holds.
+What does not hold, as tested: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 %
+too large (15 % too small), slip that does not repeat by 2 % of the limit.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +42,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.balance import Evaluation
+from solver.harmonics import build_basis
 from solver.joint import Joint
-from solver.model import FloatArray, IntArray
+from solver.model import FloatArray
 
+# largest accepted violations; response and wear rate have estimates of their own
 LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.01, "energy_error": 0.05, "drift": 1e-3}
 FINER = 4  # points between two samples at which series are looked at: the samples themselves would flatter them
-LOSS = 1e-3
+LOSS = 1e-3  # loss factor below which nobody notices
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Violations of one state, all dimensionless; 0 is perfect."""
+    """Violations of one state, all dimensionless; 0 is perfect.
+
+    residual: scaled residual. penetration: over the largest relative motion. tension: over the largest normal force.
+    cone_violation: over the largest friction limit (normal force where there is no friction). energy_error: over the
+    largest work in a period. drift: change of the tangential state over a period, over the largest friction limit.
+    response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated. stable: whether
+    small disturbances die out. The last three are not judged here.
+    """
 
     residual: float
     penetration: float
@@ -88,23 +132,15 @@ def _share(violation: float, size: float) -> float:
     return violation / size if size > 0.0 else float("inf")
 
 
-def _orders(joint: Joint) -> IntArray:
-    """Orders (n,) of the harmonics above the static one, read off the basis itself."""
-    spectrum = np.abs(np.fft.rfft(joint.basis.synthesis[1::2], axis=1))
-    return np.asarray(spectrum.argmax(axis=1), np.int64)
-
-
 def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
     """Values (..., FINER N) of a series (..., m) on a finer grid than that of the samples."""
-    n_points = FINER * joint.basis.synthesis.shape[1]
-    phase = 2.0 * np.pi * np.arange(n_points) / n_points * _orders(joint)[:, None]
-    total = values_h[..., :1] + values_h[..., 1::2] @ np.cos(phase) + values_h[..., 2::2] @ np.sin(phase)
-    return np.asarray(total)
+    finer = build_basis(joint.basis.orders, FINER * joint.basis.n_samples)
+    return np.asarray(values_h @ finer.synthesis)
 
 
 def _fejer_mean(joint: Joint, force_h: FloatArray) -> FloatArray:
-    """Mean (n_contact, 3, FINER N), N, of the truncations of the force series: see the module."""
-    orders = _orders(joint)
+    """Mean (n_contact, 3, FINER N), N, of the truncations of the force series."""
+    orders = np.array(joint.basis.orders)
     weighted = force_h.copy()
     if orders.size:
         weighted[..., 1:] *= np.repeat(1.0 - orders / (orders.max() + 1.0), 2)
@@ -146,7 +182,7 @@ def _penetration(joint: Joint, evaluation: Evaluation) -> float:
 def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
     """Work over a period, J, of a force on a motion, both (..., m)."""
     turned = motion[..., 2::2] * force[..., 1::2] - motion[..., 1::2] * force[..., 2::2]
-    return float(np.pi * (turned * _orders(joint)).sum())
+    return float(np.pi * (turned * np.array(joint.basis.orders)).sum())
 
 
 def _amplitude(values_h: FloatArray) -> FloatArray:

@@ -1,0 +1,137 @@
+"""How many random scenes are solved, and what becomes of the others.
+
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.random_scenes [--count 1000] [--first 0] [--records FILE]
+
+Each scene: the first periodic state without wear, its certificate, a march of a few steps of wear. Prints outcomes,
+the largest numbers of the certificates, the seeds of those that fail with what they are, and the run time. `--records`
+keeps one JSON line a scene.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import time
+import traceback
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.certificate import LIMITS, certify
+from solver.history import StartState
+from solver.joint import build_case
+from solver.linear import JacobianSolver
+from solver.march import march_wear
+from solver.outcome import Outcome
+from solver.path import Effort
+from solver.response import periodic_state, solve_first_state
+from solver.settings import SolverSettings
+from tests.random_scenes import RandomScene, random_scene
+
+SETTINGS = SolverSettings(harmonics=9, samples=128)
+BOUND = 60  # s: a scene that takes longer hangs
+N_OUTPUTS = 6
+
+
+class BoundExceededError(Exception):
+    """The scene took longer than BOUND."""
+
+
+def run_scene(scene: RandomScene, settings: SolverSettings = SETTINGS) -> dict[str, Any]:
+    """What became of a scene: outcomes of the first state and of the march, certificate, iterations, time in s."""
+    started = time.perf_counter()
+    record: dict[str, Any] = {"seed": scene.seed, "facts": scene.facts, "scheme": scene.scheme, "march": ""}
+    omega = 2.0 * np.pi * scene.frequency_hz
+    unworn = np.zeros(scene.model.contact.n_contact)
+    case = build_case(scene.model, scene.friction, omega, settings)
+    effort = Effort()
+    outcome, point = solve_first_state(case, omega, scene.amplitude, unworn, JacobianSolver(), effort)
+    record |= {"first": outcome.meaning, "iterations": effort.iterations, "time": time.perf_counter() - started}
+    if point is None:
+        return record
+    joint = case.joint(omega, scene.amplitude)
+    certificate = certify(joint, point.evaluation)
+    record |= {"certificate": {name: getattr(certificate, name) for name in ("residual", *LIMITS)}}
+    record |= {"failed": certificate.sentence(settings.tolerance) if not certificate.holds(settings.tolerance) else ""}
+    record |= {"slips": bool(point.evaluation.slip_work.max() > 0.0), "statuses": _statuses(point.evaluation.status_t)}
+    start = StartState(outcome, periodic_state(joint, point), omega, effort.iterations, 0.0)
+    cycles = np.linspace(0.0, scene.cycles, N_OUTPUTS)
+    history = march_wear(
+        scene.model, scene.friction, start, scene.wear_coefficient, scene.step, scene.scheme, cycles, settings
+    )
+    record["march"] = history.outcome.meaning
+    if history.outcome is Outcome.CONVERGED:
+        values = [history.wear_depth, history.wear_rate, history.response, history.mean_pressure]
+        if not all(np.isfinite(value).all() for value in values):
+            record["march"] = "NaN where converged"
+        elif (np.diff(history.wear_depth, axis=0) < 0.0).any():
+            record["march"] = "wear falls"
+    record |= {"jumped": bool(np.isfinite(history.jump_cycle)), "march_iterations": history.newton_iterations}
+    record["march_time"] = time.perf_counter() - started - record["time"]
+    return record
+
+
+def _statuses(status_t: np.ndarray) -> list[int]:
+    """Which of separated, stick, slip occur."""
+    return [int(status) for status in np.unique(status_t)]
+
+
+def bounded(seed: int) -> dict[str, Any]:
+    """Record of a scene, whatever happens."""
+
+    def stop(*_: object) -> None:
+        raise BoundExceededError
+
+    scene = random_scene(seed)
+    signal.signal(signal.SIGALRM, stop)
+    signal.alarm(BOUND)
+    try:
+        record = run_scene(scene)
+    except BoundExceededError:
+        where = traceback.format_exc(limit=-6)
+        record = {"seed": seed, "facts": scene.facts, "first": "hangs", "march": "", "time": BOUND, "where": where}
+    except Exception as error:
+        where = traceback.format_exc(limit=-3)
+        record = {"seed": seed, "facts": scene.facts, "first": repr(error), "march": "", "time": 0.0, "where": where}
+    finally:
+        signal.alarm(0)
+    return record
+
+
+def solved(record: dict[str, Any]) -> bool:
+    """Whether the first state and the march have converged and the certificate holds."""
+    return record["first"] == "converged" and record["march"] == "converged" and not record["failed"]
+
+
+def main() -> None:
+    """Runs the scenes and prints the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--records", type=Path)
+    given = parser.parse_args()
+    started = time.perf_counter()
+    records = []
+    for seed in range(given.first, given.first + given.count):
+        records.append(bounded(seed))
+        if given.records is not None:
+            with given.records.open("a") as file:
+                file.write(json.dumps(records[-1]) + "\n")
+    print(f"{given.count} scenes in {time.perf_counter() - started:.0f} s; {sum(map(solved, records))} solved")
+    print("first state:", dict(Counter(record["first"] for record in records)))
+    print("march:", dict(Counter(record["march"] for record in records if record["march"])))
+    certified = [record for record in records if "certificate" in record]
+    for name in ("residual", *LIMITS):
+        values = np.array([record["certificate"][name] for record in certified])
+        quantiles = ", ".join(f"{share}: {np.quantile(values, share):.1e}" for share in (0.5, 0.9, 0.99, 1.0))
+        print(f"{name}: quantiles {quantiles}; largest at seed {certified[int(np.argmax(values))]['seed']}")
+    for record in records:
+        if not solved(record):
+            print(record["seed"], record["first"], record["march"], record.get("failed", ""), "|", record["facts"])
+
+
+if __name__ == "__main__":
+    main()

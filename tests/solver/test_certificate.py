@@ -1,0 +1,250 @@
+"""Certificates: good states hold, their numbers fall as harmonics are added, and every broken state is caught."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance, Evaluation
+from solver.certificate import LIMITS, Certificate, certify
+from solver.joint import Joint, build_case
+from solver.model import ReducedModel
+from solver.settings import SolverSettings
+from tests.solver.models import OMEGA, branch_states, dovetail, first_point, random_model, scene
+
+TOLERANCE = SolverSettings().tolerance
+GOOD = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SLIDER = 2 * np.pi * 160.0
+KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
+
+
+def on_branch(
+    model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings, sweep: str = "up"
+) -> tuple[Joint, Evaluation]:
+    """The state of a sweep, evaluated from what is stored of it."""
+    (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
+    assert start.state is not None
+    joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(model.contact.n_contact))
+    predicted = balance.predict(start.state.displacement_h, start.state.contact_force_h)
+    return joint, balance.evaluate(predicted)
+
+
+@lru_cache
+def slider(n_harmonics: int, n_samples: int = 256) -> tuple[Joint, Evaluation]:
+    settings = SolverSettings(n_harmonics, n_samples)
+    return on_branch(scene("sdof_slider", n_harmonics), 0.5, 10.0, SLIDER, settings)
+
+
+@lru_cache
+def two_masses(omega: float, n_harmonics: int) -> tuple[Joint, Evaluation]:
+    settings = SolverSettings(n_harmonics, 256)
+    return on_branch(scene("two_masses", n_harmonics), 0.5, 20.0, omega, settings)
+
+
+@lru_cache
+def vibro_impact(omega: float, n_harmonics: int, sweep: str = "up") -> tuple[Joint, Evaluation]:
+    """The upper branch is reached by a sweep up from below the bistable range."""
+    settings = SolverSettings(n_harmonics, 256)
+    model = scene("vibro_impact", n_harmonics)
+    if sweep == "down":
+        return on_branch(model, 0.0, 0.02, omega, settings, sweep)
+    omegas = [*np.arange(0.9, omega, 0.1), omega]
+    start = branch_states(model, 0.0, 0.02, omegas, settings)[-1]
+    assert start.state is not None
+    joint = build_case(model, 0.0, start.penalty_omega, settings).joint(omega, 0.02)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(1))
+    return joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+
+
+@lru_cache
+def random_state(seed: int, kinds: tuple[str, ...] = KINDS) -> tuple[Joint, Evaluation]:
+    """Elastic joint with pairs that stick, slip and open."""
+    case = build_case(random_model(seed, kinds), 0.4, OMEGA, SolverSettings(5, 128))
+    worn = np.random.default_rng(seed).uniform(0.0, 2e-6, len(kinds))
+    point = first_point(case, OMEGA, 60.0, worn)
+    return case.joint(OMEGA, 60.0), point.evaluation
+
+
+def failing(joint: Joint, evaluation: Evaluation) -> set[str]:
+    return set(certify(joint, evaluation).failures(TOLERANCE))
+
+
+@pytest.mark.parametrize("n_harmonics", [3, 5, 11, 21])
+def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
+    states = [slider(n_harmonics), two_masses(0.4, n_harmonics), two_masses(0.6, n_harmonics)]
+    states += [vibro_impact(1.2, n_harmonics), vibro_impact(1.5, n_harmonics), vibro_impact(1.2, n_harmonics, "down")]
+    for joint, evaluation in states:
+        certificate = certify(joint, evaluation)
+        assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_states_of_elastic_joints_hold(seed: int) -> None:
+    joint, evaluation = random_state(seed)
+    assert evaluation.slip_work.max() > 0.0
+    certificate = certify(joint, evaluation)
+    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+
+
+def test_a_dovetail_state_that_slips_and_lifts_holds() -> None:
+    settings = SolverSettings(3, 128)
+    omegas = 2 * np.pi * np.array([211.5, 212.5])
+    start = branch_states(dovetail(), 0.5, 2.0, omegas, settings)[-1]
+    assert start.state is not None
+    joint = build_case(dovetail(), 0.5, start.penalty_omega, settings).joint(start.state.omega, 2.0)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(16))
+    evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+    assert {0, 1, 2} == set(np.unique(evaluation.status_t))
+    certificate = certify(joint, evaluation)
+    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+    assert certificate.penetration > 1e-4, "a pair that lifts has a corner in its motion, which no series follows"
+
+
+def test_penetration_falls_as_harmonics_are_added() -> None:
+    for omega in (1.2, 1.5):
+        values = [certify(*vibro_impact(omega, n)).penetration for n in (3, 5, 11, 21)]
+        assert (np.diff(values) < 0.0).all()
+        assert values[-1] < values[0] / 8.0
+
+
+def test_the_energy_error_falls_as_harmonics_are_added() -> None:
+    # at velocity level what is cut off dissipates in the series, not in the law
+    for states in ([slider(n) for n in (3, 5, 11, 21)], [two_masses(0.4, n) for n in (3, 5, 11, 21)]):
+        values = [certify(*state).energy_error for state in states]
+        assert (np.diff(values) < 0.0).all()
+        assert values[-1] < values[0] / 8.0
+
+
+def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots() -> None:
+    joint, evaluation = slider(21)
+    limit = 0.5 * evaluation.force_t[0, 0].max()
+    overshoot = np.abs(evaluation.force_h[0, 1] @ joint.basis.synthesis).max() / limit - 1.0
+    assert overshoot > 0.1, "Gibbs"
+    certificate = certify(joint, evaluation)
+    assert certificate.cone_violation < 1e-12
+    assert certificate.tension == 0.0
+
+
+def test_an_unconverged_force_is_caught_by_the_residual() -> None:
+    for joint, evaluation in (slider(5), random_state(1)):
+        balance = Balance(joint, evaluation.history, evaluation.wear_depth, np.zeros(joint.contact.n_contact))
+        noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
+        size = np.abs(evaluation.predicted_h).max()
+        assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + 1e-5 * size * noise))
+
+
+@pytest.mark.parametrize("harmonic", [1, 2, 3])
+def test_a_dropped_harmonic_is_caught_by_the_residual(harmonic: int) -> None:
+    joint, evaluation = random_state(1)
+    for name in ("displacement_h", "force_h"):
+        values_h = getattr(evaluation, name).copy()
+        values_h[:, :, 2 * harmonic - 1 : 2 * harmonic + 1] = 0.0
+        assert "residual" in failing(joint, replace(evaluation, **{name: values_h}))
+
+
+@pytest.mark.parametrize("state", [slider(5), random_state(1)])
+def test_friction_that_drives_is_caught_by_the_energy(state: tuple[Joint, Evaluation]) -> None:
+    # the motion is made to fit the force, so that equilibrium alone would not tell
+    joint, evaluation = state
+    turned = evaluation.force_h.copy()
+    turned[:, 1:] *= -1.0
+    moved = joint.to_relative(evaluation.displacement_h)
+    left = joint.structure.force_h() - joint.to_relative(turned) - joint.structure.apply(moved)
+    n = np.arange(1, 6)
+    steps = np.array(
+        [np.linalg.solve(joint.structure.dynamic_stiffness[i - 1], left[:, 2 * i - 1] - 1j * left[:, 2 * i]) for i in n]
+    )
+    moved[:, 1::2] += steps.T.real
+    moved[:, 2::2] -= steps.T.imag
+    moved[:, 0] += np.linalg.solve(joint.structure.static_stiffness, left[:, 0])
+    broken = replace(evaluation, force_h=turned, displacement_h=joint.to_pairs(moved))
+    failures = certify(joint, broken).failures(TOLERANCE)
+    assert "residual" not in failures
+    assert failures["energy_error"][0] > 0.5
+
+
+@pytest.mark.parametrize("state", [slider(5), random_state(1)])
+def test_another_friction_coefficient_is_caught(state: tuple[Joint, Evaluation]) -> None:
+    joint, evaluation = state
+    weaker = replace(joint, friction_coefficient=0.9 * joint.friction_coefficient)
+    assert "cone_violation" in failing(weaker, evaluation)
+    stronger = replace(joint, friction_coefficient=1.15 * joint.friction_coefficient)
+    assert failing(stronger, evaluation) == {"energy_error"}
+
+
+def test_a_slip_that_does_not_repeat_is_caught() -> None:
+    joint, evaluation = random_state(1)
+    slipping = int(np.argmax(evaluation.slip_work))
+    state_t = evaluation.state_t.copy()
+    limit = joint.friction_coefficient * evaluation.force_t[:, 0].max()
+    state_t[slipping, 0] += 0.02 * limit * np.linspace(0.0, 1.0, state_t.shape[2])
+    assert failing(joint, replace(evaluation, state_t=state_t)) == {"drift"}
+    assert failing(joint, replace(evaluation, drift=0.02 * limit)) == {"drift"}
+
+
+def test_a_pull_is_caught_in_the_samples_and_in_the_series() -> None:
+    joint, evaluation = random_state(1)
+    pulled = evaluation.force_t.copy()
+    pulled[0, 0, 3] = -0.05 * pulled[:, 0].max()
+    assert "tension" in failing(joint, replace(evaluation, force_t=pulled))
+    force_h = evaluation.force_h.copy()
+    force_h[0, 0] = 0.0
+    force_h[0, 0, 1] = evaluation.force_t[:, 0].max()
+    assert {"tension", "residual"} <= failing(joint, replace(evaluation, force_h=force_h))
+
+
+def test_surfaces_in_each_other_are_caught() -> None:
+    joint, evaluation = random_state(1)
+    moved = np.linalg.norm(evaluation.displacement_h[:, :, 1:] @ joint.basis.synthesis[1:], axis=1).max()
+    closer = evaluation.displacement_h.copy()
+    closer[0, 0, 0] += 0.2 * moved
+    assert "penetration" in failing(joint, replace(evaluation, displacement_h=closer))
+    # worn depth and gap open the pair
+    assert certify(joint, replace(evaluation, wear_depth=evaluation.wear_depth + moved)).penetration == 0.0
+
+
+@pytest.mark.parametrize("kinds", [("normal_only",), ("constant_load",), ("3d",)])
+@pytest.mark.parametrize("friction", [0.0, 0.4, 100.0])
+def test_a_state_in_which_nothing_slips_has_finite_numbers(kinds: tuple[str, ...], friction: float) -> None:
+    case = build_case(random_model(2, kinds), friction, OMEGA, SolverSettings(3, 64))
+    for amplitude in (0.0, 1.0):
+        point = first_point(case, OMEGA, amplitude, np.zeros(1))
+        certificate = certify(case.joint(OMEGA, amplitude), point.evaluation)
+        assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+
+
+def test_pairs_out_of_reach_have_nothing_to_violate() -> None:
+    model = random_model(3, ("3d", "3d"))
+    model = replace(model, contact=replace(model.contact, gap=np.full(2, 1.0)))
+    case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
+    point = first_point(case, OMEGA, 10.0, np.zeros(2))
+    certificate = certify(case.joint(OMEGA, 10.0), point.evaluation)
+    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+    assert certificate.penetration == certificate.tension == certificate.cone_violation == certificate.drift == 0.0
+
+
+@pytest.mark.parametrize("name", ["residual", *LIMITS])
+def test_each_number_is_judged_and_named(name: str) -> None:
+    limit = LIMITS.get(name, 2.0 * TOLERANCE)
+    assert GOOD.holds(TOLERANCE)
+    assert replace(GOOD, **{name: limit}).holds(TOLERANCE)
+    for wrong in (1.01 * limit, float("inf"), float("nan")):
+        broken = replace(GOOD, **{name: wrong})
+        assert not broken.holds(TOLERANCE)
+        assert set(broken.failures(TOLERANCE)) == {name}
+        assert f"{wrong:.2g}" in broken.sentence(TOLERANCE)
+    sentences = {replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0] for other in ("residual", *LIMITS)}
+    assert len(sentences) == 1 + len(LIMITS)
+
+
+def test_what_others_fill_in_is_open() -> None:
+    names = [field.name for field in fields(Certificate)]
+    assert names == ["residual", *LIMITS, "response_error", "wear_rate_error", "stable"]
+    certificate = certify(*random_state(1))
+    assert np.isnan(certificate.response_error)
+    assert np.isnan(certificate.wear_rate_error)
+    assert certificate.stable

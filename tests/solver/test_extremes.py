@@ -1,0 +1,400 @@
+"""Extreme cases: each ends converged with its certificate holding, or with an honest outcome, in bounded time.
+
+Never NaN with a converged outcome, never a number with another one, no wear that falls, no wrong sign. Where physics
+leaves no doubt that a state exists, convergence is demanded.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance
+from solver.certificate import certify
+from solver.continuation import follow_branch
+from solver.history import StartState, WearHistory
+from solver.joint import build_case
+from solver.march import Scheme, march_wear
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from tests.references import slider_amplitude
+from tests.solver.models import OMEGA, dovetail, random_model, scene
+
+SETTINGS = SolverSettings(harmonics=5, samples=64)
+BOUND = 60.0  # s for a case that takes a few seconds at most: what is found is a hang, not a slow machine
+SCHEMES: tuple[Scheme, ...] = ("implicit", "explicit")
+FRICTION = 0.4
+AMPLITUDE = 60.0  # N: the pairs of the elastic model stick, slip and open
+WEAR = 1e-11  # 1/Pa: takes about a third of the preload of the elastic model in CYCLES
+CYCLES = 1e5
+BLOCK = 2.0 * np.pi * 100.0  # rad/s, at which the block is excited
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is run: model, angular frequency in rad/s, amplitude in N, wear coefficient in 1/Pa, cycles."""
+
+    model: ReducedModel
+    omega: float
+    friction: float = FRICTION
+    amplitude: float = AMPLITUDE
+    wear: float = WEAR
+    cycles: float = CYCLES
+    step: float = CYCLES / 10
+    scheme: Scheme = "implicit"
+    settings: SolverSettings = SETTINGS
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How it ended."""
+
+    start: StartState
+    history: WearHistory
+
+
+def elastic(n_pairs: int = 3) -> Case:
+    return Case(random_model(1, ("3d",) * n_pairs), OMEGA)
+
+
+def block(
+    stiffness: tuple[float, ...] = (1e7, 2e7),
+    *,
+    ground: float = 1e5,
+    damping: float = 0.02,
+    preload: float = 100.0,
+    area: tuple[float, ...] | None = None,
+    gap: float = 0.0,
+    lift: float = 0.0,
+) -> Case:
+    """A rigid block of 1 kg on elastic pairs without mass, pressed on, pushed along both tangents.
+
+    stiffness: N/m, of each pair, half as much along the tangents. ground: N/m, all that holds the block but friction.
+    damping: of critical, of the block on its pairs. preload: N, on the block. lift: vibrating force along the normal
+    over that along the first tangent.
+    """
+    n_pairs = len(stiffness)
+    n = 3 + 3 * n_pairs
+    k = np.zeros((n, n))
+    k[:3, :3] = ground * np.eye(3)
+    for pair, size in enumerate(stiffness):
+        for component, spring in enumerate((size, 0.5 * size, 0.5 * size)):
+            tie = np.zeros(n)
+            tie[component], tie[3 + 3 * pair + component] = 1.0, -1.0
+            k += spring * np.outer(tie, tie)
+    mass = np.zeros((n, n))
+    mass[:3, :3] = np.eye(3)
+    load_static = np.zeros(n)
+    load_static[0] = preload
+    load_harmonic = np.zeros(n, complex)
+    load_harmonic[:3] = lift, 1.0, 0.5j
+    contact = ContactInterface(
+        dofs=3 + np.arange(3 * n_pairs).reshape(n_pairs, 3),
+        area=np.full(n_pairs, 1e-4) if area is None else np.array(area),
+        gap=np.full(n_pairs, gap),
+        normal_load=np.zeros(n_pairs),
+        position=np.full((n_pairs, 3), np.nan),
+        surface=("plane",) * n_pairs,
+    )
+    c = 2.0 * damping / np.sqrt(max(stiffness)) * k
+    linear = LinearModel(mass, c, k, load_static, load_harmonic, np.eye(2, n, 1))
+    return Case(ReducedModel({0: linear}, contact, ("along", "across")), BLOCK)
+
+
+def slider(stiffness: float = 1e5, damping: float = 0.0, force: float = 10.0, omega: float = 2 * np.pi * 160.0) -> Case:
+    """The textbook slider; its normal force is 10 N less `stiffness` times the wear depth."""
+    model = scene("sdof_slider", SETTINGS.harmonics, normal_stiffness=stiffness, damping=damping)
+    return Case(model, omega, 0.5, force, 1.1e-11, 8e4, 8e3)
+
+
+def run(case: Case) -> Ended:
+    """Both phases of a point, judged."""
+    started = time.perf_counter()
+    frequencies = np.array([case.omega / (2.0 * np.pi)])
+    ((_, start),) = follow_branch(case.model, case.friction, case.amplitude, frequencies, "up", case.settings)
+    cycles = np.linspace(0.0, case.cycles, 6)
+    history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
+    assert time.perf_counter() - started < BOUND
+    judge_start(case, start)
+    judge_history(case, start, history)
+    return Ended(start, history)
+
+
+def judge_start(case: Case, start: StartState) -> None:
+    assert (start.state is None) == (start.outcome is not Outcome.CONVERGED)
+    if start.state is None:
+        return
+    n_contact = case.model.contact.n_contact
+    joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(n_contact))
+    evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+    certificate = certify(joint, evaluation)
+    assert certificate.holds(case.settings.tolerance), certificate.sentence(case.settings.tolerance)
+
+
+def judge_history(case: Case, start: StartState, history: WearHistory) -> None:
+    numbers = ("wear_depth", "wear_rate", "worn_volume", "mean_pressure", "slip_range", "open_fraction")
+    numbers += ("response", "response_peak")
+    if history.outcome is not Outcome.CONVERGED:
+        for name in numbers:
+            assert np.isnan(getattr(history, name)).all(), f"{name} has numbers where the outcome is a failure"
+        assert start.outcome is Outcome.CONVERGED or history.outcome is start.outcome
+        return
+    for name in numbers:
+        assert np.isfinite(getattr(history, name)).all(), f"{name} is not finite where the outcome is converged"
+    for name in numbers[:-2]:
+        # the mean normal force of a pair that opens and is loaded by its tangent alone is a rounded zero
+        size = np.abs(getattr(history, name)).max()
+        assert (getattr(history, name) >= -1e-12 * size).all(), f"{name} is negative"
+    assert (np.diff(history.wear_depth, axis=0) >= 0.0).all(), "wear falls"
+    assert (np.diff(history.worn_volume) >= 0.0).all(), "wear falls"
+    assert (history.open_fraction <= 1.0).all()
+
+
+def run_converged(case: Case) -> WearHistory:
+    """A case whose states exist."""
+    ended = run(case)
+    assert ended.start.outcome is Outcome.CONVERGED, ended.start.outcome.sentence
+    assert ended.history.outcome is Outcome.CONVERGED, ended.history.outcome.sentence
+    return ended.history
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("friction", [0.0, 0.05, 2.0])
+@pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
+def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
+    run_converged(replace(base, friction=friction, scheme=scheme))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e2, 1e4])
+@pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
+def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
+    ended = run(replace(base, wear=factor * base.wear, scheme=scheme))
+    assert ended.start.outcome is Outcome.CONVERGED
+    if scheme == "implicit":
+        assert ended.history.outcome is Outcome.CONVERGED, ended.history.outcome.sentence
+
+
+@pytest.mark.parametrize("factor", [1e-4, 1e-2, 1.0, 5.0, 50.0])
+@pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
+def test_amplitude(base: Case, factor: float) -> None:
+    history = run_converged(replace(base, amplitude=factor * base.amplitude))
+    if factor == 1e-4:
+        assert not history.wear_depth.any(), "so small a load is held by friction"
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0, 50.0])
+def test_a_block_that_bounces(factor: float) -> None:
+    # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
+    base = block(lift=0.2)
+    ended = run(replace(base, amplitude=factor * base.amplitude))
+    assert ended.start.outcome is Outcome.CONVERGED or factor > 1.0
+
+
+@pytest.mark.parametrize("amplitude", [5e-5, 0.5, 25.0])
+def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
+    settings = SolverSettings(3, 64)
+    case = Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 3e3, 1e3, settings=settings)
+    ended = run(case)
+    assert ended.start.outcome is Outcome.CONVERGED
+    assert ended.history.outcome is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("n_steps", [1, 7, 200])
+def test_step_from_one_cycle_to_all_cycles(n_steps: int, scheme: Scheme) -> None:
+    cycles = 200.0
+    case = replace(elastic(), wear=WEAR * CYCLES / cycles, cycles=cycles, step=cycles / n_steps, scheme=scheme)
+    ended = run(case)
+    if scheme == "implicit":
+        assert ended.history.outcome is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("ratio", [1e-8, 1e-4, 1e4, 1e8])
+def test_contact_stiffness_ratio(ratio: float) -> None:
+    history = run_converged(block((1e7, 1e7 * ratio)))
+    # the stiffer of two pairs on one rigid block carries the load
+    carried = history.mean_pressure[0] * 1e-4
+    assert carried.sum() == pytest.approx(100.0, rel=0.05)
+    assert np.argmax(carried) == int(ratio > 1.0)
+
+
+def test_massless_contact_displacements() -> None:
+    case = block()
+    assert np.linalg.matrix_rank(case.model.linear[0].mass) == 3
+    history = run_converged(case)
+    assert history.slip_range.max() > 0.0
+
+
+@pytest.mark.parametrize("friction_force", [9.0, 9.99])
+def test_friction_alone_bounds_an_undamped_resonance(friction_force: float) -> None:
+    # more than pi/4 of the force: Den Hartog; the work of the force is then less than what friction takes
+    case = replace(slider(0.0, 0.0, 10.0, 2 * np.pi * np.sqrt(1.6e6) / (2 * np.pi)), friction=friction_force / 10.0)
+    history = run_converged(replace(case, settings=SolverSettings(11, 256)))
+    assert history.response_peak[0, 0] < 10.0 / 1.6e5 * 20.0
+
+
+@pytest.mark.parametrize("friction_force", [0.0, 3.0, 7.0])
+def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: float) -> None:
+    case = slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6)))
+    ended = run(replace(case, friction=friction_force / 10.0))
+    if ended.start.outcome is Outcome.CONVERGED:
+        # round-off in the frequency is a detuning: then the motion is beyond all bounds that matter
+        assert ended.history.response_peak.max() > 1e3 * 10.0 / 1.6e5
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) -> None:
+    case = elastic()
+    linear = case.model.linear[0]
+    inner = np.setdiff1d(np.arange(len(linear.mass)), case.model.contact.dofs)
+    held = np.ix_(inner, inner)
+    squares = np.linalg.eigvals(np.linalg.solve(linear.mass[held], linear.stiffness[held])).real
+    undamped = replace(case.model, linear={0: replace(linear, damping=np.zeros_like(linear.damping))})
+    run(replace(case, model=undamped, omega=float(np.sqrt(np.sort(squares)[number]))))
+
+
+def test_zero_damping_off_resonance() -> None:
+    for case in (elastic(), block()):
+        linear = case.model.linear[0]
+        undamped = replace(case.model, linear={0: replace(linear, damping=np.zeros_like(linear.damping))})
+        run_converged(replace(case, model=undamped))
+
+
+@pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
+def test_no_static_load(base: Case) -> None:
+    linear = base.model.linear[0]
+    bare = replace(base.model, linear={0: replace(linear, load_static=np.zeros_like(linear.load_static))})
+    run_converged(replace(base, model=bare))
+
+
+def test_forces_below_all_numbers() -> None:
+    # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
+    case = block(preload=0.0, lift=0.2)
+    for amplitude in (1e-100, 1e-160, 0.0, 1.0):
+        run(replace(case, amplitude=amplitude))
+
+
+@pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
+def test_gaps_never_reached(base: Case) -> None:
+    contact = replace(base.model.contact, gap=np.full(base.model.contact.n_contact, 1.0))
+    history = run_converged(replace(base, model=replace(base.model, contact=contact)))
+    assert not history.wear_depth.any()
+    assert not history.mean_pressure.any()
+    assert (history.open_fraction == 1.0).all()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_wear_that_consumes_the_whole_preload(scheme: Scheme) -> None:
+    # 10 N on a spring of 1e5 N/m: nothing is left to wear at 1e-4 m
+    history = run_converged(replace(slider(), cycles=4e6, step=4e4, scheme=scheme))
+    if scheme == "implicit":
+        assert (history.wear_depth <= 1e-4 * (1.0 + 1e-6)).all()
+    assert history.wear_depth[-1, 0] == pytest.approx(1e-4, rel=0.05)
+    assert history.mean_pressure[-1, 0] < 0.05 * history.mean_pressure[0, 0]
+
+
+@pytest.mark.parametrize("kind", ["3d", "one_tangent", "second_tangent", "normal_only", "constant_load"])
+def test_one_pair(kind: str) -> None:
+    run_converged(Case(random_model(5, (kind,)), OMEGA))
+
+
+def test_500_pairs() -> None:
+    # one tangent each and a constant load: the same with closing displacements takes fifty times as long
+    settings = SolverSettings(1, 32)
+    case = Case(random_model(3, ("constant_load_one_tangent",) * 500), OMEGA, amplitude=20.0, settings=settings)
+    history = run_converged(case)
+    assert 0 < (history.wear_depth[-1] > 0.0).sum() < 500
+
+
+def test_area_ratio() -> None:
+    # the depth goes with 1/area at the same load: the smallest pair is worn out of reach at once, the others go on
+    history = run_converged(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
+    assert history.wear_depth[-1, 0] >= history.wear_depth[-1, 1] >= history.wear_depth[-1, 2] > 0.0
+
+
+@pytest.mark.parametrize("ground", [1e-1, 1e-6])
+def test_a_nearly_singular_free_body(ground: float) -> None:
+    # held by friction and by springs of 1e-8 and 1e-13 of the contact stiffness; pushed by less than friction holds
+    case = replace(block(ground=ground), amplitude=30.0, friction=0.5)
+    history = run_converged(case)
+    assert history.response_peak.max() < 1e-3
+
+
+def load_shares(step: float, scheme: Scheme) -> FloatArray:
+    """Difference of the normal forces of the two pairs of the block, N, after each of eight steps."""
+    history = run_converged_at_steps(replace(block(), step=step, cycles=8.0 * step, scheme=scheme))
+    carried: FloatArray = history.mean_pressure * 1e-4
+    return carried[:, 1] - carried[:, 0]
+
+
+def run_converged_at_steps(case: Case) -> WearHistory:
+    """All steps are reported, not only the six counts of `run`."""
+    start = run(case).start
+    cycles = np.arange(round(case.cycles / case.step) + 1) * case.step
+    history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
+    assert history.outcome is Outcome.CONVERGED
+    return history
+
+
+def block_limit() -> float:
+    """Largest stable explicit step of the block, cycles: wear evens the loads of its two pairs out at this rate."""
+    difference = load_shares(300.0, "explicit")
+    # explicit Euler on d' = -s d: each step multiplies by 1 - s h
+    return 2.0 * 300.0 / (1.0 - difference[1] / difference[0])
+
+
+def test_the_explicit_scheme_throws_the_load_to_and_fro_beyond_its_limit() -> None:
+    limit = block_limit()
+    assert 2000.0 < limit < 3500.0
+    stable, unstable = (load_shares(share * limit, "explicit") for share in (0.4, 1.2))
+    # evenly worn pairs carry nearly even loads
+    assert (stable > -0.02 * stable[0]).all()
+    assert np.abs(stable[3:]).max() < 0.02 * stable[0]
+    assert (unstable[1:] * unstable[:-1] < 0.0).all()
+    assert np.abs(unstable[-1]) > 2.0 * unstable[0]
+
+
+@pytest.mark.parametrize("share", [1.2, 4.0])
+def test_the_implicit_scheme_runs_through_beyond_that_limit(share: float) -> None:
+    difference = load_shares(share * block_limit(), "implicit")
+    # towards evenly worn pairs, which carry nearly even loads, and not beyond
+    assert (difference > -0.02 * difference[0]).all()
+    assert np.abs(difference[3:]).max() < 0.02 * difference[0]
+
+
+NEEDS_LIMIT = pytest.mark.skipif(
+    "step_limit" not in {field.name for field in fields(WearHistory)}, reason="the history has no step_limit yet"
+)
+
+
+@NEEDS_LIMIT
+def test_the_explicit_scheme_says_where_it_is_unstable() -> None:
+    limit = block_limit()
+    for share in (0.4, 1.2, 4.0):
+        case = replace(block(), step=share * limit, cycles=8.0 * share * limit, scheme="explicit")
+        history = run_converged_at_steps(case)
+        assert vars(history)["step_limit"] == pytest.approx(limit, rel=0.1)
+        assert vars(history)["oscillates"] == (share > 1.0)
+
+
+@NEEDS_LIMIT
+def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone() -> None:
+    # the slider under a spring: one step too long takes all of the preload, nothing is left that could oscillate
+    base = slider()
+
+    def rate(depth: float) -> float:
+        normal = 10.0 - 1e5 * depth
+        amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 0.5 * normal, base.omega)
+        return 1.1e-11 / 1e-4 * 4.0 * normal * amplitude
+
+    exact = 2.0 / ((rate(-1e-8) - rate(1e-8)) / 2e-8)
+    assert exact == pytest.approx(5.4e5, rel=0.01)
+    history = run_converged_at_steps(replace(base, scheme="explicit", step=3.0 * exact, cycles=15.0 * exact))
+    assert history.wear_depth[1, 0] > 1e-4, "more than the whole preload allows"
+    assert vars(history)["step_limit"] == pytest.approx(exact, rel=0.1)

@@ -1,0 +1,88 @@
+"""A few of the random scenes of the benchmark, and that they are what they are said to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.structure import condense
+from studies.model_check import check_model
+from tests.benchmarks.random_scenes import run_scene, solved
+from tests.random_scenes import COMPONENTS, RandomScene, random_scene
+
+SCENES = [random_scene(seed) for seed in range(200)]
+
+
+def arrays(scene: RandomScene) -> list[np.ndarray]:
+    linear, contact = scene.model.linear[0], scene.model.contact
+    return [
+        *(linear.mass, linear.damping, linear.stiffness, linear.load_static, linear.load_harmonic, linear.response),
+        *(contact.dofs, contact.area, contact.gap, contact.normal_load),
+        np.array([scene.friction, scene.amplitude, scene.frequency_hz, scene.wear_coefficient, scene.cycles]),
+    ]
+
+
+def test_a_seed_gives_one_scene() -> None:
+    for seed in range(20):
+        for one, other in zip(arrays(random_scene(seed)), arrays(SCENES[seed]), strict=True):
+            assert np.array_equal(one, other)
+    assert not np.array_equal(arrays(SCENES[0])[-1], arrays(SCENES[1])[-1])
+
+
+def test_all_scenes_are_possible_structures() -> None:
+    for scene in SCENES:
+        check_model(scene.model)
+        linear = scene.model.linear[0]
+        assert np.linalg.eigvalsh(linear.stiffness)[0] > 0.0
+        assert np.linalg.eigvalsh(linear.damping)[0] > 0.0
+        assert np.linalg.eigvalsh(linear.mass)[0] > -1e-12 * np.abs(linear.mass).max()
+        assert scene.amplitude > 0.0
+        assert scene.wear_coefficient > 0.0
+        assert scene.cycles == pytest.approx(5 * scene.step)
+
+
+def test_all_kinds_are_there() -> None:
+    sizes = {scene.model.contact.n_contact for scene in SCENES}
+    assert sizes == set(range(1, 9))
+    rows = {tuple(row >= 0) for scene in SCENES for row in scene.model.contact.dofs}
+    assert len(rows) == len(COMPONENTS)
+    for words in (("0 inner", "6 inner"), ("massless", "light", "direct"), ("pressed", "touching", "near", "far")):
+        for word in words:
+            assert sum(word in scene.facts for scene in SCENES) >= 10, word
+    frictions = np.array([scene.friction for scene in SCENES])
+    assert (frictions == 0.0).sum() >= 5
+    assert frictions.max() > 1.0
+    assert frictions.max() <= 2.0
+    assert {scene.scheme for scene in SCENES} == {"implicit", "explicit"}
+    assert sum(np.abs(scene.model.linear[0].load_harmonic.imag).max() > 0.0 for scene in SCENES) >= 50
+    singular = [np.linalg.matrix_rank(scene.model.linear[0].mass) < len(scene.model.linear[0].mass) for scene in SCENES]
+    assert sum(singular) >= 50
+
+
+def test_a_rigid_mass_stays_pressed_on() -> None:
+    """With all pressed pairs held, the vibrating normal force of a mass that sits on its pair is less than its mean."""
+    for scene in SCENES:
+        contact, linear = scene.model.contact, scene.model.linear[0]
+        words = scene.facts.split("; ")[1].split(", ")
+        pressed = np.array([word.endswith("pressed") for word in words])
+        held = contact.dofs[pressed][contact.dofs[pressed] >= 0]
+        if held.size == 0:
+            continue
+        omega = 2.0 * np.pi * scene.frequency_hz
+        full = linear.stiffness + 1j * omega * linear.damping - omega**2 * linear.mass
+        force = dict(zip(held, np.abs(condense(full, held, scene.amplitude * linear.load_harmonic).force), strict=True))
+        for row, word in zip(contact.dofs, words, strict=True):
+            if row[0] >= 0 and word.endswith("direct/pressed"):
+                assert force[row[0]] <= 0.5001 * linear.load_static[row[0]]
+
+
+def test_the_first_scenes_are_solved() -> None:
+    records = [run_scene(scene) for scene in SCENES[:30]]
+    unsolved = [record["seed"] for record in records if not solved(record)]
+    # at least 99 of 100 in the benchmark: among 30 one may be such a scene, and says why
+    assert len(unsolved) <= 1, unsolved
+    for record in records:
+        assert "NaN" not in record["march"]
+        assert record["march"] != "wear falls"
+    assert sum(record.get("slips", False) for record in records) >= 15
+    assert {status for record in records for status in record.get("statuses", [])} == {0, 1, 2}
