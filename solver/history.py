@@ -34,6 +34,8 @@ class StartState:
 
     penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line.
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
+    branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
+    fold_frequency: Hz, the fold at which the sweep left its branch on the way to this frequency; NaN if none.
     """
 
     outcome: Outcome
@@ -41,6 +43,8 @@ class StartState:
     penalty_omega: float
     newton_iterations: int
     run_time: float
+    branch: int = 0
+    fold_frequency: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,10 @@ class WearHistory:
     jump_cycle: first cycle count at which the branch was lost, NaN if never.
     error_estimate: estimated relative error of the last worn volume.
     run_time: CPU seconds of the computing thread, start state included.
+    branch, fold_frequency: those of the start state.
+    step_limit: cycles, predicted largest stable explicit step at the first state that wears: 2 over the largest
+    positive rate at which the wear rate falls with the depth; inf where none. oscillates: the wear rate went up and
+    down from step to step without calming, as in an unstable explicit scheme.
     """
 
     outcome: Outcome
@@ -70,3 +78,7 @@ class WearHistory:
     newton_iterations: int
     run_time: float
     message: str = ""
+    branch: int = 0
+    fold_frequency: float = float("nan")
+    step_limit: float = float("inf")
+    oscillates: bool = False

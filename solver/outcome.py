@@ -14,6 +14,10 @@ class Outcome(IntEnum):
     BRANCH_LOST = 3
     MARCH_FAILED = 4
     SINGULAR = 5
+    INACCURATE = 6
+    CERTIFICATE_FAILED = 7
+    UNSTABLE = 8
+    ADRIFT = 9
 
     @property
     def meaning(self) -> str:
@@ -36,4 +40,11 @@ _SENTENCES = {
     " step or more harmonics.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
+    Outcome.INACCURATE: "The estimated error of the response or the wear rate stays above rtol: use more harmonics and"
+    " samples.",
+    Outcome.CERTIFICATE_FAILED: "The state converged but violates the contact law or the balance of energy: use more"
+    " harmonics and samples.",
+    Outcome.UNSTABLE: "Only an unstable periodic state was found here: the structure does not stay at it.",
+    Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
+    " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
 }
