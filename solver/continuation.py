@@ -9,18 +9,26 @@ from typing import Literal
 import numpy as np
 
 from solver.adapt import UNKNOWN, Refined, refine
+from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.history import StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, follow_arc, follow_naturally
+from solver.path import Effort, PathPoint, follow_naturally, vibration_change
 from solver.response import periodic_state, solve_first_state
 from solver.settings import SolverSettings
+from solver.settling import settle
+from solver.stability import is_stable
 
-LEAD_IN = 0.05  # of the first frequency: a sweep begins outside its range, so that a single frequency knows its branch
+LEAD_INS = (
+    0.3,
+    0.05,
+)  # of the first frequency: a sweep begins outside its range, so that one frequency knows its branch
 FINE = 0.001  # of the frequency: steps that a sweep may always take
+SPAN = 0.05  # of the frequency: natural length of arc-length steps
+MOST_LANDINGS = 6  # ends of branches on the way from one frequency to the next
 
 Sweep = Literal["up", "down"]
 
@@ -35,9 +43,10 @@ def follow_branch(
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one.
 
-    "up" follows the branch from the lowest frequency, "down" from the highest, each from a little outside the range. At
-    a fold the branch is followed by arc length until it reaches the next frequency, which is where a slow sweep of the
-    machine would land if the branch is one curve; where that fails the state is sought from nothing.
+    "up" follows the branch from the lowest frequency, "down" from the highest, each from 30 % outside the range. Where
+    the branch ends at a fold it is followed by arc length until it reaches the next frequency in a stable state, which
+    is where a slow sweep of the machine would land if the branch is one curve; where that fails, the structure is left
+    to settle in time from the last state, and at last the state is sought from nothing.
     excitation_amplitude in N. Each state starts from the tangential history of the one before.
     """
     order = np.arange(frequencies.size) if sweep == "up" else np.arange(frequencies.size)[::-1]
@@ -47,6 +56,7 @@ def follow_branch(
     started = time.thread_time()
     for index in order:
         spent = line.effort.iterations
+        line.fold = float("nan")
         outcome, refined = line.advance(float(omegas[index]), sweep)
         now = time.thread_time()
         state, estimate = None, UNKNOWN
@@ -64,13 +74,18 @@ def follow_branch(
                 wear_rate_error=estimate.wear_rate,
                 newton_iterations=line.effort.iterations - spent,
                 run_time=now - started,
+                branch=line.branch,
+                fold_frequency=line.fold / (2.0 * np.pi),
             ),
         )
         started = now
 
 
 class _Line:
-    """The last state of a sweep and how it goes on."""
+    """The last state of a sweep and how it goes on.
+
+    branch: folds jumped over so far. fold: rad/s, the fold at which the branch was left last, NaN if none.
+    """
 
     def __init__(self, case: Case, excitation_amplitude: float) -> None:
         self.case = case
@@ -80,23 +95,42 @@ class _Line:
         self.effort = Effort()
         self.point: PathPoint | None = None
         self.failure = Outcome.START_FAILED
+        self.branch = 0
+        self.fold = float("nan")
 
     def advance(self, omega: float, sweep: Sweep) -> tuple[Outcome, Refined | None]:
         """State at the next angular frequency, rad/s, with the harmonics that it needs."""
+        if self.point is None:
+            self._lead_in(omega, sweep)
         try:
-            if self.point is None:
-                self.point = self._first(omega * (1.0 - LEAD_IN if sweep == "up" else 1.0 + LEAD_IN))
             reached = self._next(omega) if self.point is not None else None
             reached = reached or self._first(omega)
-            if reached is None:
-                return self.failure if self.point is None else Outcome.BRANCH_LOST, None
-            refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
+            refined = None
+            if reached is not None:
+                refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None
+        if refined is None:
+            lost = (
+                self.failure
+                if self.point is None or self.failure in (Outcome.UNSTABLE, Outcome.ADRIFT)
+                else Outcome.BRANCH_LOST
+            )
+            return lost, None
         if refined.case is not self.case:
             self.solver = JacobianSolver()
         self.case, self.point = refined.case, refined.point
         return (Outcome.CONVERGED, refined) if refined.accurate else (Outcome.INACCURATE, None)
+
+    def _lead_in(self, omega: float, sweep: Sweep) -> None:
+        """A state outside the range; none where there is none, or where the structure is singular there."""
+        for share in LEAD_INS:
+            try:
+                self.point = self._first(omega * (1.0 - share if sweep == "up" else 1.0 + share))
+            except np.linalg.LinAlgError:
+                continue
+            if self.point is not None:
+                return
 
     def _first(self, omega: float) -> PathPoint | None:
         self.failure, found = solve_first_state(
@@ -107,12 +141,47 @@ class _Line:
     def _next(self, omega: float) -> PathPoint | None:
         assert self.point is not None
         tolerance = self.case.settings.tolerance
-        point, arrived = follow_naturally(
-            self._balance_at, self.point, omega, self.solver, tolerance, self.effort, fine=FINE * omega
+        start = self.point
+        for _ in range(MOST_LANDINGS):
+            point, arrived = follow_naturally(
+                self._balance_at, start, omega, self.solver, tolerance, self.effort, fine=FINE * omega
+            )
+            if arrived and self._stays(point):
+                return point
+            # natural steps may have led onto an unstable part, nobody knows where: then the walk begins before them
+            end = start if arrived else point
+            arc = follow_arc(
+                self._balance_at, end, omega, SPAN * omega, self.solver, tolerance, self.effort, self._stays
+            )
+            if arc.point is not None:
+                self.branch += len(arc.jumps)
+                self.fold = arc.jumps[0] if arc.jumps and np.isnan(self.fold) else self.fold
+                return arc.point
+            landed = self._settled(end, omega, arc.folds)
+            if landed is None or landed.parameter == omega:
+                return landed
+            start = landed
+        return None
+
+    def _settled(self, end: PathPoint, omega: float, folds: tuple[float, ...]) -> PathPoint | None:
+        """State that the structure settles to from the end of a branch, a little beyond it on the way to omega."""
+        beyond = end.parameter + float(np.clip(omega - end.parameter, -FINE * omega, FINE * omega))
+        joint, before = (self.case.joint(at, self.excitation_amplitude) for at in (beyond, end.parameter))
+        self.failure, found = settle(
+            self.case, joint, self.unworn, end.evaluation, before, end.history, self.solver, self.effort
         )
-        if arrived:
-            return point
-        return follow_arc(self._balance_at, point, omega, 0.05 * omega, tolerance, self.effort)
+        if found is None:
+            return None
+        if vibration_change(end.evaluation, found.evaluation) > JUMP:
+            self.branch += 1
+            # an arc that broke off behind the fold has found it all the same
+            farthest = max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (omega - end.parameter))
+            self.fold = farthest if np.isnan(self.fold) else self.fold
+        return PathPoint(beyond, found.evaluation, found.history)
+
+    def _stays(self, point: PathPoint) -> bool:
+        balance = self._balance_at(point.parameter, point.evaluation.history)
+        return is_stable(balance.linearise(point.evaluation), self.solver)
 
     def _balance_at(self, omega: float, history: FloatArray) -> Balance:
         joint = self.case.joint(omega, self.excitation_amplitude)

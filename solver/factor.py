@@ -7,6 +7,7 @@ of the pairs' tangents that keeps it to itself, a complex matrix of as many rows
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import cast
 
@@ -35,6 +36,13 @@ class Factor:
     high: ComplexArray
 
     @property
+    def sign(self) -> float:
+        """Sign of the determinant, 0 where it is singular; a complex factor has the square of a modulus."""
+        factor, pivots = self.low
+        swaps = np.count_nonzero(pivots != np.arange(pivots.size))
+        return float(np.prod(np.sign(np.diag(factor)))) * (-1.0) ** swaps
+
+    @property
     def exact(self) -> bool:
         """Whether this is the Jacobian itself."""
         return len(self.high) == 0
@@ -60,7 +68,10 @@ def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
     n_low = n_harmonics
     while n_low > 0 and rows.size * (2 * n_low + 1) > DENSE:
         n_low -= 1
-    low = scipy.linalg.lu_factor(tangent.dense(pairs, n_low), overwrite_a=True, check_finite=False)
+    with warnings.catch_warnings():
+        # an exactly singular matrix: Newton's method goes on and judges by the residual
+        warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
+        low = scipy.linalg.lu_factor(tangent.dense(pairs, n_low), overwrite_a=True, check_finite=False)
     high = np.empty((n_harmonics - n_low, rows.size, rows.size), complex)
     for place in range(n_low, n_harmonics):
         high[place - n_low] = _inverse(tangent.dense_harmonic(pairs, place))

@@ -37,6 +37,8 @@ class StartState:
     penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line. resolution: harmonics and
     samples of the state. response_error, wear_rate_error: its estimated relative errors.
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
+    branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
+    fold_frequency: Hz, the fold at which the sweep left its branch on the way to this frequency; NaN if none.
     """
 
     outcome: Outcome
@@ -47,6 +49,8 @@ class StartState:
     wear_rate_error: float
     newton_iterations: int
     run_time: float
+    branch: int = 0
+    fold_frequency: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,10 @@ class WearHistory:
     step_limit: cycles, predicted largest stable explicit step at cycle 0, inf where there is none.
     oscillates: whether the wear rate oscillated from step to step as an unstable explicit scheme does.
     run_time: CPU seconds of the computing thread, start state included.
+    branch, fold_frequency: those of the start state.
+    step_limit: cycles, predicted largest stable explicit step at the first state that wears: 2 over the largest
+    positive rate at which the wear rate falls with the depth; inf where none. oscillates: the wear rate went up and
+    down from step to step without calming, as in an unstable explicit scheme.
     """
 
     outcome: Outcome

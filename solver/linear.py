@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -10,12 +11,15 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.balance import Linearisation
 from solver.factor import Factor, build_factor
-from solver.model import FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
 KRYLOV = 30  # products after which a kept factorisation has aged too much
 RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
 FORCING = 1e-3  # relative residual of an iterative solve
+ARNOLDI = 24  # products from which the sign of a determinant is taken where a kept factorisation serves
+WHOLE = 4000  # unknowns up to which all of them are factorised where it does not
+CERTAIN = 0.15  # a real part of an eigenvalue, 1 where the factorisation is exact, that is taken as far from zero
 
 
 @dataclass
@@ -42,6 +46,64 @@ class JacobianSolver:
         rest[rows] = False
         step[rest] = (right - tangent.apply(step))[rest]
         return step
+
+    def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Steps (n_rel, m) for two right sides; a small system is factorised once."""
+        pairs = tangent.active()
+        rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+        if not rows.size or rows.size * first.shape[1] > SMALL:
+            return self.solve(tangent, first), self.solve(tangent, second)
+        both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
+        solved = _solve_dense(tangent.dense(pairs), both)
+        steps = []
+        for right, column in ((first, solved[:, 0]), (second, solved[:, 1])):
+            step = np.zeros_like(right)
+            step[rows] = column.reshape(rows.size, -1)
+            rest = np.ones(right.shape[0], bool)
+            rest[rows] = False
+            step[rest] = (right - tangent.apply(step))[rest]
+            steps.append(step)
+        return steps[0], steps[1]
+
+    def determinant_sign(self, tangent: Linearisation) -> float:
+        """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
+
+        Columns of pairs that stay stuck or closed are those of the identity and do not count. In a large system the
+        sign is that of the kept factorisation P times (-1)^k, k the number of real negative eigenvalues of J P^-1. All
+        but few of its eigenvalues are near 1, and Arnoldi's method finds those that stand apart first: where none is
+        near or below zero k = 0, else the whole Jacobian is factorised. Where it is too large for that, k is counted
+        among the eigenvalues found.
+        """
+        pairs = tangent.active()
+        rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+        m = tangent.joint.basis.synthesis.shape[0]
+        if not rows.size:
+            return 1.0
+        if rows.size * m <= SMALL:
+            return float(np.linalg.slogdet(tangent.dense(pairs))[0])
+        if self._factor is None or not np.isin(pairs, self._factor.pairs).all():
+            self._factor = build_factor(tangent, pairs)
+            if self._factor.exact:
+                return self._factor.sign
+        values = self._eigenvalues(self._factor, tangent, m)
+        if np.all(np.isfinite(values)) and values.real.min() > CERTAIN:
+            return self._factor.sign
+        if rows.size * m <= WHOLE:
+            return float(np.linalg.slogdet(tangent.dense(pairs))[0])
+        below = np.count_nonzero((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real)))
+        return self._factor.sign * float((-1) ** below)
+
+    def _eigenvalues(self, factor: Factor, tangent: Linearisation, m: int) -> ComplexArray:
+        """Eigenvalues of J P^-1 that stand apart from the others."""
+        full = np.zeros((tangent.joint.slots.size, m))
+
+        def product(vector: FloatArray) -> FloatArray:
+            full[factor.rows] = factor.solve(vector.reshape(factor.rows.size, m))
+            return tangent.apply(full)[factor.rows].ravel()
+
+        # a fixed start: the answer must not depend on what was computed before
+        start = np.random.default_rng(0).normal(size=factor.rows.size * m)
+        return ritz_values(product, start, ARNOLDI)
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
@@ -79,6 +141,29 @@ class JacobianSolver:
             maxiter=restarts,
         )
         return precondition(solution), not failed
+
+
+def ritz_values(product: Callable[[FloatArray], FloatArray], start: FloatArray, most: int) -> ComplexArray:
+    """Eigenvalues of a real operator as Arnoldi's method knows them after at most `most` products."""
+    size = min(most, start.size)
+    basis = np.zeros((size + 1, start.size))
+    projected = np.zeros((size + 1, size))
+    basis[0] = start / np.linalg.norm(start)
+    for k in range(size):
+        image = product(basis[k])
+        length = float(np.linalg.norm(image))
+        for _ in range(2):  # twice, so that the basis stays orthogonal to round-off
+            share = basis[: k + 1] @ image
+            projected[: k + 1, k] += share
+            image = image - share @ basis[: k + 1]
+        projected[k + 1, k] = np.linalg.norm(image)
+        if not projected[k + 1, k] > 1e-12 * length:
+            size = k + 1
+            break
+        basis[k + 1] = image / projected[k + 1, k]
+    if not np.all(np.isfinite(projected)):
+        return np.full(size, np.nan, complex)
+    return np.linalg.eigvals(projected[:size, :size]).astype(complex)
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

@@ -11,19 +11,35 @@ import numpy as np
 from solver.adapt import Estimate, refine
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
+from solver.explicit_limit import explicit_step_limit, wear_oscillates
 from solver.history import StartState, WearHistory
 from solver.joint import Case, Joint, build_case
+from solver.jump import landings
 from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
-from solver.path import BalanceAt, Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.path import (
+    SMALLEST_SHARE,
+    BalanceAt,
+    Effort,
+    PathPoint,
+    final_history,
+    follow_naturally,
+    solve_balance,
+    vibration_change,
+)
 from solver.record import Recorder
-from solver.response import StateReport, report_state, solve_first_state
+from solver.response import StateReport, report_state
 from solver.settings import SolverSettings
-
-RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
+from solver.stability import is_stable
 
 Scheme = Literal["explicit", "implicit"]
+
+RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
+SMALLEST_RESOLUTION = 2.0**-10  # of a step
+JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
+MOST_JUMPS = 12
+RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 
 def march_wear(
@@ -46,10 +62,10 @@ def march_wear(
     started = time.thread_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time)
     if start.state is None:
-        return recorder.failed(start.outcome, 0.0)
+        failed = recorder.failed(start.outcome, 0.0)
+        return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = _March(case, start, wear_coefficient, scheme)
-    outcome = Outcome.CONVERGED
     try:
         outcome = march.begin()
         recorder.add(0.0, march.report(), wear_coefficient)
@@ -61,14 +77,31 @@ def march_wear(
             planned = march.planned_step(step, largest_depth)
             # a remainder below round-off of the count is no step of its own
             reach = end if march.cycle + planned >= end * (1.0 - 1e-12) else march.cycle + planned
-            outcome = march.advance(reach)
-            if outcome is not Outcome.CONVERGED:
-                break
+            before = march.cycle
+            if not march.advance(reach):
+                # what was reached of the step is a state, too
+                if march.cycle > before:
+                    outcome = march.check()
+                    recorder.add(march.cycle, march.report(), wear_coefficient)
+                if outcome is Outcome.CONVERGED and not march.jump(reach - before):
+                    outcome = march.failure
+                if outcome is not Outcome.CONVERGED:
+                    break
+            outcome = march.check()
             recorder.add(march.cycle, march.report(), wear_coefficient)
+        if outcome is Outcome.CONVERGED and not march.stays():
+            outcome = Outcome.UNSTABLE
     except np.linalg.LinAlgError:
         outcome = Outcome.SINGULAR
     spent = time.thread_time() - started
-    return recorder.finish(outcome, march.jump_cycle, march.effort.iterations, spent)
+    history = recorder.finish(outcome, march.jump_cycle, march.effort.iterations, spent)
+    return replace(
+        history,
+        branch=start.branch,
+        fold_frequency=start.fold_frequency,
+        step_limit=march.step_limit if march.step_limit > 0.0 else float("inf"),
+        oscillates=wear_oscillates(march.rates) or march.pairs_oscillate(),
+    )
 
 
 @dataclass
@@ -90,6 +123,12 @@ class _March:
         self.jump_cycle = float("nan")
         self.still = np.zeros(self.case.model.contact.n_contact)
         self.last_change: tuple[float, FloatArray] | None = None
+        self.unresolved = 0.0
+        self.jumps = 0
+        self.failure = Outcome.MARCH_FAILED
+        self.step_limit = float("nan")
+        self.rates: list[float] = []
+        self.pair_rates: list[FloatArray] = []
         self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
 
     def begin(self) -> Outcome:
@@ -100,20 +139,24 @@ class _March:
         predicted = balance.predict(state.displacement_h, state.contact_force_h)
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
+        self._note()
         self.estimated_for = evaluation.predicted_h
-        return self.certify()
+        return self.check()
 
-    def certify(self) -> Outcome:
-        """Certificate of the current state."""
+    def check(self) -> Outcome:
+        """Whether the current state may be reported: errors below rtol and a certificate that holds."""
+        accurate = self._refine()
         self.certificate = replace(
             certify(self.joint, self.point.evaluation),
             response_error=self.estimate.response,
             wear_rate_error=self.estimate.wear_rate,
         )
+        if not accurate:
+            return Outcome.INACCURATE
         holds = self.certificate.holds(self.case.settings.tolerance)
         return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
 
-    def refine(self) -> bool:
+    def _refine(self) -> bool:
         """Estimate the errors again, where the state has changed enough; False where they cannot be kept below rtol."""
         now = self.point.evaluation.predicted_h[:, 1:]
         changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
@@ -145,26 +188,108 @@ class _March:
             return step
         return largest_depth / float(self.rate().max())
 
-    def advance(self, reach: float) -> Outcome:
-        """One Euler step to the cycle count `reach`, and how it ended."""
+    def advance(self, reach: float) -> bool:
+        """One Euler step to the cycle count `reach`; False where the branch ends before: then the step has gone as far
+        as there is a stable state, to within `RESOLUTION`, and `jump` goes on.
+        """
         length = reach - self.cycle
-        balance_at = self._explicit(length) if self.scheme == "explicit" else self._implicit(length)
-        tolerance = self.case.settings.tolerance
+        balance_at = self._step(length)
         base = PathPoint(0.0, self.point.evaluation, self.point.history)
         found = self._extrapolated(balance_at(1.0, base.history), length)
-        if found is None:
-            last, arrived = follow_naturally(
-                balance_at, base, 1.0, self.solver, tolerance, self.effort, keep_history=True
+        if found is not None:
+            self._take(PathPoint(1.0, found, base.history), balance_at, length)
+            return True
+        # the end of a branch is to be known to a share of the count; in the first step to that of the step
+        resolution = RESOLUTION * (self.cycle if self.cycle > 0.0 else length) / length
+        shortest = max(min(resolution, SMALLEST_SHARE), SMALLEST_RESOLUTION)
+        last, arrived = follow_naturally(
+            balance_at,
+            base,
+            1.0,
+            self.solver,
+            self.case.settings.tolerance,
+            self.effort,
+            keep_history=True,
+            shortest=shortest,
+        )
+        if not self._is_stable(last.evaluation):
+            # where it has become unstable is not known: the jump is made from the start of the step
+            last, arrived = base, False
+        if arrived or last.parameter > 0.0:
+            self._take(last, balance_at, length)
+        self.unresolved = shortest * length
+        return arrived
+
+    def jump(self, length: float) -> bool:
+        """The branch has ended at the current count, in a step of the given length: land on another stable state a
+        little beyond; False where there is none.
+        """
+        self.jumps += 1
+        if self.jumps > MOST_JUMPS:
+            return False
+        beyond = min(2.0 * self.unresolved, length)
+        worn = self.point.evaluation.wear_depth + beyond * self.rate()
+        self.last_change = None
+        for landed in landings(self.case, self.joint, self.point, worn, self.solver, self.effort):
+            if isinstance(landed, Outcome):
+                self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
+                break
+            # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
+            balance_at = self._held(landed.evaluation.wear_depth, worn)
+            start = PathPoint(0.0, landed.evaluation, landed.history)
+            point, arrived = follow_naturally(
+                balance_at, start, 1.0, self.solver, self.case.settings.tolerance, self.effort, keep_history=True
             )
-            found = last.evaluation if arrived else self._jump(balance_at, last, length)
-        if found is None:
-            return Outcome.MARCH_FAILED
-        balance = balance_at(1.0, base.history)
-        change = found.predicted_h - self.point.evaluation.predicted_h
-        self.last_change = (length, change)
-        self.point = PathPoint(0.0, found, final_history(balance, found))
-        self.cycle = reach
-        return self.certify() if self.refine() else Outcome.INACCURATE
+            if not arrived or not self._is_stable(point.evaluation):
+                continue
+            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED and np.isnan(self.jump_cycle):
+                self.jump_cycle = self.cycle
+            self.point = PathPoint(
+                0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation)
+            )
+            self.cycle += beyond
+            return True
+        return False
+
+    def stays(self) -> bool:
+        """Whether the current state is stable."""
+        return self._is_stable(self.point.evaluation)
+
+    def pairs_oscillate(self) -> bool:
+        """Whether the wear rate of some pair went up and down from step to step."""
+        return any(wear_oscillates(pair) for pair in np.array(self.pair_rates).T)
+
+    def _is_stable(self, evaluation: Evaluation) -> bool:
+        held = Balance(self.joint, evaluation.history, evaluation.wear_depth, self.still)
+        return is_stable(held.linearise(evaluation), self.solver)
+
+    def _take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
+        """Make the state at a share of a step the current one."""
+        balance = balance_at(point.parameter, self.point.history)
+        gone = point.parameter * length
+        self.last_change = (gone, point.evaluation.predicted_h - self.point.evaluation.predicted_h)
+        self.point = PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation))
+        self.cycle += gone
+        self._note()
+
+    def _note(self) -> None:
+        """Keep the wear rate of the current state, and the limit of the explicit step at the first one that wears."""
+        rate = self.rate()
+        self.pair_rates.append(rate)
+        self.rates.append(float(rate @ self.joint.contact.area))
+        if np.isnan(self.step_limit) and self.wears():
+            balance = Balance(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth, self.still)
+            per_work = self.wear_coefficient / self.joint.contact.area
+            self.step_limit = explicit_step_limit(balance, self.point.evaluation, per_work, self.solver)
+
+    def _step(self, length: float) -> BalanceAt:
+        return self._explicit(length) if self.scheme == "explicit" else self._implicit(length)
+
+    def _held(self, before: FloatArray, after: FloatArray) -> BalanceAt:
+        def balance_at(share: float, history: FloatArray) -> Balance:
+            return Balance(self.joint, history, before + share * (after - before), self.still)
+
+        return balance_at
 
     def _explicit(self, length: float) -> BalanceAt:
         before, grown = self.point.evaluation.wear_depth, length * self.rate()
@@ -196,29 +321,3 @@ class _March:
             return None
         result = solve_balance(balance, predicted, self.solver, self.case.settings.tolerance, self.effort, 8)
         return result.evaluation if result.converged else None
-
-    def _jump(self, balance_at: BalanceAt, last: PathPoint, length: float) -> Evaluation | None:
-        """The branch has ended within the step: follow it through its fold, or land on another one."""
-        tolerance = self.case.settings.tolerance
-        if np.isnan(self.jump_cycle):
-            self.jump_cycle = self.cycle + last.parameter * length
-        self.last_change = None
-        beyond = follow_arc(balance_at, last, 1.0, 1.0, tolerance, self.effort)
-        if beyond is not None:
-            return beyond.evaluation
-        worn = last.evaluation.wear_depth
-        _, other = solve_first_state(
-            self.case, self.joint.omega, self.joint.excitation_amplitude, worn, self.solver, self.effort
-        )
-        if other is None:
-            return None
-        landed, arrived = follow_naturally(
-            balance_at,
-            PathPoint(0.0, other.evaluation, other.history),
-            1.0,
-            self.solver,
-            tolerance,
-            self.effort,
-            keep_history=True,
-        )
-        return landed.evaluation if arrived else None

@@ -17,6 +17,7 @@ class Outcome(IntEnum):
     INACCURATE = 6
     CERTIFICATE_FAILED = 7
     UNSTABLE = 8
+    ADRIFT = 9
 
     @property
     def meaning(self) -> str:
@@ -43,6 +44,8 @@ _SENTENCES = {
     " use more samples or a smaller tolerance.",
     Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"
     " direction, use more frequencies or start elsewhere.",
+    Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
+    " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from solver.arc import follow_arc
 from solver.balance import Balance, Evaluation
 from solver.certificate import Certificate
 from solver.harmonics import build_basis, change_orders, from_complex, to_complex
@@ -16,8 +17,10 @@ from solver.kernels import SEPARATED
 from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance
 from solver.settings import Resolution
+from solver.settling import settle
+from solver.stability import is_stable
 
 LOAD_STEPS = 20
 PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
@@ -59,8 +62,9 @@ def solve_first_state(
 ) -> tuple[Outcome, PathPoint | None]:
     """Periodic state found from nothing: the static state first, then the excitation raised; or why there is none.
 
-    A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails,
-    the vibration without the joint is tried as the start, and arc length last.
+    A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails or
+    ends in an unstable state, the vibration without the joint is tried as the start, then the vibration is left to
+    build up in time under the whole excitation (`settling`), and arc length in the excitation comes last.
 
     omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
     """
@@ -74,6 +78,15 @@ def solve_first_state(
     def balance_at(share: float, history: FloatArray) -> Balance:
         return Balance(case.joint(omega, share * excitation_amplitude), history, wear_depth, idle)
 
+    unstable = False
+
+    def stays(point: PathPoint) -> bool:
+        nonlocal unstable
+        at = point.evaluation
+        stable = is_stable(balance_at(1.0, at.history).linearise(at), solver)
+        unstable = unstable or not stable
+        return stable
+
     still = balance_at(0.0, static.history)
     displacement_h, force_h = (
         change_orders(part, (), case.resolution.orders)
@@ -83,17 +96,26 @@ def solve_first_state(
     result = solve_balance(still, start, solver, tolerance, effort)
     if not result.converged:
         return Outcome.START_FAILED, None
-    point = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
-    point, arrived = follow_naturally(balance_at, point, 1.0, solver, tolerance, effort)
-    if arrived:
+    rest = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
+    point, arrived = follow_naturally(balance_at, rest, 1.0, solver, tolerance, effort)
+    if arrived and stays(point):
         return Outcome.CONVERGED, point
     whole = balance_at(1.0, static.history)
     sliding = start + _free_motion(whole)
     result = solve_balance(whole, sliding, solver, tolerance, effort)
     if result.converged:
-        return Outcome.CONVERGED, PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
-    reached = follow_arc(balance_at, point, 1.0, 0.2, tolerance, effort)
-    return (Outcome.START_FAILED, None) if reached is None else (Outcome.CONVERGED, reached)
+        slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
+        if stays(slid):
+            return Outcome.CONVERGED, slid
+    joint = case.joint(omega, excitation_amplitude)
+    why, settled = settle(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, effort)
+    if settled is not None:
+        return Outcome.CONVERGED, PathPoint(1.0, settled.evaluation, settled.history)
+    if not arrived:
+        reached = follow_arc(balance_at, point, 1.0, 0.2, solver, tolerance, effort, stays).point
+        if reached is not None:
+            return Outcome.CONVERGED, reached
+    return Outcome.UNSTABLE if unstable else why, None
 
 
 def _free_motion(balance: Balance) -> FloatArray:

@@ -172,6 +172,43 @@ def test_a_single_frequency_knows_its_branch() -> None:
     assert not from_above.contact_force_h.any()
 
 
+@pytest.mark.parametrize("omega", [1.2, 1.5])
+def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: float) -> None:
+    # both branches exist from 1.0919 to 1.5576 rad/s
+    model = scene("vibro_impact")
+    (rising,), (falling,) = (branch_states(model, 0.0, 0.02, [omega], FINE, sweep) for sweep in ("up", "down"))
+    assert rising.state is not None
+    assert falling.state is not None
+    expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
+    assert first_harmonic("vibro_impact", rising.state)[1] == pytest.approx(expected, rel=0.005, abs=0.0)
+    assert not falling.state.contact_force_h.any()
+    assert rising.branch == falling.branch == 0
+
+
+@pytest.mark.parametrize(
+    ("sweep", "omegas", "fold"), [("up", [1.5, 1.54, 1.58, 1.65], 1.5576), ("down", [1.0, 1.05, 1.12, 1.2], 1.09195)]
+)
+def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep: str, omegas: list[float], fold: float) -> None:
+    starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, sweep)
+    in_order = starts if sweep == "up" else starts[::-1]
+    assert [start.outcome for start in starts] == [Outcome.CONVERGED] * 4
+    assert [start.branch for start in in_order] == [0, 0, 1, 1]
+    folds = [2 * np.pi * start.fold_frequency for start in in_order]
+    assert np.isnan(folds).tolist() == [True, True, False, True]
+    # the exact motions end between 1.5575 and 1.558, and between 1.092 and 1.0915 rad/s
+    assert folds[2] == pytest.approx(fold, rel=1e-4, abs=0.0)
+    with_impacts = [start.state is not None and bool(start.state.contact_force_h.any()) for start in in_order]
+    assert with_impacts == ([True, True, False, False] if sweep == "up" else [False, False, True, True])
+
+
+def test_a_refined_fold_does_not_depend_on_where_the_sweep_comes_from() -> None:
+    folds = []
+    for before in (1.50, 1.53, 1.55):
+        starts = branch_states(scene("vibro_impact"), 0.0, 0.02, [before, 1.6], FINE, "up")
+        folds.append(starts[1].fold_frequency)
+    assert folds == pytest.approx([folds[0]] * 3, rel=1e-4, abs=0.0)
+
+
 def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> None:
     # Mass 1 between two springs, mass 2 held: K + i w C - w^2 M is exactly zero at 2 rad/s.
     model = scene("two_masses", stiffness_1=3.0, stiffness_2=1.0, damping_1=0.0, damping_2=0.0)

@@ -8,11 +8,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver.arc import ARC_FAILURES, ARC_ITERATIONS, ARC_STEPS, follow_arc
 from solver.balance import Balance
 from solver.joint import build_case
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
-from solver.path import Effort, PathPoint, final_history, follow_arc, follow_naturally, solve_balance
+from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance
 from solver.settings import SolverSettings
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
@@ -101,8 +102,11 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
         return balance_at(amplitude, history)
 
     start = first(0.03)
-    point = follow_arc(watched, start, 0.06, 0.03, TOLERANCE, Effort())
+    result = follow_arc(watched, start, 0.06, 0.03, JacobianSolver(), TOLERANCE, Effort())
+    point = result.point
     assert point is not None
+    assert len(result.folds) == 2
+    assert result.folds[0] == pytest.approx(GRAZING, rel=0.01, abs=0.0)
     assert point.parameter == 0.06
     assert point.evaluation.scaled_residual() <= TOLERANCE
     assert size(point) == pytest.approx(upper_branch_size(0.06), rel=1e-6, abs=0.0)
@@ -115,8 +119,10 @@ def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
     start = first(0.01)
     natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Effort())
     assert arrived
-    arc = follow_arc(balance_at, start, 0.03, 0.02, TOLERANCE, Effort())
+    result = follow_arc(balance_at, start, 0.03, 0.02, JacobianSolver(), TOLERANCE, Effort())
+    arc = result.point
     assert arc is not None
+    assert result.folds == ()
     size = np.abs(natural.evaluation.force_h).max()
     assert size > 0.001
     assert arc.evaluation.force_h == pytest.approx(natural.evaluation.force_h, abs=1e-6 * size)
@@ -124,7 +130,10 @@ def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
 
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
     balance_at, first, _ = wall(0.5)
-    assert follow_arc(balance_at, first(0.01), np.inf, 0.01, TOLERANCE, Effort()) is None
+    effort = Effort()
+    result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, effort)
+    assert result.point is None
+    assert effort.iterations <= (ARC_STEPS + ARC_FAILURES) * ARC_ITERATIONS
 
 
 def test_history_is_handed_on_or_kept() -> None:

@@ -1,0 +1,152 @@
+"""Where the structure settles: steps in time against the exact motion, landings against exact branches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from solver.balance import Balance
+from solver.harmonics import change_orders
+from solver.joint import Case, build_case
+from solver.linear import JacobianSolver
+from solver.model import ReducedModel
+from solver.path import Effort, PathPoint, solve_balance
+from solver.response import periodic_state, solve_static_state
+from solver.settings import SolverSettings
+from solver.settling import Motion, Transient, settle
+from tests.references import coulomb_orbit, slider_orbit
+from tests.solver.models import OMEGA, converged_state, first_point, random_model, scene
+from tests.solver.reconstruction import full_motion
+
+FORCE = 0.02
+NATURAL = np.sqrt(1.6e6)
+
+
+def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings) -> float:
+    """First harmonics, m, that build up from rest."""
+    case = build_case(model, friction, omega, settings)
+    idle = np.zeros(model.contact.n_contact)
+    quiet = case.joint(omega, 0.0)
+    static = solve_static_state(quiet, idle, settings.tolerance, Effort())
+    assert static is not None
+    still = Balance(quiet, static.history, idle, idle)
+    at = static.evaluation
+    start = still.predict(*(change_orders(part, (), case.resolution.orders) for part in (at.displacement_h, at.force_h)))
+    rest = solve_balance(still, start, JacobianSolver(), settings.tolerance, Effort())
+    assert rest.converged
+    joint = case.joint(omega, amplitude)
+    _, point = settle(case, joint, idle, rest.evaluation, quiet, static.history, JacobianSolver(), Effort())
+    assert point is not None
+    assert point.evaluation.scaled_residual() <= settings.tolerance
+    return np.abs(full_motion(model, periodic_state(joint, point)).displacement[1])
+
+
+@pytest.mark.parametrize("omega", [0.3, 0.6, 1.3])
+def test_two_masses_settle_from_rest_to_their_exact_motion(omega: float) -> None:
+    orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
+    found = from_rest(scene("two_masses"), 0.5, 20.0, omega, SolverSettings(21, 256))
+    assert found == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.8, 1.1])
+def test_the_slider_settles_from_rest_to_its_exact_motion(ratio: float) -> None:
+    # 0.3: with stops
+    exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 3.0, ratio * NATURAL).harmonic(0))
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    found = from_rest(model, 0.3, 10.0, ratio * NATURAL, SolverSettings(21, 256))
+    assert found == pytest.approx([exact], rel=0.02, abs=0.0)
+
+
+def upper_state(case: Case, omega: float) -> PathPoint:
+    """Vibro-impact on the branch with impacts."""
+    state = converged_state(case.model, 0.0, FORCE, omega, case.settings)
+    idle = np.zeros(1)
+    balance = Balance(case.joint(omega, FORCE), state.start_history, idle, idle)
+    at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    assert np.abs(state.contact_force_h).max() > 1e-2
+    return PathPoint(omega, at, state.start_history)
+
+
+@pytest.mark.parametrize("omega", [1.56, 1.60])
+def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: float) -> None:
+    # the branch with impacts ends at 1.5576 rad/s
+    settings = SolverSettings(21, 256)
+    case = build_case(scene("vibro_impact"), 0.0, omega, settings)
+    before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
+    start = upper_state(case, 1.55)
+    effort = Effort()
+    _, found = settle(case, joint, np.zeros(1), start.evaluation, before, start.history, JacobianSolver(), effort)
+    assert found is not None
+    moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
+    assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
+    assert effort.iterations < 500
+
+
+def test_before_the_fold_the_mass_stays_where_it_is() -> None:
+    settings = SolverSettings(21, 256)
+    case = build_case(scene("vibro_impact"), 0.0, 1.4, settings)
+    start, joint = upper_state(case, 1.4), case.joint(1.4, FORCE)
+    _, found = settle(case, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), Effort())
+    assert found is not None
+    size = np.abs(start.evaluation.displacement_h).max()
+    assert found.evaluation.displacement_h == pytest.approx(start.evaluation.displacement_h, abs=1e-6 * size)
+
+
+def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
+    case = build_case(random_model(1, ("3d", "one_tangent")), 0.4, OMEGA, SolverSettings(3, 64, 1e-10))
+    idle = np.zeros(2)
+    point = first_point(case, OMEGA, 60.0, idle)
+    joint = case.joint(OMEGA, 60.0)
+    transient = Transient(case, joint)
+    motion = transient.periodic(point.evaluation)
+    for inverse in (1e-6 * OMEGA, 0.01 * OMEGA, OMEGA):
+        stepped = Balance(transient.step(motion, inverse), point.evaluation.history, idle, idle)
+        at = stepped.evaluate(point.evaluation.predicted_h)
+        assert at.scaled_residual() < 1e-9
+        after = transient.after(at, motion, inverse)
+        size = np.abs(motion.displacement).max()
+        assert after.displacement == pytest.approx(motion.displacement, abs=1e-8 * size)
+        assert after.velocity == pytest.approx(motion.velocity, abs=1e-8 * np.abs(motion.velocity).max())
+
+
+def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
+    # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
+    model = scene("vibro_impact", gap=1e3)
+    omega, end = 1.3, 2.0
+    case = build_case(model, 0.0, omega, SolverSettings(2, 32))
+    joint = case.joint(omega, FORCE)
+    flow = np.array([[0.0, 1.0, 0, 0], [-1.0, -0.05, FORCE, 0], [0, 0, 0, -omega], [0, 0, omega, 0]])
+    exact = (expm(flow * end) @ np.array([0.01, 0.0, 1.0, 0.0]))[0]
+    idle, history = np.zeros(1), np.zeros((1, 2))
+    errors = []
+    for steps in (250, 500):
+        transient = Transient(case, joint)
+        rest = transient.rest()
+        displacement = rest.displacement.copy()
+        displacement[0, 1] = 0.01
+        motion = Motion(displacement, rest.velocity)
+        inverse = steps / end
+        predicted = np.zeros((1, 5))
+        for _ in range(steps):
+            balance = Balance(transient.step(motion, inverse), history, idle, idle)
+            result = solve_balance(balance, predicted, JacobianSolver(), 1e-10, Effort())
+            assert result.converged
+            predicted = result.evaluation.predicted_h
+            motion = transient.after(result.evaluation, motion, inverse)
+        phases = np.exp(1j * omega * end * np.arange(3))
+        errors.append(abs(np.real(motion.displacement[:, 1] @ phases) - exact))
+    assert errors[1] < 0.02 * abs(exact)
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
+
+
+def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> None:
+    case = build_case(scene("vibro_impact"), 0.0, 1.2, SolverSettings(5, 64))
+    start, joint = upper_state(case, 1.2), case.joint(1.2, FORCE)
+    unreachable = replace(case, settings=replace(case.settings, tolerance=0.0))
+    effort = Effort()
+    _, found = settle(unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), effort)
+    assert found is None
+    assert effort.iterations < 120 * 22

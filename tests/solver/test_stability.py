@@ -1,0 +1,117 @@
+"""Stability of states on all three branches of a mass at a wall; signs of determinants against dense ones."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver import linear
+from solver.arc import follow_arc
+from solver.balance import Balance
+from solver.joint import build_case
+from solver.linear import JacobianSolver, ritz_values
+from solver.model import FloatArray
+from solver.path import Effort, PathPoint
+from solver.settings import SolverSettings
+from solver.stability import is_stable
+from tests.solver.models import converged_state, random_balance, random_model, scene
+
+FORCE = 0.02
+SETTINGS = SolverSettings(21, 256)
+CASE = build_case(scene("vibro_impact"), 0.0, 1.55, SETTINGS)
+
+
+def balance_at(omega: float, history: FloatArray) -> Balance:
+    return Balance(CASE.joint(omega, FORCE), history, np.zeros(1), np.zeros(1))
+
+
+@lru_cache
+def crossings() -> dict[float, list[PathPoint]]:
+    """States of the branch from 1.55 rad/s through both folds back to 1.55 rad/s, that lie at 1.3 and 1.55 rad/s."""
+    state = converged_state(CASE.model, 0.0, FORCE, 1.55, SETTINGS)
+    start = balance_at(1.55, state.start_history)
+    at = start.evaluate(start.predict(state.displacement_h, state.contact_force_h))
+    found: dict[float, list[PathPoint]] = {1.3: [], 1.55: []}
+    for target, seen in found.items():
+
+        def collect(point: PathPoint, seen: list[PathPoint] = seen) -> bool:
+            seen.append(point)
+            return len(seen) == 2
+
+        begin = PathPoint(1.55, at, state.start_history)
+        follow_arc(balance_at, begin, target, 0.08, JacobianSolver(), 1e-8, Effort(), collect, toward=1.0)
+    found[1.55].insert(0, PathPoint(1.55, at, state.start_history))
+    return found
+
+
+def test_the_branches_have_alternating_stability() -> None:
+    upper, middle, lower = crossings()[1.55]
+    tangents = [balance_at(1.55, point.history).linearise(point.evaluation) for point in (upper, middle, lower)]
+    assert [is_stable(tangent, JacobianSolver()) for tangent in tangents] == [True, False, True]
+    sizes = [np.abs(point.evaluation.displacement_h).max() for point in (upper, middle, lower)]
+    assert sizes[0] > sizes[1] > 0
+    assert not lower.evaluation.force_h.any()
+
+
+def test_between_its_folds_the_branch_is_unstable() -> None:
+    middle, lower = crossings()[1.3]
+    assert middle.evaluation.force_h.any()
+    for point, stable in ((middle, False), (lower, True)):
+        assert is_stable(balance_at(1.3, point.history).linearise(point.evaluation), JacobianSolver()) is stable
+
+
+def test_a_joint_that_is_open_or_stuck_all_over_is_stable() -> None:
+    for seed, level in ((1, -1e6), (2, 1e6)):
+        balance, predicted = random_balance(random_model(seed), SolverSettings(3, 24), seed, wear=False)
+        predicted[balance.joint.slots % 3 == 0, 0] = level
+        at = balance.evaluate(predicted)
+        assert (at.status_t == (0 if level < 0 else 1)).all()
+        assert is_stable(balance.linearise(at), JacobianSolver())
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
+def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed: int) -> None:
+    settings = SolverSettings(3, 24)
+    # wear in the step so large that signs of both kinds come up
+    balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), settings, seed, wear=True)
+    assert predicted.size > linear.SMALL
+    random = np.random.default_rng(seed)
+    solver = JacobianSolver()
+    for _ in range(6):
+        tangent = balance.linearise(balance.evaluate(predicted))
+        exact = np.linalg.slogdet(tangent.dense(np.arange(balance.joint.contact.n_contact)))[0]
+        assert solver.determinant_sign(tangent) == exact
+        predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
+
+
+def test_the_sign_of_a_small_system_is_that_of_the_dense_matrix() -> None:
+    signs = set()
+    for seed in range(30):
+        balance, predicted = random_balance(random_model(seed), SolverSettings(2, 24), seed, wear=True)
+        tangent = balance.linearise(balance.evaluate(predicted))
+        exact = np.linalg.slogdet(tangent.dense(np.arange(3)))[0]
+        assert JacobianSolver().determinant_sign(tangent) == exact
+        signs.add(float(exact))
+    assert 1.0 in signs
+
+
+def test_two_right_sides_are_solved_as_one_by_one() -> None:
+    for kinds in (("3d", "normal_only"), ("3d",) * 14):
+        balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
+        tangent = balance.linearise(balance.evaluate(predicted))
+        first, second = np.random.default_rng(5).normal(size=(2, *predicted.shape))
+        for right, step in zip((first, second), JacobianSolver().solve_two(tangent, first, second), strict=True):
+            assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+
+
+def test_ritz_values_of_a_whole_space_are_the_eigenvalues() -> None:
+    matrix = np.random.default_rng(1).normal(size=(12, 12))
+    found = ritz_values(lambda x: matrix @ x, np.ones(12), 30)
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(np.linalg.eigvals(matrix)), abs=1e-8)
+
+
+def test_ritz_values_of_an_invariant_space_end_early() -> None:
+    found = ritz_values(lambda x: np.array([3.0, 5.0, 7.0]) * x, np.array([1.0, 1.0, 0.0]), 3)
+    assert np.sort(found.real) == pytest.approx([3.0, 5.0], rel=1e-12, abs=0.0)
