@@ -11,6 +11,7 @@ import numpy as np
 from solver.adapt import UNKNOWN, Refined, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
+from solver.certificate import certify
 from solver.history import StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
@@ -120,7 +121,13 @@ class _Line:
         if refined.case is not self.case:
             self.solver = JacobianSolver()
         self.case, self.point = refined.case, refined.point
-        return (Outcome.CONVERGED, refined) if refined.accurate else (Outcome.INACCURATE, None)
+        if not refined.accurate:
+            return Outcome.INACCURATE, None
+        joint = refined.case.joint(omega, self.excitation_amplitude)
+        certificate = certify(joint, refined.point.evaluation)
+        if not certificate.holds(self.case.settings.tolerance):
+            return Outcome.CERTIFICATE_FAILED, None
+        return Outcome.CONVERGED, refined
 
     def _lead_in(self, omega: float, sweep: Sweep) -> None:
         """A state outside the range; none where there is none, or where the structure is singular there."""

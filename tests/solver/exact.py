@@ -9,13 +9,14 @@ from functools import lru_cache, partial
 import numpy as np
 
 from solver import adapt
+from solver.arc import follow_arc
 from solver.balance import Balance
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, follow_arc, follow_naturally
+from solver.path import Effort, PathPoint, follow_naturally
 from solver.response import solve_first_state
 from solver.settings import SolverSettings
 from tests import references
@@ -112,13 +113,14 @@ def first_found(exact: ExactState, case: Case, effort: Effort) -> PathPoint:
     def balance_at(omega: float, history: np.ndarray) -> Balance:
         return Balance(case.joint(omega, exact.amplitude), history, idle, idle)
 
-    tolerance = case.settings.tolerance
+    tolerance, solver = case.settings.tolerance, JacobianSolver()
     at = PathPoint(begin, point.evaluation, point.history)
     for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
-        followed, arrived = follow_naturally(balance_at, at, float(target), JacobianSolver(), tolerance, effort)
-        reached = (
-            followed if arrived else follow_arc(balance_at, followed, float(target), SWEEP_STEP, tolerance, effort)
+        followed, arrived = follow_naturally(balance_at, at, float(target), solver, tolerance, effort)
+        arc = (
+            None if arrived else follow_arc(balance_at, followed, float(target), SWEEP_STEP, solver, tolerance, effort)
         )
+        reached = followed if arc is None else arc.point
         assert reached is not None
         at = reached
     return at

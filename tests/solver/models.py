@@ -11,12 +11,12 @@ import numpy as np
 from solver.balance import Balance
 from solver.continuation import follow_branch
 from solver.history import PeriodicState, StartState
-from solver.joint import Case, build_case
+from solver.joint import Case, Joint, build_case
 from solver.linear import JacobianSolver
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
-from solver.response import solve_first_state
+from solver.response import periodic_state, solve_first_state
 from solver.settings import Resolution, SolverSettings, first_resolution
 from studies.scenes import build_scene, scene_parameters
 
@@ -194,3 +194,17 @@ def converged_state(
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
     assert start.state is not None, start.outcome
     return start.state
+
+
+def start_state(joint: Joint, point: PathPoint, iterations: int = 0) -> StartState:
+    """A state as a march takes it up, its errors not estimated."""
+    return StartState(
+        outcome=Outcome.CONVERGED,
+        state=periodic_state(joint, point),
+        penalty_omega=joint.omega,
+        resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
+        response_error=np.nan,
+        wear_rate_error=np.nan,
+        newton_iterations=iterations,
+        run_time=0.0,
+    )

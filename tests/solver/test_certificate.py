@@ -111,12 +111,10 @@ def test_penetration_falls_as_harmonics_are_added() -> None:
         assert values[-1] < values[0] / 8.0
 
 
-def test_the_energy_error_falls_as_harmonics_are_added() -> None:
-    # at velocity level what is cut off dissipates in the series, not in the law
+def test_the_energy_of_marched_masses_is_balanced_but_for_their_samples() -> None:
+    # what is cut off the series goes through the march: nothing is lost but what lies between the samples
     for states in ([slider(n) for n in (3, 5, 11, 21)], [two_masses(0.4, n) for n in (3, 5, 11, 21)]):
-        values = [certify(*state).energy_error for state in states]
-        assert (np.diff(values) < 0.0).all()
-        assert values[-1] < values[0] / 8.0
+        assert max(certify(*state).energy_error for state in states) < 3e-3
 
 
 def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots() -> None:

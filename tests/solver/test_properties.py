@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from solver.balance import Balance, Evaluation
 from solver.certificate import LIMITS, LOSS
-from solver.history import StartState, WearHistory
+from solver.history import WearHistory
 from solver.joint import Joint, build_case
 from solver.linear import JacobianSolver
 from solver.march import Scheme, march_wear
@@ -26,6 +26,7 @@ from solver.path import Effort, PathPoint
 from solver.response import periodic_state, solve_first_state
 from solver.settings import SolverSettings
 from tests.random_scenes import RandomScene, random_scene
+from tests.solver.models import start_state
 
 # the same examples in every run: a failure has to be one that the next run shows, too
 profile = settings(
@@ -69,7 +70,7 @@ def history(seed: int, scheme: Scheme, factor: float = 1.0) -> WearHistory:
     scene, joint, _ = state(seed)
     result = found(seed)
     assert result is not None
-    start = StartState(Outcome.CONVERGED, periodic_state(joint, result[2]), joint.omega, 0, 0.0)
+    start = start_state(joint, result[2])
     step = scene.step / factor
     cycles = np.linspace(0.0, 3.0 * step, 4)
     wear = factor * scene.wear_coefficient
@@ -120,13 +121,14 @@ def test_signorini(seed: int) -> None:
 @profile
 @given(seeds)
 def test_coulomb(seed: int) -> None:
-    scene, _, at = state(seed)
+    scene, joint, at = state(seed)
     size = largest_force(at)
     tangential = np.hypot(at.force_t[:, 1], at.force_t[:, 2])
     limit = scene.friction * at.force_t[:, 0]
     assert (tangential <= limit + 1e-13 * size).all()
     # what slips is at its limit and what is below it stays
-    slips = at.status_t == 2
+    # (of a marched mass a sample is the mean over a step, in which it may turn)
+    slips = (at.status_t == 2) & ~joint.penalty.inertial[:, None]
     assert (np.abs(tangential - limit)[slips] <= 1e-12 * size).all()
     # and it slips along its force
     steps = np.diff(at.state_t, axis=2)

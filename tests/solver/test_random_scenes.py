@@ -85,4 +85,4 @@ def test_the_first_scenes_are_solved() -> None:
         assert "NaN" not in record["march"]
         assert record["march"] != "wear falls"
     assert sum(record.get("slips", False) for record in records) >= 15
-    assert {status for record in records for status in record.get("statuses", [])} == {0, 1, 2}
+    assert 5 <= sum(record.get("opens", False) for record in records) <= 25

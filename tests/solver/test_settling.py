@@ -34,7 +34,8 @@ def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: flo
     assert static is not None
     still = Balance(quiet, static.history, idle, idle)
     at = static.evaluation
-    start = still.predict(*(change_orders(part, (), case.resolution.orders) for part in (at.displacement_h, at.force_h)))
+    orders = case.resolution.orders
+    start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
     rest = solve_balance(still, start, JacobianSolver(), settings.tolerance, Effort())
     assert rest.converged
     joint = case.joint(omega, amplitude)
