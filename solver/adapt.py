@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.balance import Balance, Evaluation
+from solver.certificate import certify
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
 from solver.kernels import SEPARATED, STICK
@@ -23,10 +24,12 @@ from solver.settings import Resolution, all_orders, samples_for
 
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235)  # highest harmonics; "auto" takes all but the last two
 MOST_SAMPLES = 8192
+MOST_ITERATIONS = 40
 MOST_UNKNOWNS = 50_000  # of a balance that "auto" may ask for
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
+SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
 SYMMETRIC = 1e-9
 AIM = 0.8  # of rtol: an estimate is one within a factor
 SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
@@ -94,11 +97,12 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if not settings.automatic:
             known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
             return Refined(here.case, here.point, known, True)
-        if estimate.largest <= AIM * settings.rtol:
+        holds = here.holds()
+        if estimate.largest <= AIM * settings.rtol and holds:
             here, estimate = here.relaxed(estimate, effort)
             return Refined(here.case, here.point, estimate, True)
         more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
-        more_harmonics = settings.harmonics == "auto" and by_harmonics.largest > by_samples.largest / 3.0
+        more_harmonics = settings.harmonics == "auto" and (not holds or by_harmonics.largest > by_samples.largest / 3.0)
         wanted = resolution
         if more_harmonics:
             higher = _on_ladder(resolution, 1)
@@ -140,7 +144,7 @@ class _Level:
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
         balance, start = transfer(case, joint, self.point.evaluation, self.case.resolution.orders)
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, 15)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, MOST_ITERATIONS)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
@@ -180,7 +184,7 @@ class _Level:
             if level is None:
                 break
             larger = level.difference(here).times(HARMONICS_SAFETY) + estimate
-            if larger.largest > enough:
+            if larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
         return here, estimate
@@ -190,10 +194,24 @@ class _Level:
         structure = self.joint.structure
         return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
 
+    def least_response(self) -> float:
+        """Response, m, below which a relative error says nothing: a small share of what the excitation would cause on
+        the joint's own stiffness. A mass that its friction holds does not respond at all.
+        """
+        structure, penalty = self.joint.structure, self.joint.penalty
+        stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
+        moved = structure.harmonic_force / stiffness[self.joint.slots]
+        response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
+        return max(SMALL_RESPONSE * float(np.linalg.norm(response)), 1e-300)
+
+    def holds(self) -> bool:
+        """Whether the certificate of the state holds."""
+        return certify(self.joint, self.point.evaluation).holds(self.case.settings.tolerance)
+
     def difference(self, better: _Level) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
-        response = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), 1e-300)
+        response = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), better.least_response())
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         # where friction takes next to nothing, a relative error of it says nothing
         input_work = better.joint.structure.input_work(better.joint.to_relative(better.point.evaluation.displacement_h))

@@ -11,17 +11,17 @@ number asks what the samples and the series together can still get wrong:
   series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
   that no such force has are seen.
 - energy_error: work of the excitation on the joint, less what the damping takes, less `mu` times normal force times
-  slip as it wears. At displacement level what is cut off neither gives nor takes, and the error is that of the
-  sampling; at velocity level it is the dissipation of what is cut off, and falls as harmonics are added. Over the
-  largest of these works, the elastic one times a loss factor of 1e-3 at least: less does no structure notice.
+  slip as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
+  these works, the elastic one and what the excitation could do at most times a loss factor of 1e-3 at least: less does
+  no structure notice.
 - drift: change of the slip over a period.
 
 Largest values measured on good states (0 stands for below 1e-12):
 
 | states | H | penetration | tension | cone | energy | drift |
 |---|---|---|---|---|---|---|
-| slider, 10 N, 160 Hz | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 3e-2, 1e-2, 4e-3, 9e-4, 4e-4, 1e-4 | 0 |
-| two masses, 0.4 to 0.6 rad/s | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 7e-2, 2e-2, 8e-3, 2e-3, 7e-4, 2e-4 | 0 |
+| slider, 10 N, 160 Hz | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 7e-4, 2e-4, 7e-5, 4e-5, 4e-5, 4e-5 | 1e-11 |
+| two masses, 0.4 to 0.6 rad/s | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 2e-3, 4e-4, 2e-4, 8e-5, 7e-5, 7e-5 | 1e-11 |
 | vibro-impact, 0.9 to 1.5 rad/s | 1, 3, 5, 11, 21, 41 | .13, .08, .05, .016, .007, .003 | 0 | 0 | 1e-2 | 0 |
 | coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
 | dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
@@ -47,7 +47,7 @@ from solver.joint import Joint
 from solver.model import FloatArray
 
 # largest accepted violations; response and wear rate have estimates of their own
-LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.01, "energy_error": 0.05, "drift": 1e-3}
+LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.05, "energy_error": 0.05, "drift": 1e-3}
 FINER = 4  # points between two samples at which series are looked at: the samples themselves would flatter them
 LOSS = 1e-3  # loss factor below which nobody notices
 
@@ -202,7 +202,9 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     dissipation = joint.friction_coefficient * float(evaluation.slip_work.sum())
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
-    size = max(abs(excitation), abs(damping), abs(contact), dissipation, LOSS * elastic)
+    # what the excitation could do at most: beside a resonance it does next to nothing
+    apparent = np.pi * float((_amplitude(joint.structure.force_h()) * _amplitude(motion)).sum())
+    size = max(abs(excitation), abs(damping), abs(contact), dissipation, LOSS * elastic, LOSS * apparent)
     return _share(abs(excitation - damping - dissipation), size)
 
 

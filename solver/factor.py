@@ -18,6 +18,8 @@ from solver.balance import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 
 DENSE = 800  # unknowns that are factorised together: 48 pairs with two harmonics
+FEW_ROWS = 40  # relative displacements up to which each of them couples most harmonics: impacts
+DENSE_FEW = 2500  # unknowns that are factorised together then
 
 RealFactor = tuple[FloatArray, IntArray]
 
@@ -66,7 +68,8 @@ def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
     rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
     n_harmonics = tangent.joint.basis.n_harmonics
     n_low = n_harmonics
-    while n_low > 0 and rows.size * (2 * n_low + 1) > DENSE:
+    most = DENSE_FEW if rows.size <= FEW_ROWS else DENSE
+    while n_low > 0 and rows.size * (2 * n_low + 1) > most:
         n_low -= 1
     with warnings.catch_warnings():
         # an exactly singular matrix: Newton's method goes on and judges by the residual

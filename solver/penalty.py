@@ -21,8 +21,9 @@ from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure import condense, relative_indices
 
 INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
+INERTIAL_RATE = 8.0  # of the frequency: where that is judged, for any number of harmonics alike
 DRAG = 0.1  # of m w: forgets the start of a period to a half within the next
-STATIC_SHARE = 1e-6  # of the static stiffness: what holds the mean position of a marched mass
+STATIC_SHARE = 1e-7  # of the stiffness at the frequency: what holds the mean position of a marched mass
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,10 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     At a real rate the structure has no resonances: it shows an elastic joint its stiffness and a slider its mass.
     """
     rate = (highest + 1) * omega
-    size, twice = _stiffness_at(model, rate), _stiffness_at(model, 2.0 * rate)
+    size = _stiffness_at(model, rate)
+    low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-    inertial = has_tangent & (twice[:, 1] > INERTIAL * size[:, 1])
+    inertial = has_tangent & (high > INERTIAL * low)
     mass = np.ones(size.shape[0])
     if inertial.any():
         mass[inertial] = _mass_at(model, rate)[inertial]
@@ -60,7 +62,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
         inertial=inertial,
         mass=mass,
         drag=DRAG * mass * omega,
-        mean=STATIC_SHARE * size[:, 1],
+        mean=STATIC_SHARE * _stiffness_at(model, omega)[:, 1],
     )
 
 

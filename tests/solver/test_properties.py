@@ -23,7 +23,7 @@ from solver.march import Scheme, march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
-from solver.response import periodic_state, solve_first_state
+from solver.response import solve_first_state
 from solver.settings import SolverSettings
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import start_state
