@@ -22,10 +22,12 @@ from solver.model import ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, final_history, solve_balance
 from solver.settings import Resolution, all_orders, samples_for
 
-LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235)  # highest harmonics; "auto" takes all but the last two
+LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
 MOST_SAMPLES = 8192
-MOST_ITERATIONS = 40
-MOST_UNKNOWNS = 50_000  # of a balance that "auto" may ask for
+MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
+FEW_ITERATIONS = 12  # where they are dear
+DEAR = 1000  # unknowns
+MOST_UNKNOWNS = 6000  # of a balance that "auto" may march with
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
@@ -144,7 +146,8 @@ class _Level:
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
         balance, start = transfer(case, joint, self.point.evaluation, self.case.resolution.orders)
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, MOST_ITERATIONS)
+        most = MOST_ITERATIONS if start.size <= DEAR else FEW_ITERATIONS
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, most)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))

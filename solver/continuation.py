@@ -19,7 +19,7 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, follow_naturally, vibration_change
 from solver.response import periodic_state, solve_first_state
-from solver.settings import SolverSettings
+from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.settling import settle
 from solver.stability import is_stable
 
@@ -29,6 +29,7 @@ LEAD_INS = (
 )  # of the first frequency: a sweep begins outside its range, so that one frequency knows its branch
 FINE = 0.001  # of the frequency: steps that a sweep may always take
 SPAN = 0.05  # of the frequency: natural length of arc-length steps
+OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
 MOST_LANDINGS = 6  # ends of branches on the way from one frequency to the next
 
 Sweep = Literal["up", "down"]
@@ -140,10 +141,21 @@ class _Line:
                 return
 
     def _first(self, omega: float) -> PathPoint | None:
-        self.failure, found = solve_first_state(
-            self.case, omega, self.excitation_amplitude, self.unworn, self.solver, self.effort
-        )
-        return None if found is None else PathPoint(omega, found.evaluation, found.history)
+        failure: Outcome | None = None
+        for resolution in (self.case.resolution, *(OTHER_STARTS if self.case.settings.automatic else ())):
+            case, solver = self.case.at(allowed(resolution, self.case.settings)), JacobianSolver()
+            self.failure, found = solve_first_state(
+                case, omega, self.excitation_amplitude, self.unworn, solver, self.effort
+            )
+            # the first attempt says why there is none
+            failure = failure or self.failure
+            if found is not None:
+                self.case, self.solver = case, solver
+                return PathPoint(omega, found.evaluation, found.history)
+            if self.failure is Outcome.STATIC_FAILED:
+                break
+        self.failure = failure or self.failure
+        return None
 
     def _next(self, omega: float) -> PathPoint | None:
         assert self.point is not None

@@ -23,6 +23,7 @@ from solver.settling import settle
 from solver.stability import is_stable
 
 LOAD_STEPS = 20
+RELIEF = (0.1, 0.4)  # of the static friction forces, where vibration cannot be raised from the static state
 PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
 
 
@@ -63,8 +64,10 @@ def solve_first_state(
     """Periodic state found from nothing: the static state first, then the excitation raised; or why there is none.
 
     A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails or
-    ends in an unstable state, the vibration without the joint is tried as the start, then the vibration is left to
-    build up in time under the whole excitation (`settling`), and arc length in the excitation comes last.
+    ends in an unstable state, the vibration without the joint is tried as the start. Pairs that the static load has
+    left at their friction limit slip under the smallest vibration, in states that do not lie near the static one:
+    vibration shakes such pairs down, so it is raised from states that carry less friction, too. Then the vibration is
+    left to build up in time under the whole excitation (`settling`), and arc length in the excitation comes last.
 
     omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
     """
@@ -107,6 +110,14 @@ def solve_first_state(
         slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
         if stays(slid):
             return Outcome.CONVERGED, slid
+    for share in RELIEF:
+        relieved = Balance(quiet, _relieved(quiet, static, share), wear_depth, idle)
+        result = solve_balance(relieved, start, solver, tolerance, effort)
+        if result.converged:
+            held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
+            risen, climbed = follow_naturally(balance_at, held, 1.0, solver, tolerance, effort)
+            if climbed and stays(risen):
+                return Outcome.CONVERGED, risen
     joint = case.joint(omega, excitation_amplitude)
     why, settled = settle(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, effort)
     if settled is not None:
@@ -116,6 +127,11 @@ def solve_first_state(
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None
+
+
+def _relieved(joint: Joint, static: PathPoint, share: float) -> FloatArray:
+    """Tangential history (n_contact, 2), m, with which pairs carry a share less of their static friction force."""
+    return static.history + share * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 
 def _free_motion(balance: Balance) -> FloatArray:

@@ -66,3 +66,12 @@ def first_resolution(settings: SolverSettings) -> Resolution:
     n_harmonics = FIRST_HARMONICS if settings.harmonics == "auto" else settings.harmonics
     samples = samples_for(n_harmonics) if settings.samples == "auto" else settings.samples
     return Resolution(all_orders(n_harmonics), samples)
+
+
+def allowed(resolution: Resolution, settings: SolverSettings) -> Resolution:
+    """The resolution that comes nearest to one where harmonics or samples are fixed."""
+    fixed = first_resolution(settings)
+    return Resolution(
+        resolution.orders if settings.harmonics == "auto" else fixed.orders,
+        resolution.samples if settings.samples == "auto" else fixed.samples,
+    )
