@@ -48,6 +48,7 @@ from solver.model import FloatArray
 
 # largest accepted violations; response and wear rate have estimates of their own
 LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.05, "energy_error": 0.05, "drift": 1e-3}
+ROUND_OFF = 1e-10  # of a residual: the mean position of a marched mass is held by 1e-5 of its stiffness
 FINER = 4  # points between two samples at which series are looked at: the samples themselves would flatter them
 LOSS = 1e-3  # loss factor below which nobody notices
 
@@ -76,7 +77,7 @@ class Certificate:
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of everything that does not hold; tolerance: of the scaled residual. NaN does not hold."""
         # twice the tolerance: a state that is taken up again from its harmonics has lost some digits to round-off
-        limits = {"residual": 2.0 * tolerance} | LIMITS
+        limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | LIMITS
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
         }

@@ -110,6 +110,8 @@ class _Line:
             refined = None
             if reached is not None:
                 refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
+                if not refined.accurate:
+                    refined = self._afresh(omega) or refined
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None
         if refined is None:
@@ -129,6 +131,20 @@ class _Line:
         if not certificate.holds(self.case.settings.tolerance):
             return Outcome.CERTIFICATE_FAILED, None
         return Outcome.CONVERGED, refined
+
+    def _afresh(self, omega: float) -> Refined | None:
+        """An accurate state from nothing with other harmonics, where those of the branch are a dead end."""
+        before = self.case, self.solver
+        for resolution in OTHER_STARTS:
+            self.case, self.solver = self.case.at(allowed(resolution, self.case.settings)), JacobianSolver()
+            point = self._first(omega)
+            refined = None
+            if point is not None:
+                refined = refine(self.case, omega, self.excitation_amplitude, point, self.effort)
+            if refined is not None and refined.accurate:
+                return refined
+        self.case, self.solver = before
+        return None
 
     def _lead_in(self, omega: float, sweep: Sweep) -> None:
         """A state outside the range; none where there is none, or where the structure is singular there."""

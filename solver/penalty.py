@@ -23,7 +23,7 @@ from solver.structure import condense, relative_indices
 INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
 INERTIAL_RATE = 8.0  # of the frequency: where that is judged, for any number of harmonics alike
 DRAG = 0.1  # of m w: forgets the start of a period to a half within the next
-STATIC_SHARE = 1e-7  # of the stiffness at the frequency: what holds the mean position of a marched mass
+STATIC_SHARE = 1e-5  # of the stiffness at the frequency: what holds the mean position of a marched mass
 
 
 @dataclass(frozen=True)
