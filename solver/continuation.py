@@ -136,8 +136,7 @@ class _Line:
         """An accurate state from nothing with other harmonics, where those of the branch are a dead end."""
         before = self.case, self.solver
         for resolution in OTHER_STARTS:
-            self.case, self.solver = self.case.at(allowed(resolution, self.case.settings)), JacobianSolver()
-            point = self._first(omega)
+            point = self._first_at(omega, resolution)
             refined = None
             if point is not None:
                 refined = refine(self.case, omega, self.excitation_amplitude, point, self.effort)
@@ -157,21 +156,30 @@ class _Line:
                 return
 
     def _first(self, omega: float) -> PathPoint | None:
-        failure: Outcome | None = None
-        for resolution in (self.case.resolution, *(OTHER_STARTS if self.case.settings.automatic else ())):
-            case, solver = self.case.at(allowed(resolution, self.case.settings)), JacobianSolver()
-            self.failure, found = solve_first_state(
-                case, omega, self.excitation_amplitude, self.unworn, solver, self.effort
-            )
-            # the first attempt says why there is none
-            failure = failure or self.failure
+        """A state from nothing; where the harmonics of the line find none, with others."""
+        others = OTHER_STARTS if self.case.settings.automatic else ()
+        why = Outcome.START_FAILED
+        for attempt, resolution in enumerate((self.case.resolution, *others)):
+            found = self._first_at(omega, resolution)
             if found is not None:
-                self.case, self.solver = case, solver
-                return PathPoint(omega, found.evaluation, found.history)
-            if self.failure is Outcome.STATIC_FAILED:
+                return found
+            # the first attempt says why there is none
+            why = self.failure if attempt == 0 else why
+            if why is Outcome.STATIC_FAILED:
                 break
-        self.failure = failure or self.failure
+        self.failure = why
         return None
+
+    def _first_at(self, omega: float, resolution: Resolution) -> PathPoint | None:
+        """A state from nothing with these harmonics and samples, as far as they are not fixed."""
+        case, solver = self.case.at(allowed(resolution, self.case.settings)), JacobianSolver()
+        self.failure, found = solve_first_state(
+            case, omega, self.excitation_amplitude, self.unworn, solver, self.effort
+        )
+        if found is None:
+            return None
+        self.case, self.solver = case, solver
+        return PathPoint(omega, found.evaluation, found.history)
 
     def _next(self, omega: float) -> PathPoint | None:
         assert self.point is not None

@@ -21,6 +21,8 @@ DENSE = 800  # unknowns that are factorised together: 48 pairs with two harmonic
 FEW_ROWS = 40  # relative displacements up to which each of them couples most harmonics: impacts
 DENSE_FEW = 2500  # unknowns that are factorised together then
 
+NEUTRAL = 1e-8  # of an eigenvalue of the Jacobian, which is dimensionless and 1 for a pair that sticks
+
 RealFactor = tuple[FloatArray, IntArray]
 
 
@@ -74,11 +76,21 @@ def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
     with warnings.catch_warnings():
         # an exactly singular matrix: Newton's method goes on and judges by the residual
         warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
-        low = scipy.linalg.lu_factor(tangent.dense(pairs, n_low), overwrite_a=True, check_finite=False)
+        low = scipy.linalg.lu_factor(without_neutral(tangent.dense(pairs, n_low)), overwrite_a=True, check_finite=False)
     high = np.empty((n_harmonics - n_low, rows.size, rows.size), complex)
     for place in range(n_low, n_harmonics):
         high[place - n_low] = _inverse(tangent.dense_harmonic(pairs, place))
     return Factor(pairs, rows, n_low, low, high)
+
+
+def without_neutral(matrix: FloatArray) -> FloatArray:
+    """The matrix with its eigenvalues shifted by `NEUTRAL`, in place.
+
+    A joint that slips as a whole may lie anywhere along its slip: an eigenvalue that is zero but for round-off would
+    give the determinant any sign.
+    """
+    matrix[np.diag_indices_from(matrix)] += NEUTRAL
+    return matrix
 
 
 def _inverse(matrix: ComplexArray) -> ComplexArray:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.balance import Linearisation
-from solver.factor import Factor, build_factor
+from solver.factor import Factor, build_factor, without_neutral
 from solver.model import ComplexArray, FloatArray, IntArray
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
@@ -80,7 +80,7 @@ class JacobianSolver:
         if not rows.size:
             return 1.0
         if rows.size * m <= SMALL:
-            return float(np.linalg.slogdet(tangent.dense(pairs))[0])
+            return float(np.linalg.slogdet(without_neutral(tangent.dense(pairs)))[0])
         if self._factor is None or not np.isin(pairs, self._factor.pairs).all():
             self._factor = build_factor(tangent, pairs)
             if self._factor.exact:
@@ -89,7 +89,7 @@ class JacobianSolver:
         if np.all(np.isfinite(values)) and values.real.min() > CERTAIN:
             return self._factor.sign
         if rows.size * m <= WHOLE:
-            return float(np.linalg.slogdet(tangent.dense(pairs))[0])
+            return float(np.linalg.slogdet(without_neutral(tangent.dense(pairs)))[0])
         below = np.count_nonzero((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real)))
         return self._factor.sign * float((-1) ** below)
 
