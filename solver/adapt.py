@@ -14,6 +14,7 @@ import numpy as np
 
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
+from solver.factor import FEW_ROWS
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
 from solver.kernels import SEPARATED, STICK
@@ -25,9 +26,11 @@ from solver.settings import Resolution, all_orders, samples_for
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
 MOST_SAMPLES = 8192
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
+MOST_REFINEMENT = 120  # iterations of one refinement in all
 FEW_ITERATIONS = 12  # where they are dear
 DEAR = 1000  # unknowns
 MOST_UNKNOWNS = 6000  # of a balance that "auto" may march with
+MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
@@ -83,6 +86,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
     """
     settings = case.settings
     here = _Level(case, case.joint(omega, excitation_amplitude), point)
+    most = effort.iterations + MOST_REFINEMENT
     while True:
         if _nothing_happens(here.point.evaluation):
             if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
@@ -112,7 +116,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if more_samples:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
-        if wanted != resolution and _allowed(here, wanted):
+        if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
             next_level = finer if finer is not None and not more_harmonics else here.solve_at(wanted, effort)
             if next_level is None and settings.harmonics == settings.samples and richer is not None:
                 next_level = richer if _allowed(here, richer.case.resolution) else None
@@ -268,4 +272,5 @@ def _allowed(here: _Level, resolution: Resolution) -> bool:
     unknowns = here.joint.slots.size * (2 * len(resolution.orders) + 1)
     if not here.case.model.holds(resolution.highest):
         return False
-    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and unknowns <= MOST_UNKNOWNS
+    most = MOST_OF_FEW if here.joint.slots.size <= FEW_ROWS else MOST_UNKNOWNS
+    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and unknowns <= most

@@ -135,7 +135,7 @@ class _Line:
     def _afresh(self, omega: float) -> Refined | None:
         """An accurate state from nothing with other harmonics, where those of the branch are a dead end."""
         before = self.case, self.solver
-        for resolution in OTHER_STARTS:
+        for resolution in OTHER_STARTS[1:]:
             point = self._first_at(omega, resolution)
             refined = None
             if point is not None:

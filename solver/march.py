@@ -39,6 +39,8 @@ RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is foun
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
+MOST_ITERATIONS = 1000  # of Newton's method, and as many more a step: a march that takes more leads nowhere
+STEP_ITERATIONS = 30
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 
@@ -69,7 +71,7 @@ def march_wear(
     try:
         outcome = march.begin()
         recorder.add(0.0, march.report(), wear_coefficient)
-        end = float(cycles[-1])
+        end, steps = float(cycles[-1]), 0
         while outcome is Outcome.CONVERGED and march.cycle < end:
             if not march.wears():
                 recorder.add(end, march.report(), wear_coefficient)
@@ -77,6 +79,10 @@ def march_wear(
             planned = march.planned_step(step, largest_depth)
             # a remainder below round-off of the count is no step of its own
             reach = end if march.cycle + planned >= end * (1.0 - 1e-12) else march.cycle + planned
+            steps += 1
+            if march.effort.iterations > MOST_ITERATIONS + STEP_ITERATIONS * steps:
+                outcome = Outcome.MARCH_FAILED
+                break
             before = march.cycle
             if not march.advance(reach):
                 # what was reached of the step is a state, too
