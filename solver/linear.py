@@ -112,9 +112,16 @@ class JacobianSolver:
                 return solution
         self._factor = build_factor(tangent, pairs)
         if self._factor.exact:
-            return self._factor.solve(right)
+            return self._solve_exactly(self._factor, tangent, rows, right)
         # as far as it gets: Newton judges by the true residual
         return self._iterate(self._factor, tangent, rows, right, RESTARTS)[0]
+
+    def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
+        """Solution by a factorisation of these rows; a second solve takes away what `without_neutral` has put in."""
+        full = np.zeros((tangent.joint.slots.size, right.shape[1]))
+        full[rows] = factor.solve(right)
+        solution = full[rows] + factor.solve(right - tangent.apply(full)[rows])
+        return solution if np.all(np.isfinite(solution)) else full[rows]
 
     def _iterate(
         self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray, restarts: int

@@ -59,12 +59,10 @@ def run_scene(scene: RandomScene, settings: SolverSettings = SETTINGS) -> dict[s
             record["march"] = "NaN where converged"
         elif (np.diff(history.wear_depth, axis=0) < 0.0).any():
             record["march"] = "wear falls"
+        record["slips"] = bool(history.slip_range[0].max() > 0.0)
+        record["opens"] = bool((history.open_fraction[0] > 0.0).any())
         for name in CERTIFIED:
             record[name] = float(np.nanmax(getattr(history, name), initial=0.0))
-    record |= {
-        "slips": bool(np.nanmax(history.slip_range[0]) > 0.0),
-        "opens": bool((history.open_fraction[0] > 0.0).any()),
-    }
     record |= {"jumped": bool(np.isfinite(history.jump_cycle)), "march_iterations": history.newton_iterations}
     record["march_time"] = time.perf_counter() - started - record["time"]
     return record

@@ -76,13 +76,13 @@ def test_a_rigid_mass_stays_pressed_on() -> None:
                 assert force[row[0]] <= 0.5001 * linear.load_static[row[0]]
 
 
-def test_the_first_scenes_are_solved() -> None:
-    records = [run_scene(scene) for scene in SCENES[:30]]
+def test_a_score_of_scenes_is_solved() -> None:
+    # the benchmark runs 1000 of them, of which some take minutes
+    records = [run_scene(random_scene(seed)) for seed in range(100, 120)]
     unsolved = [record["seed"] for record in records if not solved(record)]
-    # at least 99 of 100 in the benchmark: among 30 one may be such a scene, and says why
-    assert len(unsolved) <= 1, unsolved
+    assert not unsolved
     for record in records:
         assert "NaN" not in record["march"]
         assert record["march"] != "wear falls"
-    assert sum(record.get("slips", False) for record in records) >= 15
-    assert 5 <= sum(record.get("opens", False) for record in records) <= 25
+    assert sum(record.get("slips", False) for record in records) >= 10
+    assert 3 <= sum(record.get("opens", False) for record in records) <= 17

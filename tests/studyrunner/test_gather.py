@@ -157,7 +157,12 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = results[0].points
         assert opened.outcome.values[point] == 6
-        assert opened.outcome.attrs["flag_meanings"].split()[6:] == ["inaccurate", "certificate_failed", "unstable"]
+        assert opened.outcome.attrs["flag_meanings"].split()[6:] == [
+            "inaccurate",
+            "certificate_failed",
+            "unstable",
+            "adrift",
+        ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:
                 there = opened[name].values[point]
