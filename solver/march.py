@@ -40,7 +40,7 @@ SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
 MOST_ITERATIONS = 1000  # of Newton's method, and as many more a step: a march that takes more leads nowhere
-STEP_ITERATIONS = 30
+STEP_ITERATIONS = 10
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 
