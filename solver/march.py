@@ -39,7 +39,7 @@ RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is foun
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
-MOST_ITERATIONS = 1000  # of Newton's method, and as many more a step: a march that takes more leads nowhere
+MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
 STEP_ITERATIONS = 10
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
@@ -151,23 +151,31 @@ class _March:
 
     def check(self) -> Outcome:
         """Whether the current state may be reported: errors below rtol and a certificate that holds."""
-        accurate = self._refine()
+        now = self.point.evaluation.predicted_h[:, 1:]
+        changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
+        accurate = True
+        if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
+            accurate = self._refine()
+        holds = self._certify()
+        if not holds and accurate and self.case.settings.automatic:
+            # more harmonics or samples may be all that it needs
+            accurate = self._refine()
+            holds = self._certify()
+        if not accurate:
+            return Outcome.INACCURATE
+        return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
+
+    def _certify(self) -> bool:
+        """Certificate of the current state, and whether it holds."""
         self.certificate = replace(
             certify(self.joint, self.point.evaluation),
             response_error=self.estimate.response,
             wear_rate_error=self.estimate.wear_rate,
         )
-        if not accurate:
-            return Outcome.INACCURATE
-        holds = self.certificate.holds(self.case.settings.tolerance)
-        return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
+        return self.certificate.holds(self.case.settings.tolerance)
 
     def _refine(self) -> bool:
-        """Estimate the errors again, where the state has changed enough; False where they cannot be kept below rtol."""
-        now = self.point.evaluation.predicted_h[:, 1:]
-        changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
-        if changed <= RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
-            return True
+        """Estimate the errors of the current state; False where they cannot be kept below rtol."""
         refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
         self.estimate, self.point = refined.estimate, refined.point
         if refined.case is not self.case:
