@@ -47,7 +47,6 @@ def step_line(
         sign = 1.0 if force > 0.0 else -1.0
         after = (force - sign * limit) / gain
         tangent[0, 2] = sign
-        # away from rest: a velocity before would be in the way or on the way of the motion
         tangent[1, 0] = 1.0 / gain
         tangent[1, 1] = loss / gain
         tangent[1, 2] = -sign / gain

@@ -7,7 +7,7 @@ leaves no doubt that a state exists, convergence is demanded.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -368,22 +368,15 @@ def test_the_implicit_scheme_runs_through_beyond_that_limit(share: float) -> Non
     assert np.abs(difference[3:]).max() < 0.02 * difference[0]
 
 
-NEEDS_LIMIT = pytest.mark.skipif(
-    "step_limit" not in {field.name for field in fields(WearHistory)}, reason="the history has no step_limit yet"
-)
-
-
-@NEEDS_LIMIT
 def test_the_explicit_scheme_says_where_it_is_unstable() -> None:
     limit = block_limit()
     for share in (0.4, 1.2, 4.0):
         case = replace(block(), step=share * limit, cycles=8.0 * share * limit, scheme="explicit")
         history = run_converged_at_steps(case)
-        assert vars(history)["step_limit"] == pytest.approx(limit, rel=0.1)
-        assert vars(history)["oscillates"] == (share > 1.0)
+        assert history.step_limit == pytest.approx(limit, rel=0.1)
+        assert history.oscillates == (share > 1.0)
 
 
-@NEEDS_LIMIT
 def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone() -> None:
     # the slider under a spring: one step too long takes all of the preload, nothing is left that could oscillate
     base = slider()
@@ -397,4 +390,4 @@ def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone() -> None:
     assert exact == pytest.approx(5.4e5, rel=0.01)
     history = run_converged_at_steps(replace(base, scheme="explicit", step=3.0 * exact, cycles=15.0 * exact))
     assert history.wear_depth[1, 0] > 1e-4, "more than the whole preload allows"
-    assert vars(history)["step_limit"] == pytest.approx(exact, rel=0.1)
+    assert history.step_limit == pytest.approx(exact, rel=0.1)

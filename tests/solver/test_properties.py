@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from random import Random
 
 import numpy as np
 from hypothesis import HealthCheck, assume, given, settings
@@ -215,11 +216,11 @@ def test_a_stiffer_structure_under_a_larger_load_moves_the_same(seed: int, scale
 
 @profile
 @given(seeds, st.randoms(use_true_random=False))
-def test_the_order_of_the_pairs_means_nothing(seed: int, random: object) -> None:
+def test_the_order_of_the_pairs_means_nothing(seed: int, random: Random) -> None:
     scene, _, at = state(seed)
     contact = scene.model.contact
     order = np.arange(contact.n_contact)
-    random.shuffle(order)  # type: ignore[attr-defined]
+    random.shuffle(order)
     permuted = replace(
         contact,
         dofs=contact.dofs[order],
@@ -248,7 +249,7 @@ def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
     both = (dofs[:, 1:] >= 0).all(axis=1)
     assume(both.any())
     n = len(model.linear[0].stiffness)
-    # a pair at velocity level or not: the choice and the penalty are those of the larger of the two tangents
+    # a pair marched with its mass or not: the choice and the penalty are those of the larger of the two tangents
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     back = np.eye(n)
     displacement_h, force_h, history_m = at.displacement_h.copy(), at.force_h.copy(), at.history.copy()
