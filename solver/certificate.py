@@ -26,8 +26,8 @@ Largest values measured on good states (0 stands for below 1e-12):
 | coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
 | dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
 
-With the limits below all of these hold but vibro-impact from 1.1 rad/s on at one harmonic, which is far off. They are no
-measure of the truncation error: that is estimated in `solver.adapt`.
+With the limits below all of these hold but vibro-impact from 1.1 rad/s on at one harmonic, which is far off. They are
+no measure of the truncation error: that is estimated in `solver.adapt`.
 What does not hold, as tested: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 %
 too large (15 % too small), slip that does not repeat by 2 % of the limit.
 """
