@@ -289,7 +289,7 @@ def mass_tangent(
     samples, step_synthesis (m, N) the tangential ones as means over the steps, step_analysis (N, m) their harmonics
     back from such means. Returns
 
-    - force_tangent (n_contact, 3m, 3m): as `kernels.march_tangent`, without its normal rows, dimensionless;
+    - force_tangent (n_contact, 3m, 3m): as `tangents.march_tangent`, without its normal rows, dimensionless;
     - wear_tangent (n_contact, 3m): of slip_work, m.
     """
     n_contact, _, n_samples = predicted_t.shape

@@ -9,7 +9,8 @@ section 2: the print has the sign of the normal test the other way round):
 - slip otherwise: `lambda_T = mu p_N n` along `n = (p_T - x') / |p_T - x'|`, `x = p_T - lambda_T`.
 
 The state at the start of a period is history. The period is marched again from where it ended until it repeats, and at
-least twice where anything slips or opens, because the second pass is what carries the derivative of the start state.
+least twice where anything slips or opens. Slip whose direction varies closes slowly, by a factor a period: after a few
+periods the start is taken from Newton's method on the closure, which the march then has to confirm.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.model import BoolArray, FloatArray, IntArray
+from solver.model import FloatArray, IntArray
 
 SEPARATED = 0
 STICK = 1
 SLIP = 2
+
+PLAIN_PASSES = 4  # before the closure is sought by Newton's method; most pairs close within two
+NEUTRAL = 1e-9  # of the determinant of the closure: what does not fade from period to period has to be marched
 
 
 @njit(cache=True)
@@ -75,38 +79,6 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def mean_normal_tangent(
-    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
-) -> FloatArray:
-    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
-    n_contact, _, n_samples = predicted_t.shape
-    m = synthesis.shape[0]
-    basis_t = np.ascontiguousarray(synthesis.T)
-    tangent = np.zeros((n_contact, m, m))
-    row = np.empty(m)
-    for pair in range(n_contact):
-        if not has_normal[pair]:
-            continue
-        for n in range(n_samples):
-            force = predicted_t[pair, 0, n]
-            if force <= 0.0:
-                continue
-            ahead = (n + 1) % n_samples
-            _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
-            _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
-            for j in range(m):
-                row[j] = 0.5 * (
-                    (own_before + own_after) * basis_t[n, j]
-                    + other_before * basis_t[n - 1, j]
-                    + other_after * basis_t[ahead, j]
-                )
-            for k in range(m):
-                for j in range(m):
-                    tangent[pair, k, j] += analysis[n, k] * row[j]
-    return tangent
-
-
-@njit(cache=True)
 def march_period(
     predicted_t: FloatArray,
     friction: float,
@@ -131,14 +103,21 @@ def march_period(
     status_t = np.zeros((n_contact, n_samples), np.int64)
     passes = np.zeros(n_contact, np.int64)
     drift = np.zeros(n_contact)
+    influence = np.zeros((2, 2))
     for pair in range(n_contact):
         first = start[pair, 0]
         second = start[pair, 1]
+        before = np.inf
         for sweep in range(most_passes):
             state_t[pair, 0, 0] = first
             state_t[pair, 1, 0] = second
             moved = False
+            tracked = sweep >= PLAIN_PASSES
+            influence[:, :] = 0.0
+            influence[0, 0] = influence[1, 1] = 1.0
             for n in range(n_samples):
+                pre_1 = predicted_t[pair, 1, n] - first
+                pre_2 = predicted_t[pair, 2, n] - second
                 normal, force_1, force_2, first, second, status = contact_sample(
                     predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction, first, second
                 )
@@ -149,11 +128,50 @@ def march_period(
                 state_t[pair, 1, n + 1] = second
                 status_t[pair, n] = status
                 moved = moved or status != STICK
+                if tracked and status != STICK:
+                    turn_influence(influence, status, friction * normal, pre_1, pre_2)
             passes[pair] = sweep + 1
-            drift[pair] = np.hypot(first - state_t[pair, 0, 0], second - state_t[pair, 1, 0])
+            change_1, change_2 = first - state_t[pair, 0, 0], second - state_t[pair, 1, 0]
+            drift[pair] = np.hypot(change_1, change_2)
             if not moved or (sweep > 0 and drift[pair] <= closure):
                 break
+            # a plain pass never takes the state further away; one from a start that Newton's method gave may
+            if tracked and drift[pair] < 0.5 * before:
+                before = drift[pair]
+                missing_1, missing_2, found = close(influence, change_1, change_2)
+                if found:
+                    first = state_t[pair, 0, 0] + missing_1
+                    second = state_t[pair, 1, 0] + missing_2
+            else:
+                before = np.inf
     return force_t, state_t, status_t, passes, drift
+
+
+@njit(cache=True)
+def turn_influence(influence: FloatArray, status: int, limit: float, pre_1: float, pre_2: float) -> None:
+    """Derivative (2, 2) of the state with respect to that at the start of the period, taken past a sample, in place."""
+    size = np.sqrt(pre_1 * pre_1 + pre_2 * pre_2)
+    if status == SEPARATED or limit == 0.0:
+        influence[:, :] = 0.0
+        return
+    unit_1 = pre_1 / size
+    unit_2 = pre_2 / size
+    # what lies across the slip turns with it; what lies along it is forgotten
+    for column in range(2):
+        across = limit / size * (unit_1 * influence[1, column] - unit_2 * influence[0, column])
+        influence[0, column] = -unit_2 * across
+        influence[1, column] = unit_1 * across
+
+
+@njit(cache=True)
+def close(influence: FloatArray, change_1: float, change_2: float) -> tuple[float, float, bool]:
+    """Solution of `(I - influence) x = change`, and whether there is one that means anything."""
+    a, b = 1.0 - influence[0, 0], -influence[0, 1]
+    c, d = -influence[1, 0], 1.0 - influence[1, 1]
+    determinant = a * d - b * c
+    if determinant <= NEUTRAL:
+        return 0.0, 0.0, False
+    return (d * change_1 - b * change_2) / determinant, (a * change_2 - c * change_1) / determinant, True
 
 
 @njit(cache=True)
@@ -173,133 +191,3 @@ def wear_integral(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
             )
             integral[pair] += 0.5 * (force_t[pair, 0, before] + force_t[pair, 0, n]) * slip
     return integral
-
-
-@njit(cache=True)
-def state_tangent(
-    dstate: FloatArray,
-    basis: FloatArray,
-    status: int,
-    normal: float,
-    pre_1: float,
-    pre_2: float,
-    friction: float,
-    has_normal: bool,
-    dforce: FloatArray,
-) -> None:
-    """Derivatives of one sample, in place: `dforce` (2, 3m) of the tangential force, `dstate` (2, 3m) of the state.
-
-    Columns are the harmonics of the predicted force of the pair: normal (m), tangent 1 (m), tangent 2 (m). `basis` (m,)
-    holds the derivative of a time sample with respect to its harmonics. `dstate` comes in as that of the sample before.
-    """
-    m = basis.size
-    if status == STICK:
-        for column in range(3 * m):
-            dforce[0, column] = -dstate[0, column]
-            dforce[1, column] = -dstate[1, column]
-        for k in range(m):
-            dforce[0, m + k] += basis[k]
-            dforce[1, 2 * m + k] += basis[k]
-        return
-    for column in range(3 * m):
-        dforce[0, column] = 0.0
-        dforce[1, column] = 0.0
-    if status == SLIP and friction * normal > 0.0:
-        size = np.sqrt(pre_1 * pre_1 + pre_2 * pre_2)
-        unit_1 = pre_1 / size
-        unit_2 = pre_2 / size
-        ratio = friction * normal / size
-        across_11 = ratio * (1.0 - unit_1 * unit_1)
-        across_12 = -ratio * unit_1 * unit_2
-        across_22 = ratio * (1.0 - unit_2 * unit_2)
-        for column in range(3 * m):
-            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
-            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-        for k in range(m):
-            if has_normal:
-                dforce[0, k] += friction * unit_1 * basis[k]
-                dforce[1, k] += friction * unit_2 * basis[k]
-            dforce[0, m + k] += across_11 * basis[k]
-            dforce[0, 2 * m + k] += across_12 * basis[k]
-            dforce[1, m + k] += across_12 * basis[k]
-            dforce[1, 2 * m + k] += across_22 * basis[k]
-    for column in range(3 * m):
-        dstate[0, column] = -dforce[0, column]
-        dstate[1, column] = -dforce[1, column]
-    for k in range(m):
-        dstate[0, m + k] += basis[k]
-        dstate[1, 2 * m + k] += basis[k]
-
-
-@njit(cache=True)
-def march_tangent(
-    predicted_t: FloatArray,
-    friction: float,
-    start: FloatArray,
-    passes: IntArray,
-    synthesis: FloatArray,
-    analysis: FloatArray,
-    has_normal: BoolArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Exact derivative of `march_period` and `wear_integral` after the same number of passes.
-
-    has_normal (n_contact,): False where the normal force is constant. Returns
-
-    - force_tangent (n_contact, 3m, 3m): d(harmonics of the tangential force)/d(harmonics of the predicted force) of
-      each pair, harmonics as in `state_tangent`, dimensionless; the rows of the normal force are zero;
-    - wear_tangent (n_contact, 3m): derivative of the wear integral (N * N), N.
-    """
-    n_contact, _, n_samples = predicted_t.shape
-    m = synthesis.shape[0]
-    # rows of the transposes are contiguous, which is what the loops over columns need
-    basis_t = np.ascontiguousarray(synthesis.T)
-    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    wear_tangent = np.zeros((n_contact, 3 * m))
-    dstate = np.empty((2, 3 * m))
-    before_dstate = np.empty((2, 3 * m))
-    dforce = np.empty((2, 3 * m))
-    for pair in range(n_contact):
-        dstate[:, :] = 0.0
-        first = start[pair, 0]
-        second = start[pair, 1]
-        for sweep in range(passes[pair]):
-            last = sweep == passes[pair] - 1
-            for n in range(n_samples):
-                pre_1 = predicted_t[pair, 1, n] - first
-                pre_2 = predicted_t[pair, 2, n] - second
-                old_first = first
-                old_second = second
-                normal, _, _, first, second, status = contact_sample(
-                    predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction, first, second
-                )
-                if not last and status == STICK:
-                    continue
-                before_dstate[:, :] = dstate
-                state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce)
-                if not last:
-                    continue
-                if status != SEPARATED:
-                    for k in range(m):
-                        for column in range(3 * m):
-                            force_tangent[pair, m + k, column] += analysis[n, k] * dforce[0, column]
-                            force_tangent[pair, 2 * m + k, column] += analysis[n, k] * dforce[1, column]
-                step_1 = first - old_first
-                step_2 = second - old_second
-                slip = np.hypot(step_1, step_2)
-                if slip == 0.0:
-                    continue
-                before = n - 1 if n > 0 else n_samples - 1
-                normal_before = max(predicted_t[pair, 0, before], 0.0)
-                mean = 0.5 * (normal_before + normal)
-                for column in range(3 * m):
-                    wear_tangent[pair, column] += mean * (
-                        step_1 / slip * (dstate[0, column] - before_dstate[0, column])
-                        + step_2 / slip * (dstate[1, column] - before_dstate[1, column])
-                    )
-                if has_normal[pair]:
-                    for k in range(m):
-                        if normal_before > 0.0:
-                            wear_tangent[pair, k] += 0.5 * slip * basis_t[before, k]
-                        if normal > 0.0:
-                            wear_tangent[pair, k] += 0.5 * slip * basis_t[n, k]
-    return force_tangent, wear_tangent

@@ -8,8 +8,9 @@ import numpy as np
 
 from solver.inertia import march_masses, mass_tangent
 from solver.joint import Joint
-from solver.kernels import march_period, march_tangent, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.kernels import march_period, mean_normal_force, wear_integral
 from solver.model import FloatArray, IntArray
+from solver.tangents import march_tangent, mean_normal_tangent
 
 CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
 MOST_PASSES = 400
@@ -97,6 +98,7 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
             at.predicted_t[elastic],
             friction,
             at.start[elastic],
+            at.state_t[elastic],
             at.passes[elastic],
             basis.synthesis,
             basis.analysis,

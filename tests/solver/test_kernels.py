@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +20,10 @@ from solver.kernels import (
     STICK,
     contact_sample,
     march_period,
-    march_tangent,
     mean_normal_force,
-    mean_normal_tangent,
     wear_integral,
 )
+from solver.tangents import march_tangent, mean_normal_tangent
 from tests.solver import contact_twin
 from tests.solver.kernel_cases import BASIS, FRICTION, PERIODS, KernelCase, kernel_case, kernel_results
 
@@ -162,24 +162,27 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
     )
 
 
-def derivative_error(case: KernelCase, n_contact: int) -> tuple[float, float, float]:
+def derivative_error(
+    case: KernelCase, n_contact: int, closure: float = 0.0, most_passes: int = PERIODS
+) -> tuple[float, float, float]:
     """Largest error of the tangents against central differences relative to their size, and the switches' distance."""
     basis = BASIS
     m = basis.synthesis.shape[0]
 
     def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, 0.0, PERIODS)
+        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, closure, most_passes)
         force_h = force_t @ basis.analysis
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
         return force_h, wear_integral(force_t, state_t), status_t
 
     predicted_t = case.predicted_h @ basis.synthesis
-    *_, passes, _ = march_period(predicted_t, FRICTION, case.start, 0.0, PERIODS)
+    _, state_t, _, passes, _ = march_period(predicted_t, FRICTION, case.start, closure, most_passes)
     force_tangent, wear_tangent = march_tangent(
         predicted_t,
         FRICTION,
         case.start,
+        state_t,
         passes,
         basis.synthesis,
         basis.analysis,
@@ -221,26 +224,69 @@ def test_tangents_are_those_of_central_differences(seed: int) -> None:
 def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
     # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
     case = kernel_case(4, BASIS.n_samples, seed=10)
-    arguments = (case.predicted_t, FRICTION, case.start)
+    _, state_t, *_ = march_period(case.predicted_t, FRICTION, case.start, 1e-12, PERIODS)
+    arguments = (case.predicted_t, FRICTION, case.start, state_t)
     rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
     one, _ = march_tangent(*arguments, np.full(4, 1), *rest)
     two, _ = march_tangent(*arguments, np.full(4, 2), *rest)
     assert np.abs(one - two).max() > 1e-3
 
 
+def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
+    """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
+    case = kernel_case(n_contact, BASIS.n_samples, seed=seed)
+    predicted_h = case.predicted_h.copy()
+    predicted_h[:, 0] *= 0.3
+    predicted_h[:, 0, 0] = 20.0
+    predicted_h[:, 1:] *= 0.1
+    predicted_h[:, 1, 1] = np.linspace(8.4, 10.0, n_contact)
+    return replace(case, predicted_h=predicted_h, predicted_t=predicted_h @ BASIS.synthesis)
+
+
+@pytest.mark.parametrize("seed", [31, 33])
+def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int) -> None:
+    case = slowly_closing(seed)
+    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 400)
+    assert (drift <= 1e-9).all()
+    slowest = 0
+    for pair in range(force_t.shape[0]):
+        plain = 1
+        start = case.start[pair]
+        while True:
+            force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, 1)
+            plain += 1
+            if np.linalg.norm(slip[:, -1] - start) < 1e-12:
+                break
+            start = slip[:, -1]
+        slowest = max(slowest, plain)
+        assert force_t[pair] == pytest.approx(force, abs=1e-6)
+        assert state_t[pair] == pytest.approx(slip, abs=1e-6)
+        assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
+    assert slowest > 40
+    assert passes.max() < 20
+
+
+@pytest.mark.parametrize("seed", [31, 33])
+def test_tangents_of_a_slow_closure_are_those_of_central_differences(seed: int) -> None:
+    force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_passes=400)
+    assert force_error < 1e-6
+    assert wear_error < 1e-6 * max(wear_size, 1.0)
+
+
 def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
     basis = build_basis((), 1)
     predicted_t = np.array([[[2.0], [0.5], [3.0]]])
     start = np.zeros((1, 2))
-    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 8)
+    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 1)
     assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
     everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
-    tangent, _ = march_tangent(predicted_t, FRICTION, start, np.array([1]), *everything)
+    tangent, _ = march_tangent(predicted_t, FRICTION, start, state_t, np.array([1]), *everything)
     # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
     along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
     across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))
     assert tangent[0, 1:] == pytest.approx(np.column_stack([FRICTION * along, across]), rel=1e-12)
     assert mean_normal_tangent(predicted_t, *everything)[0, 0] == pytest.approx([1.0])
+    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 8)
     assert wear_integral(force_t, state_t)[0] == 0.0
 
 

@@ -1,0 +1,239 @@
+"""Derivatives of the contact law through one period, for `kernels`. Floats and arrays only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from solver.kernels import PLAIN_PASSES, SEPARATED, SLIP, STICK, close, closed_share, contact_sample
+from solver.model import BoolArray, FloatArray, IntArray
+
+
+@njit(cache=True)
+def mean_normal_tangent(
+    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
+) -> FloatArray:
+    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    basis_t = np.ascontiguousarray(synthesis.T)
+    tangent = np.zeros((n_contact, m, m))
+    row = np.empty(m)
+    for pair in range(n_contact):
+        if not has_normal[pair]:
+            continue
+        for n in range(n_samples):
+            force = predicted_t[pair, 0, n]
+            if force <= 0.0:
+                continue
+            ahead = (n + 1) % n_samples
+            _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
+            _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
+            for j in range(m):
+                row[j] = 0.5 * (
+                    (own_before + own_after) * basis_t[n, j]
+                    + other_before * basis_t[n - 1, j]
+                    + other_after * basis_t[ahead, j]
+                )
+            for k in range(m):
+                for j in range(m):
+                    tangent[pair, k, j] += analysis[n, k] * row[j]
+    return tangent
+
+
+@njit(cache=True)
+def state_tangent(
+    dstate: FloatArray,
+    basis: FloatArray,
+    status: int,
+    normal: float,
+    pre_1: float,
+    pre_2: float,
+    friction: float,
+    has_normal: bool,
+    dforce: FloatArray,
+) -> None:
+    """Derivatives of one sample, in place: `dforce` (2, 3m+2) of the tangential force, `dstate` (2, 3m+2) of the state.
+
+    Columns are the harmonics of the predicted force of the pair: normal (m), tangent 1 (m), tangent 2 (m), and the
+    state at the start of the period. `basis` (m,) holds the derivative of a time sample with respect to its harmonics.
+    `dstate` comes in as that of the sample before.
+    """
+    m = basis.size
+    if status == STICK:
+        for column in range(3 * m + 2):
+            dforce[0, column] = -dstate[0, column]
+            dforce[1, column] = -dstate[1, column]
+        for k in range(m):
+            dforce[0, m + k] += basis[k]
+            dforce[1, 2 * m + k] += basis[k]
+        return
+    for column in range(3 * m + 2):
+        dforce[0, column] = 0.0
+        dforce[1, column] = 0.0
+    if status == SLIP and friction * normal > 0.0:
+        size = np.sqrt(pre_1 * pre_1 + pre_2 * pre_2)
+        unit_1 = pre_1 / size
+        unit_2 = pre_2 / size
+        ratio = friction * normal / size
+        across_11 = ratio * (1.0 - unit_1 * unit_1)
+        across_12 = -ratio * unit_1 * unit_2
+        across_22 = ratio * (1.0 - unit_2 * unit_2)
+        for column in range(3 * m + 2):
+            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
+            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
+        for k in range(m):
+            if has_normal:
+                dforce[0, k] += friction * unit_1 * basis[k]
+                dforce[1, k] += friction * unit_2 * basis[k]
+            dforce[0, m + k] += across_11 * basis[k]
+            dforce[0, 2 * m + k] += across_12 * basis[k]
+            dforce[1, m + k] += across_12 * basis[k]
+            dforce[1, 2 * m + k] += across_22 * basis[k]
+    for column in range(3 * m + 2):
+        dstate[0, column] = -dforce[0, column]
+        dstate[1, column] = -dforce[1, column]
+    for k in range(m):
+        dstate[0, m + k] += basis[k]
+        dstate[1, 2 * m + k] += basis[k]
+
+
+@njit(cache=True)
+def march_tangent(
+    predicted_t: FloatArray,
+    friction: float,
+    start: FloatArray,
+    state_t: FloatArray,
+    passes: IntArray,
+    synthesis: FloatArray,
+    analysis: FloatArray,
+    has_normal: BoolArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Derivative of what `march_period` and `wear_integral` give, the closure of the period included.
+
+    start (n_contact, 2): as in `march_period`. state_t, passes: as it has returned them. has_normal (n_contact,): False
+    where the normal force is constant. Returns
+
+    - force_tangent (n_contact, 3m, 3m): d(harmonics of the tangential force)/d(harmonics of the predicted force) of
+      each pair, harmonics as in `state_tangent`, dimensionless; the rows of the normal force are zero;
+    - wear_tangent (n_contact, 3m): derivative of the wear integral (N * N), N.
+
+    The last pass gives the derivatives with its start held and those with respect to its start. The start moves with
+    the predicted force as a state that repeats has to; where nothing makes it do so (the pair has come to stick), as it
+    has been marched to.
+    """
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    width = 3 * m
+    # rows of the transposes are contiguous, which is what the loops over columns need
+    basis_t = np.ascontiguousarray(synthesis.T)
+    force_tangent = np.zeros((n_contact, width, width))
+    wear_tangent = np.zeros((n_contact, width))
+    dstate = np.empty((2, width + 2))
+    before_dstate = np.empty((2, width + 2))
+    dforce = np.empty((2, width + 2))
+    harmonics = np.empty((2 * m, width + 2))
+    wear = np.empty(width + 2)
+    dstart = np.empty((2, width))
+    for pair in range(n_contact):
+        harmonics[:, :] = 0.0
+        wear[:] = 0.0
+        dstate[:, :] = 0.0
+        dstate[0, width] = dstate[1, width + 1] = 1.0
+        for n in range(n_samples):
+            first = state_t[pair, 0, n]
+            second = state_t[pair, 1, n]
+            normal, _, _, _, _, status = contact_sample(
+                predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction, first, second
+            )
+            pre_1 = predicted_t[pair, 1, n] - first
+            pre_2 = predicted_t[pair, 2, n] - second
+            before_dstate[:, :] = dstate
+            state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce)
+            if status != SEPARATED:
+                for k in range(m):
+                    for column in range(width + 2):
+                        harmonics[k, column] += analysis[n, k] * dforce[0, column]
+                        harmonics[m + k, column] += analysis[n, k] * dforce[1, column]
+            step_1 = state_t[pair, 0, n + 1] - first
+            step_2 = state_t[pair, 1, n + 1] - second
+            slip = np.hypot(step_1, step_2)
+            if slip == 0.0:
+                continue
+            before = n - 1 if n > 0 else n_samples - 1
+            normal_before = max(predicted_t[pair, 0, before], 0.0)
+            mean = 0.5 * (normal_before + normal)
+            for column in range(width + 2):
+                wear[column] += mean * (
+                    step_1 / slip * (dstate[0, column] - before_dstate[0, column])
+                    + step_2 / slip * (dstate[1, column] - before_dstate[1, column])
+                )
+            if has_normal[pair]:
+                for k in range(m):
+                    if normal_before > 0.0:
+                        wear[k] += 0.5 * slip * basis_t[before, k]
+                    if normal > 0.0:
+                        wear[k] += 0.5 * slip * basis_t[n, k]
+        start_tangent(
+            dstart,
+            dstate,
+            predicted_t[pair],
+            friction,
+            start[pair],
+            min(passes[pair] - 1, PLAIN_PASSES),
+            basis_t,
+            has_normal[pair],
+            dforce,
+        )
+        for column in range(width):
+            for row in range(2 * m):
+                force_tangent[pair, m + row, column] = (
+                    harmonics[row, column]
+                    + harmonics[row, width] * dstart[0, column]
+                    + harmonics[row, width + 1] * dstart[1, column]
+                )
+            wear_tangent[pair, column] = (
+                wear[column] + wear[width] * dstart[0, column] + wear[width + 1] * dstart[1, column]
+            )
+    return force_tangent, wear_tangent
+
+
+@njit(cache=True)
+def start_tangent(
+    dstart: FloatArray,
+    dstate: FloatArray,
+    predicted_t: FloatArray,
+    friction: float,
+    start: FloatArray,
+    passes: int,
+    basis_t: FloatArray,
+    has_normal: bool,
+    dforce: FloatArray,
+) -> None:
+    """Derivative (2, 3m) of the start of the last pass, into `dstart`; `dstate` (2, 3m+2): that of its end.
+
+    passes: those to march before the last one where the closure does not say it, 0 where the start is given.
+    """
+    width = dstart.shape[1]
+    dstart[:, :] = 0.0
+    if passes == 0:
+        return
+    influence = dstate[:, width:]
+    _, _, found = close(influence, 0.0, 0.0)
+    if found:
+        for column in range(width):
+            first, second, _ = close(influence, dstate[0, column], dstate[1, column])
+            dstart[0, column], dstart[1, column] = first, second
+        return
+    moved = np.zeros_like(dstate)
+    first, second = start
+    for _ in range(passes):
+        for n in range(predicted_t.shape[1]):
+            pre_1 = predicted_t[1, n] - first
+            pre_2 = predicted_t[2, n] - second
+            normal, _, _, first, second, status = contact_sample(
+                predicted_t[0, n], predicted_t[1, n], predicted_t[2, n], friction, first, second
+            )
+            if status != STICK:
+                state_tangent(moved, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal, dforce)
+    dstart[:, :] = moved[:, :width]
