@@ -27,11 +27,13 @@ LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics;
 MOST_SAMPLES = 8192
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
 MOST_REFINEMENT = 120  # iterations of one refinement in all
-FEW_ITERATIONS = 12  # where they are dear
+FEW_ITERATIONS = 20  # where they are dear
 DEAR = 1000  # unknowns
-MOST_UNKNOWNS = 6000  # of a balance that "auto" may march with
+MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
 MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
+MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
+NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
 SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
@@ -168,15 +170,17 @@ class _Level:
     def harmonics_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
         """Estimated error for want of harmonics, and the state with more of them that it comes from.
 
-        It is the difference to the state two steps up the ladder; where that is not found, or the scene does not hold
-        the nodal diameters of so many, one step; where not even those, to the state one step down, which is larger.
+        It is the difference to the state two steps up the ladder; where that is not found, takes too many unknowns, or
+        the scene does not hold the nodal diameters of so many, one step; where not even those, to the state one step
+        down, which is larger.
         """
-        for steps in (2, 1, -1):
+        for steps, safety in ((2, HARMONICS_SAFETY), (1, NEAR_SAFETY), (-1, HARMONICS_SAFETY)):
             other = _on_ladder(self.case.resolution, steps)
-            if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest):
+            affordable = self.joint.slots.size * (2 * len(other.orders) + 1) <= MOST_COMPARED
+            if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = self.solve_at(other, effort)
                 if level is not None:
-                    return self.difference(level).times(HARMONICS_SAFETY), level if steps > 0 else None
+                    return self.difference(level).times(safety), level if steps > 0 else None
         return UNKNOWN, None
 
     def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[_Level, Estimate]:

@@ -30,6 +30,7 @@ LEAD_INS = (
 FINE = 0.001  # of the frequency: steps that a sweep may always take
 SPAN = 0.05  # of the frequency: natural length of arc-length steps
 OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
+FEW_PAIRS = 12  # up to which a state that is not accurate is sought from nothing as well: impacts have many others
 MOST_LANDINGS = 6  # ends of branches on the way from one frequency to the next
 
 Sweep = Literal["up", "down"]
@@ -110,7 +111,7 @@ class _Line:
             refined = None
             if reached is not None:
                 refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
-                if not refined.accurate:
+                if not refined.accurate and refined.case.model.contact.n_contact <= FEW_PAIRS:
                     refined = self._afresh(omega) or refined
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None

@@ -10,15 +10,16 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.balance import Linearisation
-from solver.factor import Factor, build_factor, without_neutral
+from solver.factor import Factor, build_factor
 from solver.model import ComplexArray, FloatArray, IntArray
+from solver.slip_space import build_slip_factor, find_slip_space
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
 KRYLOV = 30  # products after which a kept factorisation has aged too much
 RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
 FORCING = 1e-3  # relative residual of an iterative solve
 ARNOLDI = 24  # products from which the sign of a determinant is taken where a kept factorisation serves
-WHOLE = 4000  # unknowns up to which all of them are factorised where it does not
+WHOLE = 4000  # directions of the slip space up to which all of them are factorised where it does not
 CERTAIN = 0.15  # a real part of an eigenvalue, 1 where the factorisation is exact, that is taken as far from zero
 
 
@@ -68,28 +69,21 @@ class JacobianSolver:
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        Columns of pairs that stay stuck or closed are those of the identity and do not count. In a large system the
-        sign is that of the kept factorisation P times (-1)^k, k the number of real negative eigenvalues of J P^-1. All
-        but few of its eigenvalues are near 1, and Arnoldi's method finds those that stand apart first: where none is
-        near or below zero k = 0, else the whole Jacobian is factorised. Where it is too large for that, k is counted
-        among the eigenvalues found.
+        Where the slip space is large it is that of the kept factorisation P times (-1)^k, k the number of real negative
+        eigenvalues of J P^-1. All but few of its eigenvalues are near 1, and Arnoldi's method finds those that stand
+        apart first: where none is near or below zero k = 0, else the whole slip space is factorised. Where it is too
+        large for that, k is counted among the eigenvalues found.
         """
-        pairs = tangent.active()
-        rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
-        m = tangent.joint.basis.synthesis.shape[0]
-        if not rows.size:
-            return 1.0
-        if rows.size * m <= SMALL:
-            return float(np.linalg.slogdet(without_neutral(tangent.dense(pairs)))[0])
-        if self._factor is None or not np.isin(pairs, self._factor.pairs).all():
-            self._factor = build_factor(tangent, pairs)
+        if self._factor is None or self._factor.exact or not np.isin(tangent.active(), self._factor.pairs).all():
+            self._factor = build_factor(tangent, tangent.active())
             if self._factor.exact:
                 return self._factor.sign
-        values = self._eigenvalues(self._factor, tangent, m)
+        values = self._eigenvalues(self._factor, tangent, tangent.joint.basis.synthesis.shape[0])
         if np.all(np.isfinite(values)) and values.real.min() > CERTAIN:
             return self._factor.sign
-        if rows.size * m <= WHOLE:
-            return float(np.linalg.slogdet(without_neutral(tangent.dense(pairs)))[0])
+        whole = find_slip_space(tangent, WHOLE, 0, 0.0)
+        if whole is not None:
+            return build_slip_factor(tangent, whole).sign
         below = np.count_nonzero((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real)))
         return self._factor.sign * float((-1) ** below)
 
@@ -117,11 +111,15 @@ class JacobianSolver:
         return self._iterate(self._factor, tangent, rows, right, RESTARTS)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
-        """Solution by a factorisation of these rows; a second solve takes away what `without_neutral` has put in."""
-        full = np.zeros((tangent.joint.slots.size, right.shape[1]))
-        full[rows] = factor.solve(right)
-        solution = full[rows] + factor.solve(right - tangent.apply(full)[rows])
-        return solution if np.all(np.isfinite(solution)) else full[rows]
+        """Solution by a factorisation of this Jacobian; a second solve takes away what `NEUTRAL` has put in."""
+        padded = np.zeros((tangent.joint.slots.size, right.shape[1]))
+        padded[rows] = right
+        first = factor.solve(padded)
+        # the rows of all other pairs follow from these
+        first[~np.isin(np.arange(len(first)), rows)] = 0.0
+        padded[rows] = right - tangent.apply(first)[rows]
+        solution = (first + factor.solve(padded))[rows]
+        return solution if np.all(np.isfinite(solution)) else first[rows]
 
     def _iterate(
         self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray, restarts: int

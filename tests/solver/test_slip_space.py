@@ -1,0 +1,107 @@
+"""Factorisation in the slip space against a dense one of the whole Jacobian."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import factor
+from solver.balance import Balance, Linearisation
+from solver.factor import HarmonicFactor, build_factor
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.settings import SolverSettings
+from solver.slip_space import build_slip_factor, find_slip_space
+from tests.solver.models import PRELOAD, random_balance, random_model
+
+SETTINGS = SolverSettings(3, 24)
+KINDS = ("3d", "constant_load", "normal_only", "3d", "3d", "3d", "3d", "3d", "3d", "3d", "3d", "3d")
+MANY = 10**6
+
+
+def case(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
+    """12 pairs of all kinds, of which the last three stay pressed and stuck."""
+    balance, predicted = random_balance(random_model(seed, KINDS, 4), SETTINGS, seed, wear=wear)
+    pressed = (balance.joint.slots // 3 >= 9) & (balance.joint.slots % 3 == 0)
+    predicted = predicted.copy()
+    predicted[pressed, 0] += 100.0 * PRELOAD
+    return balance, predicted
+
+
+def tangent_of(balance: Balance, predicted: FloatArray) -> Linearisation:
+    return balance.linearise(balance.evaluate(predicted))
+
+
+def dense_of(tangent: Linearisation) -> FloatArray:
+    return tangent.dense(np.arange(tangent.joint.contact.n_contact))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("wear", [False, True])
+def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, wear: bool) -> None:
+    balance, predicted = case(seed, wear)
+    tangent = tangent_of(balance, predicted)
+    space = find_slip_space(tangent, MANY, 0, 0.0)
+    assert space is not None and space.exact
+    assert set(space.pairs) == set(tangent.active())
+    assert space.size < 0.8 * predicted.size
+    found = build_slip_factor(tangent, space)
+    right = np.random.default_rng(seed).normal(size=predicted.shape)
+    dense = dense_of(tangent)
+    exact = np.linalg.solve(dense, right.ravel()).reshape(right.shape)
+    # NEUTRAL shifts the eigenvalues by 1e-8
+    assert np.linalg.norm(found.solve(right) - exact) < 1e-6 * np.linalg.norm(exact)
+    assert found.sign == np.linalg.slogdet(dense)[0]
+
+
+def test_the_sign_of_the_determinant_is_followed_through_zero() -> None:
+    balance, predicted = case(4)
+    signs = set()
+    for scale in np.linspace(-3.0, 3.0, 13):
+        tangent = tangent_of(balance, predicted * scale)
+        sign = np.linalg.slogdet(dense_of(tangent))[0]
+        signs.add(float(sign))
+        assert JacobianSolver().determinant_sign(tangent) == sign
+    assert signs == {1.0, -1.0}
+
+
+def test_a_part_of_the_slip_space_steers_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+    balance, predicted = case(5)
+    tangent = tangent_of(balance, predicted)
+    whole = find_slip_space(tangent, MANY, 0, 0.0)
+    part = find_slip_space(tangent, 0, MANY, factor.CUTOFF)
+    assert whole is not None and part is not None
+    assert part.size < whole.size and not part.exact
+    monkeypatch.setattr(factor, "EXACT_FEW", 0)
+    monkeypatch.setattr(factor, "EXACT", 0)
+    right = np.random.default_rng(6).normal(size=predicted.shape)
+    found = JacobianSolver().solve(tangent, right)
+    assert np.linalg.norm(tangent.apply(found) - right) < 2e-3 * np.linalg.norm(right)
+
+
+def test_a_slip_space_that_is_too_large_is_left_to_the_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
+    balance, predicted = case(7)
+    tangent = tangent_of(balance, predicted)
+    assert find_slip_space(tangent, 10, 10, factor.CUTOFF) is None
+    monkeypatch.setattr(factor, "EXACT_FEW", 0)
+    monkeypatch.setattr(factor, "MOST", 0)
+    monkeypatch.setattr(factor, "EXACT", 0)
+    monkeypatch.setattr(factor, "DENSE", 100)
+    assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
+    right = np.random.default_rng(8).normal(size=predicted.shape)
+    found = JacobianSolver().solve(tangent, right)
+    assert np.linalg.norm(tangent.apply(found) - right) < 2e-3 * np.linalg.norm(right)
+    assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
+
+
+def test_where_everything_sticks_there_is_no_slip_space() -> None:
+    balance, predicted = case(9, wear=False)
+    pressed = predicted.copy()
+    pressed[balance.joint.slots % 3 == 0, 0] += 1e4 * PRELOAD
+    constant = ~balance.joint.has_normal[balance.joint.slots // 3]
+    pressed[constant] = 0.0
+    tangent = tangent_of(balance, pressed)
+    space = find_slip_space(tangent, MANY, 0, 0.0)
+    assert space is not None and space.size == 0
+    right = np.random.default_rng(1).normal(size=predicted.shape)
+    assert np.array_equal(build_slip_factor(tangent, space).solve(right), right)
