@@ -302,7 +302,8 @@ def mass_tangent(
     local = np.empty((5, 5))
     entry = np.empty((5, 3 * m + 2))
     leave = np.empty((5, 3 * m + 2))
-    force_h = np.empty((2 * m, 3 * m + 2))
+    analysis_t = np.ascontiguousarray(step_analysis.T)
+    dforce_t = np.empty((n_samples, 2, 3 * m + 2))
     work = np.empty(3 * m + 2)
     for pair in range(n_contact):
         gain = mass[pair] / step + 0.5 * drag[pair]
@@ -312,7 +313,6 @@ def mass_tangent(
         entry[:, :] = 0.0
         entry[2, 3 * m] = 1.0
         entry[3, 3 * m + 1] = 1.0
-        force_h[:, :] = 0.0
         work[:] = 0.0
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
@@ -322,10 +322,7 @@ def mass_tangent(
                 entry[1, 2 * m + k] = mean_t[n, k]
                 entry[4, k] = friction * point_t[n, k] if normal > 0.0 and has_normal[pair] else 0.0
             leave[:, :] = local @ entry
-            for k in range(m):
-                for column in range(3 * m + 2):
-                    force_h[k, column] += step_analysis[n, k] * leave[0, column]
-                    force_h[m + k, column] += step_analysis[n, k] * leave[1, column]
+            dforce_t[n] = leave[:2]
             for column in range(3 * m + 2):
                 work[column] += normal * step * leave[4, column]
             if normal > 0.0 and has_normal[pair]:
@@ -337,14 +334,18 @@ def mass_tangent(
             entry[3, :] = leave[3]
         # the start of the period is its end: v0 = v(x, v0)
         determinant = (1.0 - entry[2, 3 * m]) * (1.0 - entry[3, 3 * m + 1]) - entry[2, 3 * m + 1] * entry[3, 3 * m]
+        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, 3 * m + 2)
         for column in range(3 * m):
             first = (
                 (1.0 - entry[3, 3 * m + 1]) * entry[2, column] + entry[2, 3 * m + 1] * entry[3, column]
             ) / determinant
             second = ((1.0 - entry[2, 3 * m]) * entry[3, column] + entry[3, 3 * m] * entry[2, column]) / determinant
-            for row in range(2 * m):
-                force_tangent[pair, m + row, column] = (
-                    force_h[row, column] + force_h[row, 3 * m] * first + force_h[row, 3 * m + 1] * second
-                )
+            for component in range(2):
+                for k in range(m):
+                    force_tangent[pair, (1 + component) * m + k, column] = (
+                        dforce_h[k, component, column]
+                        + dforce_h[k, component, 3 * m] * first
+                        + dforce_h[k, component, 3 * m + 1] * second
+                    )
             wear_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
     return force_tangent, wear_tangent

@@ -4,7 +4,7 @@ The Jacobian is the identity but for what the pairs do not pass on, `S = I - d l
 
     J = I - S + Z_r D,      D = d u/dp
 
-S and D of a pair that sticks all period long are zero, and of one that slips or opens for a part of the period they have
+S and D are zero where a pair sticks all period long, and where it slips or opens for a part of the period they have
 a low rank: its slip is the same throughout a phase of sticking. With an orthonormal basis V of the rows of S and D of
 each pair, `S = S V V^T` and `D = D V V^T`, so that with y = V^T x
 

@@ -18,26 +18,26 @@ def mean_normal_tangent(
     m = synthesis.shape[0]
     basis_t = np.ascontiguousarray(synthesis.T)
     tangent = np.zeros((n_contact, m, m))
-    row = np.empty(m)
+    analysis_t = np.ascontiguousarray(analysis.T)
+    rows = np.empty((n_samples, m))
     for pair in range(n_contact):
         if not has_normal[pair]:
             continue
         for n in range(n_samples):
             force = predicted_t[pair, 0, n]
+            rows[n] = 0.0
             if force <= 0.0:
                 continue
             ahead = (n + 1) % n_samples
             _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
             _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
             for j in range(m):
-                row[j] = 0.5 * (
+                rows[n, j] = 0.5 * (
                     (own_before + own_after) * basis_t[n, j]
                     + other_before * basis_t[n - 1, j]
                     + other_after * basis_t[ahead, j]
                 )
-            for k in range(m):
-                for j in range(m):
-                    tangent[pair, k, j] += analysis[n, k] * row[j]
+        tangent[pair] = np.dot(analysis_t, rows)
     return tangent
 
 
@@ -131,12 +131,12 @@ def march_tangent(
     wear_tangent = np.zeros((n_contact, width))
     dstate = np.empty((2, width + 2))
     before_dstate = np.empty((2, width + 2))
+    analysis_t = np.ascontiguousarray(analysis.T)
+    dforce_t = np.empty((n_samples, 2, width + 2))
     dforce = np.empty((2, width + 2))
-    harmonics = np.empty((2 * m, width + 2))
     wear = np.empty(width + 2)
     dstart = np.empty((2, width))
     for pair in range(n_contact):
-        harmonics[:, :] = 0.0
         wear[:] = 0.0
         dstate[:, :] = 0.0
         dstate[0, width] = dstate[1, width + 1] = 1.0
@@ -149,12 +149,7 @@ def march_tangent(
             pre_1 = predicted_t[pair, 1, n] - first
             pre_2 = predicted_t[pair, 2, n] - second
             before_dstate[:, :] = dstate
-            state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce)
-            if status != SEPARATED:
-                for k in range(m):
-                    for column in range(width + 2):
-                        harmonics[k, column] += analysis[n, k] * dforce[0, column]
-                        harmonics[m + k, column] += analysis[n, k] * dforce[1, column]
+            state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce_t[n])
             step_1 = state_t[pair, 0, n + 1] - first
             step_2 = state_t[pair, 1, n + 1] - second
             slip = np.hypot(step_1, step_2)
@@ -185,13 +180,17 @@ def march_tangent(
             has_normal[pair],
             dforce,
         )
+        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
+        for component in range(2):
+            for k in range(m):
+                row = (1 + component) * m + k
+                start_1 = dforce_h[k, component, width]
+                start_2 = dforce_h[k, component, width + 1]
+                for column in range(width):
+                    force_tangent[pair, row, column] = (
+                        dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
+                    )
         for column in range(width):
-            for row in range(2 * m):
-                force_tangent[pair, m + row, column] = (
-                    harmonics[row, column]
-                    + harmonics[row, width] * dstart[0, column]
-                    + harmonics[row, width + 1] * dstart[1, column]
-                )
             wear_tangent[pair, column] = (
                 wear[column] + wear[width] * dstart[0, column] + wear[width + 1] * dstart[1, column]
             )

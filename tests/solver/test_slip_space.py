@@ -42,7 +42,8 @@ def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, 
     balance, predicted = case(seed, wear)
     tangent = tangent_of(balance, predicted)
     space = find_slip_space(tangent, MANY, 0, 0.0)
-    assert space is not None and space.exact
+    assert space is not None
+    assert space.exact
     assert set(space.pairs) == set(tangent.active())
     assert space.size < 0.8 * predicted.size
     found = build_slip_factor(tangent, space)
@@ -70,8 +71,10 @@ def test_a_part_of_the_slip_space_steers_the_iteration(monkeypatch: pytest.Monke
     tangent = tangent_of(balance, predicted)
     whole = find_slip_space(tangent, MANY, 0, 0.0)
     part = find_slip_space(tangent, 0, MANY, factor.CUTOFF)
-    assert whole is not None and part is not None
-    assert part.size < whole.size and not part.exact
+    assert whole is not None
+    assert part is not None
+    assert part.size < whole.size
+    assert not part.exact
     monkeypatch.setattr(factor, "EXACT_FEW", 0)
     monkeypatch.setattr(factor, "EXACT", 0)
     right = np.random.default_rng(6).normal(size=predicted.shape)
@@ -102,6 +105,7 @@ def test_where_everything_sticks_there_is_no_slip_space() -> None:
     pressed[constant] = 0.0
     tangent = tangent_of(balance, pressed)
     space = find_slip_space(tangent, MANY, 0, 0.0)
-    assert space is not None and space.size == 0
+    assert space is not None
+    assert space.size == 0
     right = np.random.default_rng(1).normal(size=predicted.shape)
     assert np.array_equal(build_slip_factor(tangent, space).solve(right), right)
