@@ -26,7 +26,7 @@ from solver.settings import Resolution, all_orders, samples_for
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
 MOST_SAMPLES = 8192
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
-MOST_REFINEMENT = 120  # iterations of one refinement in all
+MOST_REFINEMENT = 200  # iterations of one refinement in all
 FEW_ITERATIONS = 20  # where they are dear
 DEAR = 1000  # unknowns
 MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
@@ -98,8 +98,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if settings.harmonics == "auto":
             here = here.without_even(effort) or here
         resolution = here.case.resolution
-        finer = here.solve_at(Resolution(resolution.orders, 2 * resolution.samples), effort)
-        by_samples = UNKNOWN if finer is None else here.difference(finer).times(SAMPLES_SAFETY)
+        by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
@@ -166,6 +165,18 @@ class _Level:
         if odd == orders or not _half_wave_symmetric(self.point.evaluation):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
+
+    def samples_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
+        """Estimated error for want of samples, and the state with twice as many that it comes from.
+
+        Where that is not found it is the difference to the state with half as many, which is at least as large.
+        """
+        orders, samples = self.case.resolution.orders, self.case.resolution.samples
+        finer = self.solve_at(Resolution(orders, 2 * samples), effort)
+        if finer is not None:
+            return self.difference(finer).times(SAMPLES_SAFETY), finer
+        coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
+        return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
     def harmonics_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
         """Estimated error for want of harmonics, and the state with more of them that it comes from.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.kernels import PLAIN_PASSES, SEPARATED, SLIP, STICK, close, closed_share, contact_sample
+from solver.kernels import PLAIN_PASSES, SLIP, STICK, close, closed_share, contact_sample
 from solver.model import BoolArray, FloatArray, IntArray
 
 
