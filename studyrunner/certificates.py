@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studyrunner.evaluate import CONVERGED
 from studyrunner.progress import count
-from studyrunner.results import MarchResult
 from studyrunner.study import Study
 from studyrunner.tasks import Index
 from studyrunner.variables import CERTIFICATE, COORDINATES
@@ -27,92 +26,141 @@ class _Place:
     cycle: int | None = None
 
 
-def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
-    """Table in lines: the largest value of each certificate over all converged points, with its place, then how many
-    folds, jumps, too long steps, oscillating wear rates and unstable states there are. The order of results does not
-    matter.
+@dataclass
+class _Noted:
+    """How many there are, and the first of them."""
+
+    n: int = 0
+    first: Index | None = None
+
+    def add(self, point: Index) -> None:
+        """One more."""
+        self.n += 1
+        self.first = point if self.first is None else min(self.first, point)
+
+
+class CertificateTable:
+    """Collects the table from the records of marches, some at a time; their order does not matter.
+
+    It keeps the worst of each kind and counts: little, however many points there are.
     """
-    converged = [result for result in results if result.outcome == CONVERGED]
-    n_converged = sum(len(result.points) for result in converged)
-    rows = [("worst certificate of", f"{count(n_converged, 'point')} computed to tolerance")]
-    rows.extend((f"  {label}", _worst(study, name, converged)) for name, label in CERTIFICATE.items())
-    rows.append(("folds in the sweeps", _folds(study, results)))
-    rows.append(("jumps while wearing", _jumps(study, results)))
-    rows.append(("explicit steps too long", _listed(study, _too_long(study, results), "longer than step_limit")))
-    oscillating = [min(result.points) for result in results if result.oscillates]
-    rows.append(("oscillating wear rate", _listed(study, oscillating, "use a smaller step or the implicit scheme")))
-    unstable = [min(result.points) for result in converged if not np.all(result.values["stable"])]
-    rows.append(("unstable states", _listed(study, unstable, "see the variable stable")))
-    width = max(len(label) for label, _ in rows)
-    return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._n_converged = 0
+        self._n_histories = 0
+        self._worst: dict[str, tuple[float, _Place]] = {}
+        self._folds: set[tuple[Index, float]] = set()
+        self._first_jump: tuple[float, Index] | None = None
+        self._n_jumps = 0
+        self._noted = {name: _Noted() for name in ("too long", "oscillating", "unstable")}
+
+    def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
+        """Records (n,) as in `parts`, and the points that each of them is of."""
+        converged = records["outcome"] == CONVERGED
+        first = [min(of_one) for of_one in points]
+        self._n_histories += int(np.count_nonzero(converged))
+        self._n_converged += sum(len(points[row]) for row in _rows(converged))
+        for name in CERTIFICATE:
+            self._add_worst(name, first, records[name], converged)
+        self._add_folds(points, records["fold_frequency"])
+        for row in _rows(~np.isnan(records["jump_cycle"])):
+            jump = (float(records["jump_cycle"][row]), first[row])
+            self._first_jump = jump if self._first_jump is None else min(self._first_jump, jump)
+            self._n_jumps += 1
+        self._add_too_long(points, records["step_limit"])
+        self._note("oscillating", first, records["oscillates"] != 0)
+        self._note("unstable", first, converged & ~np.all(records["stable"] != 0, axis=1))
+
+    def format(self) -> str:
+        """Table in lines: the largest value of each certificate over all converged points, with its place, then how
+        many folds, jumps, too long steps, oscillating wear rates and unstable states there are.
+        """
+        rows = [("worst certificate of", f"{count(self._n_converged, 'point')} computed to tolerance")]
+        rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())
+        rows.append(("folds in the sweeps", self._format_folds()))
+        rows.append(("jumps while wearing", self._format_jumps()))
+        rows.append(("explicit steps too long", self._format_noted("too long", "longer than step_limit")))
+        remedy = "use a smaller step or the implicit scheme"
+        rows.append(("oscillating wear rate", self._format_noted("oscillating", remedy)))
+        rows.append(("unstable states", self._format_noted("unstable", "see the variable stable")))
+        width = max(len(label) for label, _ in rows)
+        return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
+
+    def _add_worst(
+        self, name: str, first: Sequence[Index], values: NDArray[np.float64], converged: NDArray[np.bool_]
+    ) -> None:
+        """Largest value (n, n_cycles) and its place; the first in the order of the file where several are equal."""
+        # None is negative: NaN, which is not estimated, counts below all.
+        known = np.where(np.isnan(values) | ~converged[:, None], -1.0, values)
+        cycles = known.argmax(axis=1)
+        largest = known.max(axis=1)
+        value = float(largest.max(initial=-1.0))
+        if value < 0.0:
+            return
+        place = min(_Place(first[row], int(cycles[row])) for row in _rows(largest == value))
+        before = self._worst.get(name)
+        if before is None or value > before[0] or (value == before[0] and place < before[1]):
+            self._worst[name] = (value, place)
+
+    def _add_folds(self, points: Sequence[tuple[Index, ...]], frequencies: NDArray[np.float64]) -> None:
+        """Folds at which a sweep left its branch. Points that differ in their wear only share the sweep's folds."""
+        kept = [axis for axis, name in enumerate(self._study.dimensions) if name not in _NOT_OF_A_SWEEP]
+        for row in _rows(~np.isnan(frequencies)):
+            for point in points[row]:
+                self._folds.add((tuple(point[axis] for axis in kept), float(frequencies[row])))
+
+    def _add_too_long(self, points: Sequence[tuple[Index, ...]], limits: NDArray[np.float64]) -> None:
+        """Points of the explicit scheme whose step is longer than what is predicted to be stable."""
+        study = self._study
+        if study.slow_time.largest_depth is not None:
+            return
+        names = list(study.dimensions)
+        scheme, step = names.index("scheme"), names.index("step")
+        for row in _rows(np.isfinite(limits)):
+            for point in points[row]:
+                longest = min(study.axes.step[point[step]], study.cycles_kept[-1])
+                if study.axes.scheme[point[scheme]] == "explicit" and longest > limits[row]:
+                    self._noted["too long"].add(point)
+
+    def _note(self, what: str, first: Sequence[Index], where: NDArray[np.bool_]) -> None:
+        for row in _rows(where):
+            self._noted[what].add(first[row])
+
+    def _format_worst(self, name: str) -> str:
+        if name not in self._worst:
+            return "not estimated" if self._n_histories else "none"
+        largest, place = self._worst[name]
+        where = _where(self._study, place)
+        return f"{largest:.1e}" + (f" at {where}" if where else "")
+
+    def _format_folds(self) -> str:
+        if not self._folds:
+            return "none"
+        frequencies = sorted({frequency for _, frequency in self._folds})
+        more = ", ..." if len(frequencies) > _FOLDS_NAMED else ""
+        return f"{len(self._folds)}, at {', '.join(f'{value:.6g} Hz' for value in frequencies[:_FOLDS_NAMED])}{more}"
+
+    def _format_jumps(self) -> str:
+        """Histories that lost their branch, and the earliest of them."""
+        if self._first_jump is None:
+            return "none"
+        cycle, point = self._first_jump
+        where = _where(self._study, _Place(point))
+        return f"{self._n_jumps}, the first at cycle {cycle:g}" + (f" at {where}" if where else "")
+
+    def _format_noted(self, what: str, remedy: str) -> str:
+        """How many of them, where the first is, and what there is to say."""
+        noted = self._noted[what]
+        if noted.first is None:
+            return "none"
+        where = _where(self._study, _Place(noted.first))
+        return f"{noted.n}, the first at {where}: {remedy}" if where else f"{noted.n}: {remedy}"
 
 
-def _worst(study: Study, name: str, converged: Sequence[MarchResult]) -> str:
-    """Largest value and its place; the first in the order of the file where several are equal."""
-    found = list(_candidates(name, converged))
-    if not found:
-        return "not estimated" if converged else "none"
-    largest = max(value for value, _ in found)
-    place = min(place for value, place in found if value == largest)
-    where = _where(study, place)
-    return f"{largest:.1e}" + (f" at {where}" if where else "")
-
-
-def _candidates(name: str, converged: Sequence[MarchResult]) -> Iterator[tuple[float, _Place]]:
-    """The largest value of each history that has any."""
-    for result in converged:
-        values = np.asarray(result.values[name], dtype=np.float64)
-        if not np.isnan(values).all():
-            cycle = int(np.nanargmax(values))
-            yield float(values[cycle]), _Place(min(result.points), cycle)
-
-
-def _folds(study: Study, results: Sequence[MarchResult]) -> str:
-    """Folds at which a sweep left its branch. Points that differ in their wear only share the sweep and its folds."""
-    kept = [axis for axis, name in enumerate(study.dimensions) if name not in _NOT_OF_A_SWEEP]
-    folds = {
-        (tuple(point[axis] for axis in kept), result.fold_frequency)
-        for result in results
-        if not math.isnan(result.fold_frequency)
-        for point in result.points
-    }
-    if not folds:
-        return "none"
-    frequencies = sorted({frequency for _, frequency in folds})
-    more = ", ..." if len(frequencies) > _FOLDS_NAMED else ""
-    return f"{len(folds)}, at {', '.join(f'{value:.6g} Hz' for value in frequencies[:_FOLDS_NAMED])}{more}"
-
-
-def _jumps(study: Study, results: Sequence[MarchResult]) -> str:
-    """Histories that lost their branch, and the earliest of them."""
-    jumps = sorted((result.jump_cycle, min(result.points)) for result in results if not math.isnan(result.jump_cycle))
-    if not jumps:
-        return "none"
-    where = _where(study, _Place(jumps[0][1]))
-    return f"{len(jumps)}, the first at cycle {jumps[0][0]:g}" + (f" at {where}" if where else "")
-
-
-def _too_long(study: Study, results: Sequence[MarchResult]) -> list[Index]:
-    """Points of the explicit scheme whose step is longer than what is predicted to be stable."""
-    if study.slow_time.largest_depth is not None:
-        return []
-    names = list(study.dimensions)
-    scheme, step = names.index("scheme"), names.index("step")
-    return [
-        point
-        for result in results
-        for point in result.points
-        if study.axes.scheme[point[scheme]] == "explicit"
-        and min(study.axes.step[point[step]], study.cycles_kept[-1]) > result.step_limit
-    ]
-
-
-def _listed(study: Study, points: Sequence[Index], remedy: str) -> str:
-    """How many of them, where the first is, and what there is to say."""
-    if not points:
-        return "none"
-    where = _where(study, _Place(min(points)))
-    return f"{len(points)}, the first at {where}: {remedy}" if where else f"{len(points)}: {remedy}"
+def _rows(where: NDArray[np.bool_]) -> list[int]:
+    rows: list[int] = np.flatnonzero(where).tolist()
+    return rows
 
 
 def _where(study: Study, place: _Place) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -63,8 +63,11 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -
         cast("Literal['up', 'down']", task.sweep),
         _solver_settings(task.settings),
     )
+    n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for position, start in branch:
-        yield StartResult(position, start, _moves(start))
+        n_coefficients = 2 * len(start.resolution.orders) + 1
+        n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
+        yield StartResult(position, start, _moves(start), n_unknowns)
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> MarchResult:
@@ -139,7 +142,7 @@ def _solver_settings(settings: Settings) -> SolverSettings:
     return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol)
 
 
-def describe_failures(outcomes: Sequence[int]) -> tuple[str, ...]:
-    """One line for each way in which points failed: how many of them, and the sentence."""
-    counts = {ending: outcomes.count(ending.number) for ending in endings() if ending.number != CONVERGED}
+def describe_failures(outcomes: Mapping[int, int]) -> tuple[str, ...]:
+    """One line for each way in which points failed: how many of them, and the sentence. outcomes: points by number."""
+    counts = {ending: outcomes.get(ending.number, 0) for ending in endings() if ending.number != CONVERGED}
     return tuple(f"{count} x {ending.meaning}: {ending.sentence}" for ending, count in counts.items() if count)

@@ -1,105 +1,207 @@
-"""Results -> one labelled dataset -> one NetCDF file, written under a temporary name and renamed."""
+"""Records of marches -> one labelled NetCDF file, written under a temporary name and renamed.
+
+The file is written slab by slab from the files of a run: only a slab is ever in memory, however many points there are.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 import platform
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+import netCDF4
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.certificates import summarise_certificates
+from studyrunner.certificates import CertificateTable
 from studyrunner.evaluate import endings
 from studyrunner.output import partial_path
-from studyrunner.results import MarchResult
+from studyrunner.parts import Parts, march_numbers, variable_sizes
 from studyrunner.scene import SceneFacts
 from studyrunner.study import Study
 from studyrunner.study_file import format_study
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.tasks import TaskPlan
+from studyrunner.variables import ASKED, COORDINATES, KEPT, Variable
 
 _PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
+_BYTES_A_SLAB = 16e6
+_ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
+
+Region = tuple[int | slice, ...]
 
 
-def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult]) -> xr.Dataset:
-    """The result of a study: axes in the order of the study, then cycle, then contact or response.
+@dataclass(frozen=True)
+class Gathered:
+    """What the end of a run tells. outcomes: points by number of their outcome. certificates: the table."""
 
-    Every point of the study is in exactly one of the results; anything else is a bug and raises ValueError.
+    outcomes: Mapping[int, int]
+    certificates: str
+
+
+@dataclass(frozen=True)
+class _Index:
+    """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,)."""
+
+    file: NDArray[np.int32]
+    row: NDArray[np.int32]
+
+
+def gather(study: Study, facts: SceneFacts, plan: TaskPlan, parts: Parts, path: Path) -> Gathered:
+    """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
+
+    Every point of the study has exactly one record; anything else is a bug and raises ValueError.
     """
-    axes = study.dimensions
-    shape = tuple(len(values) for values in axes.values())
-    sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
-    asked = [name for name in ASKED if name in study.outputs.variables]
-    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
-    arrays = {
-        name: np.zeros(shape + tuple(sizes[dimension] for dimension in entry.dimensions), dtype=entry.dtype)
-        for name, entry in variables.items()
-    }
-    filled = np.zeros(shape, dtype=np.int64)
-    for result in results:
-        for point in result.points:
-            filled[point] += 1
-            for name in asked:
-                arrays[name][point] = result.values[name]
-            for name in KEPT:
-                arrays[name][point] = getattr(result, name)
-    if not np.all(filled == 1):
-        raise ValueError(f"{np.count_nonzero(filled != 1)} points were not computed exactly once")
-    dataset = xr.Dataset(
-        {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
-        coords=_coordinates(study, facts),
-        attrs={**_attributes(study, facts), "certificate_summary": summarise_certificates(study, results)},
-    )
-    for name in map(str, dataset.variables):
-        entry = COORDINATES.get(name) or variables[name]
-        content = "coordinate" if name in COORDINATES else "modelResult"
-        dataset[name].attrs = {
-            "units": entry.units,
-            "long_name": entry.long_name,
-            "coverage_content_type": content,
-        }
-        if entry.flags:
-            dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
-            dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
-        if name in asked and not entry.dtype.startswith("float"):
-            dataset[name].attrs["comment"] = "0 where the point failed, see outcome"
-    flags = endings()
-    dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
-    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
-    return dataset
-
-
-def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Writes the file under a temporary name in the same folder, then renames it: whole or not at all."""
+    index, gathered = _read_through(study, plan, parts)
     temporary = partial_path(path)
-    encoding: dict[str, dict[str, object]] = {}
-    for name in dataset.data_vars:
-        encoding[str(name)] = {"zlib": True, "complevel": 1, "shuffle": True}
-    for key, coordinate in dataset.coords.items():
-        # Every coordinate value is there: no mark for missing ones.
-        encoding[str(key)] = {"_FillValue": None} if coordinate.dtype.kind == "f" else {}
     try:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+            file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
+            _write_values(file, study, facts, parts, index)
+            _write_coordinates(file, study, facts)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+    return gathered
 
 
-def _coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
-    coordinates: dict[str, tuple[str, NDArray[np.generic]]] = {
+def _read_through(study: Study, plan: TaskPlan, parts: Parts) -> tuple[_Index, Gathered]:
+    """Reads every file once: where each point is, how it ended, and the table."""
+    shape = tuple(len(values) for values in study.dimensions.values())
+    marches = list(itertools.chain.from_iterable(plan.marches))
+    index = _Index(*(np.zeros(math.prod(shape), dtype=np.int32) for _ in range(2)))
+    filled = np.zeros(math.prod(shape), dtype=np.int64)
+    table = CertificateTable(study)
+    outcomes: Counter[int] = Counter()
+    for number in range(len(parts.files)):
+        records = parts.read(number)
+        points = [marches[march].points for march in march_numbers(records)]
+        for row, (of_one, outcome) in enumerate(zip(points, records["outcome"].tolist(), strict=True)):
+            places = [int(np.ravel_multi_index(point, shape)) for point in of_one]
+            index.file[places], index.row[places] = number, row
+            filled[places] += 1
+            outcomes[outcome] += len(of_one)
+        table.add(points, records)
+    if not np.all(filled == 1):
+        raise ValueError(f"{np.count_nonzero(filled != 1)} points were not computed exactly once")
+    return index, Gathered(outcomes, table.format())
+
+
+def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts: Parts, index: _Index) -> None:
+    shape = tuple(len(values) for values in study.dimensions.values())
+    sizes = variable_sizes(study, facts)
+    asked = [name for name in ASKED if name in study.outputs.variables]
+    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
+    for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
+        file.createDimension(name, size)
+    slab = _slab_shape(shape, parts.kind.itemsize)
+    for name, entry in variables.items():
+        variable = file.createVariable(
+            name,
+            entry.dtype,
+            (*study.dimensions, *entry.dimensions),
+            compression="zlib",
+            complevel=1,
+            shuffle=True,
+            chunksizes=(*slab, *(sizes[dimension] for dimension in entry.dimensions)),
+            fill_value=math.nan if entry.dtype.startswith("float") else None,
+        )
+        variable.setncatts(_attributes(name, entry))
+        if "contact" in entry.dimensions:
+            variable.setncattr("coordinates", _ON_CONTACT)
+    if not any("contact" in entry.dimensions for entry in variables.values()):
+        file.setncattr("coordinates", _ON_CONTACT)
+    for region, first, last in _slabs(shape, slab):
+        records = _read_slab(parts, index, first, last)
+        lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
+        for name, entry in variables.items():
+            values = records[name].reshape(*lengths, *records[name].shape[1:])
+            file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+
+
+def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
+    """Points along each axis that are written at once, and make a compressed chunk: as many as fit into a slab."""
+    left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
+    lengths = []
+    for size in reversed(shape):
+        lengths.append(min(size, left))
+        # Points that are next to each other in the file: an axis that does not fit ends the slab.
+        left = left // size if left >= size else 1
+    return tuple(reversed(lengths))
+
+
+def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, int, int]]:
+    """Regions of the axes, and the first point of each and the one after the last, in the order of the file."""
+    first = 0
+    starts = (range(0, size, length) for size, length in zip(shape, slab, strict=True))
+    for corner in itertools.product(*starts):
+        region = tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
+        )
+        last = first + math.prod(at.stop - at.start for at in region)
+        yield region, first, last
+        first = last
+
+
+def _read_slab(parts: Parts, index: _Index, first: int, last: int) -> NDArray[np.void]:
+    """Records of points that follow each other in the file."""
+    files, rows = index.file[first:last], index.row[first:last]
+    records = np.empty(last - first, dtype=parts.kind)
+    order = np.argsort(files, kind="stable")
+    bounds = np.flatnonzero(np.diff(files[order], prepend=-1, append=-1))
+    for begin, end in itertools.pairwise(bounds):
+        places = order[begin:end]
+        records[places] = parts.read(int(files[places[0]]))[rows[places]]
+    return records
+
+
+def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -> None:
+    for name, (dimension, values) in coordinates(study, facts).items():
+        texts = values.dtype.kind == "U"
+        kind: Any = str if texts else values.dtype
+        variable = file.createVariable(name, kind, (dimension,))
+        variable.setncatts(_attributes(name, COORDINATES[name]))
+        variable[:] = values.astype(object) if texts else values
+
+
+def _attributes(name: str, entry: Variable) -> dict[str, object]:
+    """Attributes of a variable of the file."""
+    content = "coordinate" if name in COORDINATES else "modelResult"
+    found: dict[str, object] = {
+        "units": entry.units,
+        "long_name": entry.long_name,
+        "coverage_content_type": content,
+    }
+    if entry.flags:
+        found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
+        found["flag_meanings"] = " ".join(entry.flags)
+    if name == "outcome":
+        found["flag_values"] = np.array([flag.number for flag in endings()], dtype=entry.dtype)
+        found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
+    if name in ASKED and not entry.dtype.startswith("float"):
+        found["comment"] = "0 where the point failed, see outcome"
+    return found
+
+
+def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
+    """Coordinates of the file: name, dimension, values."""
+    found: dict[str, tuple[str, NDArray[np.generic]]] = {
         name: (name, _labels(values)) for name, values in study.dimensions.items()
     }
-    coordinates["cycle"] = ("cycle", np.array(study.cycles_kept))
-    coordinates["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
-    coordinates["response"] = ("response", _labels(facts.response_names))
+    found["cycle"] = ("cycle", np.array(study.cycles_kept))
+    found["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
+    found["response"] = ("response", _labels(facts.response_names))
     for column, name in enumerate(("contact_x", "contact_y", "contact_z")):
-        coordinates[name] = ("contact", np.array(facts.position[:, column]))
-    coordinates["contact_area"] = ("contact", np.array(facts.area))
-    coordinates["contact_surface"] = ("contact", _labels(facts.surface))
-    return coordinates
+        found[name] = ("contact", np.array(facts.position[:, column]))
+    found["contact_area"] = ("contact", np.array(facts.area))
+    found["contact_surface"] = ("contact", _labels(facts.surface))
+    return found
 
 
 def _labels(values: Sequence[object]) -> NDArray[np.generic]:
@@ -109,7 +211,7 @@ def _labels(values: Sequence[object]) -> NDArray[np.generic]:
     return array.astype(np.int32) if array.dtype.kind == "i" else array
 
 
-def _attributes(study: Study, facts: SceneFacts) -> dict[str, str]:
+def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes of the file. None of them depends on when, where or on how many ranks the study ran."""
     versions = {name: metadata.version(name) for name in _PACKAGES}
     own = f"{_PACKAGES[0]} {versions[_PACKAGES[0]]}"

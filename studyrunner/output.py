@@ -32,6 +32,8 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
                 raise wrong("give a file that may be written: this one is write-protected")
             if any(source.exists() and target.samefile(source) for source in inputs):
                 raise wrong("give another file: this one is read by the run")
+        if parts_folder(target).exists() and not parts_folder(target).is_dir():
+            raise wrong(f"give another name: {parts_folder(target).name}, which the run needs, is a file")
         trial = partial_path(target)
         trial.touch(exist_ok=False)
         trial.unlink()
@@ -43,3 +45,8 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
 def partial_path(path: Path) -> Path:
     """Where the file `path` is written before it is renamed: in the same folder, one name for each process."""
     return path.with_name(f".{path.name}.{os.getpid()}.partial")
+
+
+def parts_folder(path: Path) -> Path:
+    """The folder of results that are to go into the file `path`."""
+    return path.with_name(f"{path.name}.parts")

@@ -20,6 +20,7 @@ POLL_SECONDS = 1e-3
 """How long a rank sleeps between two looks for a message: a blocking receive would keep a core busy."""
 
 _SECONDS_TO_PRINT = 1.0
+_MANY_SENT = 64
 
 _SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
@@ -116,12 +117,16 @@ class MpiRanks:
         self._mpi = MPI
         self._world = MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
+        self._many = _MANY_SENT
         self.rank: int = self._world.Get_rank()
         self.size: int = self._world.Get_size()
 
     def send(self, message: object, rank: int) -> None:
         """As in Ranks."""
-        self._sent = [request for request in self._sent if not request.Test()]
+        if len(self._sent) >= self._many:
+            # Not at every message: with thousands of ranks as many may be on their way.
+            self._sent = [request for request in self._sent if not request.Test()]
+            self._many = max(_MANY_SENT, 2 * len(self._sent))
         self._sent.append(self._world.isend(message, dest=rank))
 
     def flush(self) -> None:

@@ -16,12 +16,14 @@ class StartResult:
     """Start state at one frequency of a branch; a branch gives one after the other.
 
     position: place of the frequency in the branch. start: what a march starts from. moves: whether anything slips or
-    lifts in the joint; where nothing does nothing wears.
+    lifts in the joint; where nothing does nothing wears. n_unknowns: of the state, with the harmonics that it took; 0
+    where there is no state.
     """
 
     position: int
     start: object
     moves: bool
+    n_unknowns: int
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from studyrunner.costs import Kin
 from studyrunner.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
@@ -19,6 +21,10 @@ from studyrunner.variables import ASKED, CERTIFICATE
 
 Index = tuple[int, ...]
 
+BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
+"""First keys of the kin of tasks, see LearnedCosts."""
+
+_NEIGHBOURS = 4  # frequencies whose marches take about as long
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
 
 
@@ -34,7 +40,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class BranchTask:
-    """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N).
+    """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
 
     number: of the branch in the study. cost: estimated seconds.
     """
@@ -47,9 +53,24 @@ class BranchTask:
     cost: float
 
     @property
-    def urgency(self) -> float:
-        """Before all marches: branches make them possible."""
-        return math.inf
+    def n_results(self) -> int:
+        """Start states that it gives."""
+        return len(self.frequencies)
+
+    @property
+    def opens_others(self) -> bool:
+        """Marches."""
+        return True
+
+    @property
+    def kind(self) -> str:
+        """First key of its kin."""
+        return BRANCHES
+
+    @property
+    def kin(self) -> Kin:
+        """What its states cost, in general and on this branch."""
+        return ((self.kind, (self.kind, self.number)),)
 
 
 @dataclass(frozen=True)
@@ -59,11 +80,13 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
     cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
-    variables: what is handed back. cost: estimated seconds, as if it wears until the start state says that nothing
-        moves.
+    variables: what is handed back. cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult.
+        Until it is there, n_unknowns are those planned for and something moves.
     start: start state, None until its branch has reached it.
+    number: of the march in the study.
     """
 
+    number: int
     branch: int
     position: int
     settings: Settings
@@ -76,12 +99,32 @@ class MarchTask:
     points: tuple[Index, ...]
     variables: tuple[str, ...]
     cost: float
+    n_unknowns: int
+    moves: bool = True
     start: object = field(default=None, compare=False)
 
     @property
-    def urgency(self) -> float:
-        """The longest go first, so that the ranks end together."""
-        return self.cost
+    def n_results(self) -> int:
+        """One history."""
+        return 1
+
+    @property
+    def opens_others(self) -> bool:
+        """Nothing."""
+        return False
+
+    @property
+    def kind(self) -> str:
+        """First key of its kin."""
+        return MARCHES if self.moves else RESTING
+
+    @property
+    def kin(self) -> Kin:
+        """Marches from states that move or rest, with as many unknowns, near this state and from it; with such wear."""
+        kind = self.kind
+        near, here = (kind, self.branch, "near", self.position // _NEIGHBOURS), (kind, self.branch, self.position)
+        wear = (kind, self.wear_coefficient, self.step, self.scheme)
+        return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
 
 @dataclass(frozen=True)
@@ -112,6 +155,12 @@ class TaskPlan:
         marches = itertools.chain.from_iterable(self.marches)
         return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
 
+    def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
+        """The marches from one start state."""
+        line = self.marches[branch]
+        first, last = (side(line, position, key=lambda march: march.position) for side in (bisect_left, bisect_right))
+        return line[first:last]
+
 
 _HELD_FOR = {
     "cycles": "slow_time.cycles = 0 asks for the unworn states, the same for every step and scheme",
@@ -131,9 +180,11 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
     branches: list[BranchTask] = []
     marches: list[tuple[MarchTask, ...]] = []
     counts = dict.fromkeys(_HELD_FOR, 0)
+    numbers = itertools.count()
     for line in _lines(study):
         settings = _settings(study, line)
-        seconds = seconds_an_iteration(_unknowns(n_displacements, settings.harmonics))
+        n_unknowns = _unknowns(n_displacements, settings.harmonics)
+        seconds = seconds_an_iteration(n_unknowns)
         branches.append(
             BranchTask(
                 number=len(branches),
@@ -148,7 +199,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
             tuple(
                 task
                 for position, place in enumerate(ascending)
-                for task in _marches(study, (len(marches), position), place, line, seconds, counts)
+                for task in _marches(study, (len(marches), position), place, line, n_unknowns, counts, numbers)
             )
         )
     return TaskPlan(
@@ -158,6 +209,11 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
         n_points=math.prod(sizes),
         n_unknowns=max(_unknowns(n_displacements, harmonics) for harmonics in study.harmonics),
     )
+
+
+def march_variables(study: Study) -> tuple[str, ...]:
+    """Variables that a march hands back: those asked for and those that the table at the end is made of."""
+    return tuple(name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
 
 
 def _lines(study: Study) -> Iterator[Index]:
@@ -178,7 +234,13 @@ def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
 
 
 def _marches(
-    study: Study, branch: tuple[int, int], frequency: int, line: Index, seconds: float, counts: dict[str, int]
+    study: Study,
+    branch: tuple[int, int],
+    frequency: int,
+    line: Index,
+    n_unknowns: int,
+    counts: dict[str, int],
+    numbers: Iterator[int],
 ) -> list[MarchTask]:
     """Tasks of all points at one frequency of one branch; adds the points that share one to `counts`, by cause."""
     axes, slow_time = study.axes, study.slow_time
@@ -197,6 +259,7 @@ def _marches(
         if key in shared and cause is not None:
             counts[cause] += 1
         shared.setdefault(key, []).append((wear, step, scheme))
+    variables = march_variables(study)
     tasks = []
     for key, members in shared.items():
         wear, step, scheme = members[0]
@@ -204,6 +267,7 @@ def _marches(
         n_steps = 1 if held else math.ceil(study.cycles_kept[-1] / axes.step[step])
         tasks.append(
             MarchTask(
+                number=next(numbers),
                 branch=branch[0],
                 position=branch[1],
                 settings=_settings(study, line),
@@ -214,8 +278,9 @@ def _marches(
                 held=held,
                 cycles=study.cycles_kept,
                 points=tuple(_point(study, frequency, line, member) for member in members),
-                variables=tuple(name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE),
-                cost=seconds * ITERATIONS_A_STEP * n_steps,
+                variables=variables,
+                cost=seconds_an_iteration(n_unknowns) * ITERATIONS_A_STEP * n_steps,
+                n_unknowns=n_unknowns,
             )
         )
     return tasks

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from studyrunner.parts import Parts, record_type
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
+from studyrunner.study import Study
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.variables import ASKED
 
@@ -41,7 +44,7 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
     places = list(enumerate(task.frequencies))
     for position, frequency in places if task.sweep == "up" else reversed(places):
         start = (frequency, task.excitation_amplitude, task.sweep == "up", *settings)
-        yield StartResult(position, start, moves=position % 2 == 0)
+        yield StartResult(position, start, moves=position % 2 == 0, n_unknowns=18)
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0) -> MarchResult:
@@ -82,12 +85,22 @@ def without_values(result: MarchResult, outcome: int) -> MarchResult:
     return replace(result, outcome=outcome, values=values)
 
 
+def fake_parts(study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path) -> Parts:
+    """The files of a run that had these results, some in a file."""
+    marches = {task.points: task for line in plan.marches for task in line}
+    parts = Parts(folder, record_type(study, FACTS))
+    for place, result in enumerate(results):
+        parts.add(marches[result.points], result)
+        if place % 3 == 0:
+            parts.flush()
+    parts.flush()
+    return parts
+
+
 def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:
     """All marches of a branch with their start states."""
     return [
         march
         for started in fake_branch(plan.branches[branch])
-        for march in start_marches(
-            [task for task in plan.marches[branch] if task.position == started.position], started
-        )
+        for march in start_marches(plan.marches_from(branch, started.position), started)
     ]

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studyrunner.certificates import summarise_certificates
+from studyrunner.certificates import CertificateTable
+from studyrunner.parts import pack, record_type
 from studyrunner.results import MarchResult
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
@@ -43,6 +44,17 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
             stable = np.ones(len(study.cycles_kept), dtype=np.int8)
             results.append(replace(result, values={**result.values, **drawn, "stable": stable}))
     return study, results
+
+
+def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
+    """The table of results that come in some at a time."""
+    plan = build_tasks(study, FACTS.n_displacements)
+    marches = {task.points: task for line in plan.marches for task in line}
+    table = CertificateTable(study)
+    for some in (results[:1], results[1:6], results[6:]):
+        records = pack(record_type(study, FACTS), [(marches[result.points], result) for result in some])
+        table.add([result.points for result in some], records)
+    return table.format()
 
 
 def table_of(study: Study, results: Sequence[MarchResult]) -> dict[str, str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +15,13 @@ import xarray as xr
 
 from studyrunner import gather
 from studyrunner.evaluate import endings
-from studyrunner.gather import build_dataset, write_dataset
+from studyrunner.gather import Gathered
+from studyrunner.output import parts_folder
 from studyrunner.results import MarchResult
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
+from tests.studyrunner.dataset_twin import build_dataset, write_dataset
+from tests.studyrunner.fakes import FACTS, fake_march, fake_parts, fake_starts, without_values
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -25,23 +30,29 @@ OVERRIDES = (
     "slow_time.outputs=[0, 100, 1000]",
 )
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep", "harmonics")
+WEAR_RATE = "outputs.variables=['wear_rate', 'outcome']"
 SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 
 def fake_results(*overrides: str) -> list[MarchResult]:
-    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
-    plan = build_tasks(study, FACTS.n_displacements)
+    plan = build_tasks(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
     return [fake_march(task) for branch in plan.branches for task in fake_starts(plan, branch.number)]
 
 
-@pytest.fixture
-def dataset() -> xr.Dataset:
-    return build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, fake_results())
+def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gathered:
+    """The file of a run of the study with these results."""
+    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
+    plan = build_tasks(study, FACTS.n_displacements)
+    parts = fake_parts(study, plan, results, parts_folder(path))
+    try:
+        return gather.gather(study, FACTS, plan, parts, path)
+    finally:
+        parts.remove()
 
 
 @pytest.fixture
-def opened(dataset: xr.Dataset, tmp_path: Path) -> xr.Dataset:
-    write_dataset(dataset, tmp_path / "out.nc")
+def opened(tmp_path: Path) -> xr.Dataset:
+    write(fake_results(), tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as result:
         return result.load()
 
@@ -140,7 +151,7 @@ def test_scalars_are_those_of_the_task(tmp_path: Path) -> None:
     results = fake_results()
     special = {"branch": 3, "fold_frequency": 155.5, "step_limit": 12.0, "oscillates": True}
     results[1] = replace(results[1], **special)
-    write_dataset(build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, results), tmp_path / "out.nc")
+    write(results, tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         for name, value in special.items():
             (point,) = results[1].points
@@ -153,7 +164,7 @@ def test_scalars_are_those_of_the_task(tmp_path: Path) -> None:
 def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
     results = fake_results()
     results[0] = without_values(results[0], 6)
-    write_dataset(build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, results), tmp_path / "out.nc")
+    write(results, tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = results[0].points
         assert opened.outcome.values[point] == 6
@@ -173,10 +184,9 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("harmonics", ["axes.harmonics=auto", "axes.harmonics=[3, 'auto']"])
 def test_automatic_harmonics_on_an_axis_are_labels(harmonics: str, tmp_path: Path) -> None:
-    study = read_study("sdof_slider", (*OVERRIDES, harmonics, "axes.samples=[64, 128]"))
-    plan = build_tasks(study, FACTS.n_displacements)
-    results = [fake_march(task) for branch in plan.branches for task in fake_starts(plan, branch.number)]
-    write_dataset(build_dataset(study, FACTS, results), tmp_path / "out.nc")
+    overrides = (harmonics, "axes.samples=[64, 128]")
+    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
+    write(fake_results(*overrides), tmp_path / "out.nc", *overrides)
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         assert opened.harmonics.values.tolist() == [str(value) for value in study.harmonics]
         assert opened.samples.dtype == np.int32
@@ -195,30 +205,75 @@ def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
     assert read_study(str(tmp_path / "again.toml")).model_dump() == read_study("sdof_slider", OVERRIDES).model_dump()
 
 
-def test_only_the_variables_asked_for() -> None:
-    override = "outputs.variables=['wear_rate', 'outcome']"
-    study = read_study("sdof_slider", (*OVERRIDES, override))
-    dataset = build_dataset(study, FACTS, fake_results(override))
-    assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
+def test_only_the_variables_asked_for(tmp_path: Path) -> None:
+    write(fake_results(WEAR_RATE), tmp_path / "out.nc", WEAR_RATE)
+    with xr.open_dataset(tmp_path / "out.nc") as dataset:
+        assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
 
 
-def test_a_point_that_is_missing_is_a_bug() -> None:
-    with pytest.raises(ValueError, match="1 points were not computed"):
-        build_dataset(read_study("sdof_slider", OVERRIDES), FACTS, fake_results()[1:])
-
-
-def test_a_failed_write_leaves_the_old_file(
-    dataset: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("overrides", [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",)])
+@pytest.mark.parametrize("bytes_a_slab", [1.0, 3000.0, 1e9], ids=["a point", "some points", "all"])
+def test_the_file_is_the_one_of_the_plain_twin(
+    overrides: tuple[str, ...], bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
+    monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
+    results = fake_results(*overrides)
+    results[1] = without_values(results[1], 6)
+    shuffled = [results[place] for place in np.random.default_rng(3).permutation(len(results))]
+    gathered = write(shuffled, tmp_path / "out.nc", *overrides)
+    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
+    write_dataset(build_dataset(study, FACTS, results, gathered.certificates), tmp_path / "twin.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:
+        xr.testing.assert_identical(opened, twin)
+        assert list(opened.variables) == list(twin.variables)
+        own = ("source", "chunksizes", "preferred_chunks", "contiguous") if bytes_a_slab < 1e9 else ("source",)
+        for name in twin.variables:
+            expected, found = ({k: v for k, v in at[name].encoding.items() if k not in own} for at in (twin, opened))
+            np.testing.assert_equal(found, expected)
+        assert opened.encoding["unlimited_dims"] == twin.encoding["unlimited_dims"]
+
+
+@pytest.mark.parametrize("shape", [(7,), (3, 1, 5, 2), (1, 1, 4)])
+@pytest.mark.parametrize("n_points", [1, 2, 6, 11, 1000])
+def test_slabs_are_all_points_in_the_order_of_the_file(shape: tuple[int, ...], n_points: int) -> None:
+    slab = gather._slab_shape(shape, int(gather._BYTES_A_SLAB // n_points))
+    assert np.prod(slab) <= n_points
+    points = np.arange(np.prod(shape)).reshape(shape)
+    found = [(points[region].ravel().tolist(), first, last) for region, first, last in gather._slabs(shape, slab)]
+    assert all(inside == list(range(first, last)) for inside, first, last in found)
+    assert list(itertools.chain.from_iterable(inside for inside, *_ in found)) == points.ravel().tolist()
+
+
+def test_outcomes_are_counted(tmp_path: Path) -> None:
+    results = fake_results()
+    results[0] = without_values(results[0], 6)
+    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1}
+
+
+@pytest.mark.parametrize("change", [lambda results: results[1:], lambda results: [*results, results[0]]])
+def test_a_point_that_is_missing_or_twice_there_is_a_bug(
+    change: Callable[[list[MarchResult]], list[MarchResult]], tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match="1 points were not computed exactly once"):
+        write(change(fake_results()), tmp_path / "out.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "out.nc"
     path.write_text("an earlier result", encoding="utf-8")
 
-    def fail(*_: object) -> None:
-        raise OSError("disk full")
+    replace_file = os.replace
+
+    def fail(source: Path, target: Path) -> None:
+        if target == path:
+            raise OSError("disk full")
+        replace_file(source, target)
 
     monkeypatch.setattr(gather.os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        write_dataset(dataset, path)
+        write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -228,8 +283,8 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    results = [fake_march(task) for task in fake_starts(plan, 0)]
-    write_dataset(build_dataset(study, FACTS, results), tmp_path / "dovetail.nc")
+    parts = fake_parts(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
+    gather.gather(study, FACTS, plan, parts, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import pytest
 
+from studyrunner.costs import LearnedCosts
 from studyrunner.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
 from studyrunner.schedule import serve_tasks
 
@@ -16,24 +18,38 @@ from studyrunner.schedule import serve_tasks
 @dataclass(frozen=True)
 class Job:
     name: str
-    urgency: float
+    cost: float
+    n_results: int = 1
+    opens_others: bool = False
+
+    @property
+    def kin(self) -> tuple[tuple[str, ...], ...]:
+        return (("job", self.name),)
 
 
 def take_nothing(job: Job, result: object) -> list[Job]:
     return []
 
 
-def test_urgent_tasks_go_first_and_results_make_new_ones() -> None:
-    done: list[tuple[str, str]] = []
+def serve(
+    tasks: list[Job], run: Callable[[Job], Iterable[object]], take: Callable[[Job, object], list[Job]] = take_nothing
+) -> LearnedCosts:
+    costs = LearnedCosts()
+    serve_tasks(Alone(), tasks, run, take, costs)
+    return costs
+
+
+def test_long_tasks_go_first_and_results_make_new_ones() -> None:
+    done: list[tuple[str, object]] = []
 
     def run(job: Job) -> Iterator[str]:
         yield job.name.upper()
 
-    def take(job: Job, result: str) -> list[Job]:
+    def take(job: Job, result: object) -> list[Job]:
         done.append((job.name, result))
-        return [Job("a1", 2.0), Job("a2", 5.0)] if job.name == "a" else []
+        return [Job("a1", 1e5), Job("a2", 1e6)] if job.name == "a" else []
 
-    serve_tasks(Alone(), [Job("b", 1.0), Job("a", 3.0)], run, take)
+    serve([Job("b", 10.0), Job("a", 1.0, opens_others=True)], run, take)
     assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
 
 
@@ -45,22 +61,33 @@ def test_results_arrive_while_their_task_goes_on() -> None:
         assert taken.wait(10.0)
         yield 2
 
-    def take(job: Job, result: int) -> list[Job]:
+    def take(job: Job, result: object) -> list[Job]:
         taken.set()
         results.append(result)
         return []
 
-    results: list[int] = []
-    serve_tasks(Alone(), [Job("a", 1.0)], run, take)
+    results: list[object] = []
+    serve([Job("a", 1.0, n_results=2)], run, take)
     assert results == [1, 2]
 
 
-def test_a_task_may_have_no_result() -> None:
-    serve_tasks(Alone(), [Job("a", 1.0)], lambda _: [], take_nothing)
+@pytest.mark.parametrize(("given", "said"), [(0, 1), (1, 2), (2, 1)])
+def test_another_number_of_results_than_said_is_a_bug(given: int, said: int) -> None:
+    with pytest.raises(ValueError, match=f"not {said} results"):
+        serve([Job("a", 1.0, n_results=said)], lambda _: range(given))
 
 
 def test_no_tasks() -> None:
-    serve_tasks(Alone(), [], lambda job: [job], take_nothing)
+    serve([], lambda job: [job])
+
+
+def test_what_tasks_take_is_learnt() -> None:
+    def run(job: Job) -> Iterator[object]:
+        for seconds in (0.05, 0.15):
+            time.sleep(seconds)
+            yield None
+
+    assert 0.2 <= serve([Job("a", 1.0, n_results=2)], run).measured("job") < 0.6
 
 
 def test_an_exception_in_a_task_is_raised() -> None:
@@ -69,7 +96,7 @@ def test_an_exception_in_a_task_is_raised() -> None:
         raise ZeroDivisionError(job.name)
 
     with pytest.raises(ZeroDivisionError, match="a"):
-        serve_tasks(Alone(), [Job("a", 1.0)], fail, take_nothing)
+        serve([Job("a", 1.0, n_results=2)], fail)
 
 
 @pytest.mark.parametrize(

@@ -104,13 +104,33 @@ def test_largest_depth_makes_the_step_axis_idle_for_the_explicit_scheme() -> Non
 
 def test_marches_cost_little_and_go_last_where_nothing_moves() -> None:
     _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit")
-    planned = plan.marches[0][:2]
-    short, long = sorted(start_marches(planned, StartResult(0, "state", moves=True)), key=lambda task: task.urgency)
-    resting = start_marches(planned, StartResult(0, "state", moves=False))
+    planned = plan.marches_from(0, 0)
+    moving = start_marches(planned, StartResult(0, "state", moves=True, n_unknowns=planned[0].n_unknowns))
+    short, long = sorted(moving, key=lambda task: task.cost)
+    resting = start_marches(planned, StartResult(0, "state", moves=False, n_unknowns=planned[0].n_unknowns))
     assert (long.start, long.step, short.step) == ("state", 100.0, 1000.0)
-    assert all(0.0 < task.urgency < short.urgency for task in resting)
-    assert long.urgency < plan.branches[0].urgency
+    assert all(0.0 < task.cost < short.cost for task in resting)
     assert [task.cost for task in planned] == [long.cost, short.cost]
+    assert {task.kin[0] for task in moving} != {task.kin[0] for task in resting}
+
+
+def test_a_march_costs_what_the_harmonics_of_its_start_state_say() -> None:
+    _, plan = plan_of("axes.frequency=[1, 2]", "solver.harmonics=auto")
+    planned = plan.marches_from(0, 1)
+    n_planned = planned[0].n_unknowns
+    more, same = (start_marches(planned, StartResult(1, "state", True, n)) for n in (3 * n_planned, 0))
+    assert all(many.cost > task.cost for many, task in zip(more, planned, strict=True))
+    assert [task.cost for task in same] == [task.cost for task in planned]
+
+
+def test_marches_are_found_by_their_start_state() -> None:
+    _, plan = plan_of("axes.frequency=[3, 1, 2]", "axes.wear_coefficient=[0, 1e-11]", "axes.sweep=['up', 'down']")
+    numbers = [task.number for line in plan.marches for task in line]
+    assert numbers == list(range(len(numbers)))
+    for branch in plan.branches:
+        found = [plan.marches_from(branch.number, position) for position in range(branch.n_results)]
+        assert all(task.position == position for position, tasks in enumerate(found) for task in tasks)
+        assert tuple(itertools.chain.from_iterable(found)) == plan.marches[branch.number]
 
 
 def test_automatic_settings_are_those_of_the_task_and_estimated_for_the_plan() -> None:

@@ -1,0 +1,210 @@
+"""Decides which rank gets which task; knows no messages and nothing of what a task is, and is given its clock.
+
+A server on real ranks and a simulation with thousands of them use the same decisions. No message makes it look at all
+ranks.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from studyrunner.costs import Kin, LearnedCosts, Lesson
+
+AHEAD_SECONDS = 0.2
+"""A rank holds a second task behind one that takes less: behind a longer one it would wait for no gain."""
+
+WATCH_SECONDS = 1.0
+"""Between two looks at the tasks that run, at least."""
+
+_WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
+_AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
+_WAITING = 1000
+_WAITING_A_RANK = 16
+_FEW_LESSONS = 16
+_LESSONS_SHARE = 8
+
+
+class Work(Protocol):
+    """What has to be known of a task."""
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds, positive."""
+
+    @property
+    def kin(self) -> Kin:
+        """Which tasks it is like, see LearnedCosts."""
+
+    @property
+    def n_results(self) -> int:
+        """Results that it gives, one after the other, at least 1."""
+
+    @property
+    def opens_others(self) -> bool:
+        """Whether its results make other tasks possible."""
+
+
+Task = TypeVar("Task", bound=Work)
+
+
+@dataclass(frozen=True)
+class Assignment(Generic[Task]):
+    """A task on its way to a rank."""
+
+    number: int
+    task: Task
+
+
+@dataclass
+class _Held(Generic[Task]):
+    """A task that a rank has. began: when its rank took it up, None as long as it waits there.
+
+    n_left: results that it has still to give. lesson: what its being overdue has taught.
+    """
+
+    task: Task
+    n_left: int
+    began: float | None
+    lesson: Lesson | None = None
+
+
+class WaitingTasks(Generic[Task]):
+    """Tasks that wait; the one that is expected to take longest comes first, of equal ones the earliest."""
+
+    def __init__(self, costs: LearnedCosts) -> None:
+        self._costs = costs
+        self._tasks: dict[int, Task] = {}
+        self._order: list[tuple[float, int]] = []
+
+    def __len__(self) -> int:
+        return len(self._tasks)
+
+    def add(self, number: int, task: Task) -> None:
+        """One more."""
+        self._tasks[number] = task
+        heapq.heappush(self._order, (-self._expected(task), number))
+
+    def pop(self) -> tuple[int, Task]:
+        """The next one and its number. Raises IndexError where none waits."""
+        _, number = heapq.heappop(self._order)
+        return number, self._tasks.pop(number)
+
+    def reorder(self) -> None:
+        """Puts all of them in the order of what is expected now."""
+        self._order = [(-self._expected(task), number) for number, task in self._tasks.items()]
+        heapq.heapify(self._order)
+
+    def _expected(self, task: Task) -> float:
+        return task.cost * self._costs.correction(task.kin)
+
+
+class Dispatcher(Generic[Task]):
+    """Who computes what.
+
+    Tasks that make others possible go first, unless so many wait already that all ranks have enough for long: what
+    waits, and what it holds, is then bounded. Of the others the longest go first, so that the ranks end together.
+    """
+
+    def __init__(self, n_ranks: int, costs: LearnedCosts, clock: Callable[[], float]) -> None:
+        self._n_ranks = n_ranks
+        self._costs = costs
+        self._clock = clock
+        self._n_known = 0
+        self._n_lessons = 0
+        self._began = clock()
+        self._next_watch = self._began + WATCH_SECONDS
+        self._openers: WaitingTasks[Task] = WaitingTasks(costs)
+        self._others: WaitingTasks[Task] = WaitingTasks(costs)
+        self._held: dict[int, _Held[Task]] = {}
+        self._held_by: list[list[int]] = [[] for _ in range(n_ranks)]
+        # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
+        self._free = dict.fromkeys(reversed(range(n_ranks)))
+        self._ahead: dict[int, None] = {}
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing waits and nothing is computed."""
+        return not self._held and self._n_waiting == 0
+
+    def add(self, tasks: Iterable[Task]) -> None:
+        """Tasks that have become possible."""
+        for task in tasks:
+            (self._openers if task.opens_others else self._others).add(self._n_known, task)
+            self._n_known += 1
+
+    def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
+        """The ranks that get a task now, and the tasks."""
+        if self._n_lessons >= max(_FEW_LESSONS, len(self._others) // _LESSONS_SHARE):
+            self._n_lessons = 0
+            self._others.reorder()
+        while self._free and self._n_waiting:
+            rank, _ = self._free.popitem()
+            assignment = self._hand_out(rank)
+            self._see_ahead(rank)
+            yield rank, assignment
+        while self._ahead and self._n_waiting > self._n_ranks:
+            rank, _ = self._ahead.popitem()
+            yield rank, self._hand_out(rank)
+
+    def deliver(self, rank: int, number: int, seconds: float) -> Task:
+        """The task of which a rank has sent a result that took it so long."""
+        held = self._held[number]
+        task = held.task
+        if held.lesson is not None:
+            self._costs.forget(held.lesson)
+            held.lesson = None
+        self._costs.learn(task.kin, task.cost / task.n_results, seconds)
+        self._n_lessons += 1
+        held.n_left -= 1
+        held.began = self._clock()
+        if held.n_left == 0:
+            del self._held[number]
+            self._held_by[rank].remove(number)
+            self._ahead.pop(rank, None)
+            if self._held_by[rank]:
+                self._held[self._held_by[rank][0]].began = self._clock()
+                self._see_ahead(rank)
+            else:
+                self._free[rank] = None
+        return task
+
+    def watch(self) -> None:
+        """Called many times a second: now and then learns from tasks that take longer than expected.
+
+        A march that takes a hundred times as long as most teaches this long before it ends, in time for those like it.
+        """
+        now = self._clock()
+        if now < self._next_watch or not self._n_waiting:
+            return
+        self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
+        for held in self._held.values():
+            task = held.task
+            if held.began is None or task.opens_others:
+                continue
+            at_least = _AS_LONG_AGAIN * (now - held.began)
+            if at_least > task.cost * self._costs.correction(task.kin):
+                if held.lesson is not None:
+                    self._costs.forget(held.lesson)
+                held.lesson = self._costs.learn(task.kin, task.cost, at_least)
+        self._n_lessons = 0
+        self._others.reorder()
+
+    @property
+    def _n_waiting(self) -> int:
+        return len(self._openers) + len(self._others)
+
+    def _hand_out(self, rank: int) -> Assignment[Task]:
+        enough = len(self._others) >= _WAITING + _WAITING_A_RANK * self._n_ranks
+        number, task = (self._openers if self._openers and not enough else self._others).pop()
+        self._held[number] = _Held(task, task.n_results, None if self._held_by[rank] else self._clock())
+        self._held_by[rank].append(number)
+        return Assignment(number, task)
+
+    def _see_ahead(self, rank: int) -> None:
+        """Whether a rank that holds one task may get a second one."""
+        task = self._held[self._held_by[rank][0]].task
+        if task.n_results == 1 and task.cost * self._costs.correction(task.kin) < AHEAD_SECONDS:
+            self._ahead[rank] = None

@@ -1,0 +1,168 @@
+"""How busy up to 4096 ranks are: recorded costs of tasks, replayed through the real scheduling code.
+
+    python -m tests.benchmarks.scheduling [SHAPE ...]
+
+The costs are those of the bundled dovetail sector in `dovetail_costs.csv`, see `record_costs`. Every line of a study
+gets the recorded one, shifted along the frequency and scaled by a factor, and every task a factor of its own; all are
+drawn once and do not depend on the number of ranks. `possible` is the efficiency that no order of the tasks exceeds:
+the longest way along a branch and through a march from it bounds the time of a run.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studyrunner.results import StartResult
+from studyrunner.study_file import read_study
+from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
+from tests.benchmarks.simulation import Overheads, Replay, lognormal, replay
+
+N_DISPLACEMENTS = 144
+RANKS = (2, 16, 64, 256, 1024, 4096)
+SHIFT = 0.2  # Hz, at most, from line to line
+SPREAD_LINE, SPREAD_TASK = 0.3, 0.2
+RECORDED_STEPS = 100
+LEAST_WEAR = 3e-12  # recorded: this and ten times as much
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Sizes of the axes of a study of 10 000 points and the steps of a march."""
+
+    n_frequencies: int
+    n_amplitudes: int
+    n_sweeps: int
+    n_wear: int
+    n_steps: int
+    first: float = 209.5
+    last: float = 213.5
+    most_wear: float = 3e-11
+    n_step_sizes: int = 1
+
+    @property
+    def label(self) -> str:
+        """One line for the table."""
+        n_marches = self.n_wear * self.n_step_sizes
+        lines = f"{self.n_amplitudes * self.n_sweeps} lines x {self.n_frequencies} frequencies x {n_marches}"
+        fewest = f"{self.n_steps // self.n_step_sizes} to " if self.n_step_sizes > 1 else ""
+        return f"{lines}, {fewest}{self.n_steps} steps, {self.first:g} to {self.last:g} Hz"
+
+    def build_plan(self) -> TaskPlan:
+        """The tasks of such a study of the bundled dovetail sector."""
+        sweeps = ["up", "down"][: self.n_sweeps]
+        study = read_study(
+            "dovetail",
+            (
+                f"axes.frequency={{start = {self.first}, stop = {self.last}, num = {self.n_frequencies}}}",
+                f"axes.excitation_amplitude={np.linspace(0.3, 0.7, self.n_amplitudes).tolist()}",
+                f"axes.sweep={sweeps}",
+                f"axes.wear_coefficient={np.linspace(LEAST_WEAR, self.most_wear, self.n_wear).tolist()}",
+                "axes.scheme=implicit",
+                f"slow_time.cycles={1000 * self.n_steps}",
+                f"axes.step={[1000.0 * size for size in range(1, self.n_step_sizes + 1)]}",
+            ),
+        )
+        return build_tasks(study, N_DISPLACEMENTS)
+
+
+SHAPES = {
+    "usual": Shape(100, 5, 2, 10, 500),
+    "short": Shape(100, 5, 2, 10, 100),
+    "focus": Shape(100, 5, 2, 10, 500, 210.9, 212.5),
+    "band": Shape(100, 5, 2, 10, 500, 211.8, 211.9, 6e-12),
+    "steps": Shape(25, 20, 2, 1, 2000, 211.8, 211.9, 6e-12, 10),
+    "many_lines": Shape(25, 20, 2, 10, 500, 210.9, 212.5),
+    "few_lines": Shape(200, 1, 2, 25, 500, 210.9, 212.5),
+    "one_line": Shape(1000, 1, 1, 10, 500, 210.9, 212.5),
+}
+"""usual: the range of the bundled study, most of which rests. focus: where the joint slips. band: a resonance only,
+little wear, no march ten times as long as others. steps: as band, uneven by the step axis, which the plan knows."""
+
+
+class RecordedCosts:
+    """Costs of the tasks of a study with the shape of the recorded ones."""
+
+    def __init__(self, plan: TaskPlan, n_steps: int) -> None:
+        with Path(__file__).with_name("dovetail_costs.csv").open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        starts = [row for row in rows if float(row["wear_coefficient"]) == 0.0]
+        self._lead_in = float(starts[0]["seconds"])
+        # The first one has the lead-in; without, it costs what the second does.
+        self._starts = [float(row["seconds"]) for row in (starts[1], *starts[1:])]
+        self._unknowns = [int(row["n_unknowns"]) for row in starts]
+        self._moves = [row["moves"] == "1" for row in starts]
+        places = {row["frequency"]: place for place, row in enumerate(starts)}
+        marches: dict[int, list[float]] = {}
+        for row in rows:
+            if float(row["wear_coefficient"]) > 0.0:
+                marches.setdefault(places[row["frequency"]], []).append(float(row["seconds"]))
+        self._marches = marches
+        self._n_steps = n_steps
+        self._rng = np.random.default_rng(0)
+        self._shifts = self._rng.uniform(-SHIFT, SHIFT, len(plan.branches))
+        self._factors = [lognormal(self._rng, SPREAD_LINE) for _ in plan.branches]
+        self._start_factors = np.exp(SPREAD_TASK * self._rng.standard_normal((len(plan.branches), 10_000)))
+        n_marches = sum(len(line) for line in plan.marches)
+        self._march_factors = np.exp(SPREAD_TASK * self._rng.standard_normal(n_marches))
+        self._frequencies = plan.branches[0].frequencies
+        self._recorded = [float(row["frequency"]) for row in starts]
+
+    def start(self, branch: BranchTask, position: int) -> tuple[StartResult, float]:
+        """A start state and its cost, s."""
+        place = self._place(branch.number, branch.frequencies[position])
+        seconds = self._starts[place]
+        if position == (0 if branch.sweep == "up" else branch.n_results - 1):
+            seconds += self._lead_in
+        seconds *= self._factors[branch.number] * self._start_factors[branch.number, position]
+        return StartResult(position, None, self._moves[place], self._unknowns[place]), seconds
+
+    def march(self, task: MarchTask) -> float:
+        """Cost of a march, s."""
+        place = self._place(task.branch, self._frequencies[task.position])
+        recorded = min(self._marches, key=lambda other: (self._moves[other] != self._moves[place], abs(other - place)))
+        # Between the two wear coefficients that were recorded, and beyond, as a power of it.
+        least, most = self._marches[recorded]
+        seconds = least * (most / least) ** np.log10(task.wear_coefficient / LEAST_WEAR)
+        if self._moves[place]:
+            seconds *= self._n_steps * (1000.0 / task.step) / RECORDED_STEPS
+        return float(seconds) * self._factors[task.branch] * float(self._march_factors[task.number])
+
+    def _place(self, branch: int, frequency: float) -> int:
+        """Recorded frequency that stands for one of a line."""
+        recorded = self._recorded
+        share = (frequency + self._shifts[branch] - recorded[0]) / (recorded[-1] - recorded[0])
+        return int(np.clip(round(share * (len(recorded) - 1)), 0, len(recorded) - 1))
+
+
+def replay_shape(shape: Shape, n_ranks: int, overheads: Overheads) -> Replay:
+    """A study of this shape on so many ranks."""
+    plan = shape.build_plan()
+    costs = RecordedCosts(plan, shape.n_steps)
+    return replay(plan, costs.start, costs.march, n_ranks, overheads)
+
+
+def main() -> None:
+    """Prints a table for each shape."""
+    overheads = Overheads()
+    print(f"master: {1e3 * overheads.result:g} ms a result, {1e3 * overheads.assignment:g} ms an assignment")
+    for name in sys.argv[1:] or SHAPES:
+        shape = SHAPES[name]
+        print(f"\n{name}: {shape.label}")
+        print(f"{'ranks':>6s} {'time':>9s} {'efficiency':>10s} {'possible':>9s} {'replayed in':>12s}")
+        for n_ranks in RANKS:
+            began = time.perf_counter()
+            found = replay_shape(shape, n_ranks, overheads)
+            spent = time.perf_counter() - began
+            print(
+                f"{n_ranks:6d} {found.makespan:7.0f} s {found.efficiency:10.3f} {found.possible:9.3f} {spent:10.1f} s"
+            )
+
+
+if __name__ == "__main__":
+    main()

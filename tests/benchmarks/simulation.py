@@ -1,0 +1,141 @@
+"""Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
+
+Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
+result makes possible is decided by `studyrunner.dispatch`, `studyrunner.costs` and `studyrunner.run.Course`.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from studyrunner.dispatch import Assignment, Dispatcher
+from studyrunner.results import MarchResult, StartResult
+from studyrunner.run import Course
+from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
+
+Task = BranchTask | MarchTask
+
+
+@dataclass(frozen=True)
+class Overheads:
+    """What is not computing, s: the master's time for a result and for an assignment, one after the other, and the time
+    until the other side looks at a message."""
+
+    result: float = 3e-4
+    assignment: float = 1e-4
+    latency: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Replay:
+    """How a replay went. work: sum of all costs, s. longest_way: s, of a start state along its branch and a march from
+    it, which no number of ranks shortens. n_unfinished: 0 unless there is a bug."""
+
+    n_ranks: int
+    work: float
+    makespan: float
+    longest_way: float
+    n_unfinished: int
+
+    @property
+    def efficiency(self) -> float:
+        """Work over the time that all ranks had."""
+        return self.work / (self.n_ranks * self.makespan)
+
+    @property
+    def possible(self) -> float:
+        """Efficiency that no order of the tasks exceeds."""
+        return min(1.0, self.work / (self.n_ranks * self.longest_way))
+
+
+def replay(
+    plan: TaskPlan,
+    started: Callable[[BranchTask, int], tuple[StartResult, float]],
+    march_seconds: Callable[[MarchTask], float],
+    n_ranks: int,
+    overheads: Overheads,
+) -> Replay:
+    """Runs the tasks of a plan on simulated ranks. The same arguments give the same replay.
+
+    started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s.
+    """
+    clock = 0.0
+    course = Course(plan, lambda *_: None)
+    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, course.costs, lambda: clock)
+    ticket = itertools.count()
+    arrivals: list[tuple[float, int, int, int, float, StartResult | MarchResult]] = []
+    queues: list[list[tuple[float, Assignment[Task]]]] = [[] for _ in range(n_ranks)]
+    free_at = [0.0] * n_ranks
+    computing = [False] * n_ranks
+    work = longest_way = last_end = 0.0
+
+    def begin(rank: int) -> None:
+        """The rank takes the next task that it has been sent; what it will send is known at once."""
+        nonlocal work, longest_way
+        sent, assignment = queues[rank].pop(0)
+        computing[rank] = True
+        task = assignment.task
+        now = max(sent + overheads.latency, free_at[rank])
+        results: list[tuple[StartResult | MarchResult, float]] = []
+        if isinstance(task, BranchTask):
+            order = range(task.n_results) if task.sweep == "up" else reversed(range(task.n_results))
+            way = 0.0
+            for position in order:
+                start, seconds = started(task, position)
+                way += seconds
+                ways[task.number, position] = way
+                results.append((start, seconds))
+        else:
+            seconds = march_seconds(task)
+            longest_way = max(longest_way, ways[task.branch, task.position] + seconds)
+            results.append((_history(task), seconds))
+        for result, seconds in results:
+            now += seconds
+            work += seconds
+            heapq.heappush(arrivals, (now + overheads.latency, next(ticket), rank, assignment.number, seconds, result))
+        free_at[rank] = now
+
+    ways: dict[tuple[int, int], float] = {}
+
+    def hand_out() -> None:
+        nonlocal clock
+        for rank, assignment in dispatcher.assign():
+            clock += overheads.assignment
+            queues[rank].append((clock, assignment))
+            if not computing[rank]:
+                begin(rank)
+
+    dispatcher.add(plan.branches)
+    hand_out()
+    left: dict[int, int] = {}
+    while arrivals:
+        arrived, _, rank, number, seconds, result = heapq.heappop(arrivals)
+        # The master takes one message after the other.
+        clock = max(clock, arrived) + overheads.result
+        task = dispatcher.deliver(rank, number, seconds)
+        left[number] = left.get(number, task.n_results) - 1
+        if left[number] == 0:
+            del left[number]
+            computing[rank] = False
+            if queues[rank]:
+                begin(rank)
+        dispatcher.add(course.take(task, result))
+        dispatcher.watch()
+        hand_out()
+        last_end = clock
+    return Replay(n_ranks, work, last_end, longest_way, plan.n_points - course.n_points)
+
+
+def _history(task: MarchTask) -> MarchResult:
+    nan = float("nan")
+    return MarchResult(task.points, 0, {}, nan, nan, 0, 0.0, 0, nan, float("inf"), False)
+
+
+def lognormal(rng: np.random.Generator, spread: float) -> float:
+    """A factor around 1 with this standard deviation of its logarithm."""
+    return float(np.exp(spread * rng.standard_normal()))

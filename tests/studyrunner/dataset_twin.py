@@ -1,0 +1,68 @@
+"""The plain twin of the result file: a dataset with everything in memory, written by xarray."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from studyrunner.evaluate import endings
+from studyrunner.gather import coordinates, describe_run
+from studyrunner.results import MarchResult
+from studyrunner.scene import SceneFacts
+from studyrunner.study import Study
+from studyrunner.variables import ASKED, COORDINATES, KEPT
+
+
+def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult], certificates: str) -> xr.Dataset:
+    """The result of a study: axes in the order of the study, then cycle, then contact or response."""
+    axes = study.dimensions
+    shape = tuple(len(values) for values in axes.values())
+    sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    asked = [name for name in ASKED if name in study.outputs.variables]
+    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
+    arrays = {
+        name: np.zeros(shape + tuple(sizes[dimension] for dimension in entry.dimensions), dtype=entry.dtype)
+        for name, entry in variables.items()
+    }
+    for result in results:
+        for point in result.points:
+            for name in asked:
+                arrays[name][point] = result.values[name]
+            for name in KEPT:
+                arrays[name][point] = getattr(result, name)
+    dataset = xr.Dataset(
+        {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
+        coords=coordinates(study, facts),
+        attrs={**describe_run(study, facts), "certificate_summary": certificates},
+    )
+    for name in map(str, dataset.variables):
+        entry = COORDINATES.get(name) or variables[name]
+        content = "coordinate" if name in COORDINATES else "modelResult"
+        dataset[name].attrs = {
+            "units": entry.units,
+            "long_name": entry.long_name,
+            "coverage_content_type": content,
+        }
+        if entry.flags:
+            dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
+            dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
+        if name in asked and not entry.dtype.startswith("float"):
+            dataset[name].attrs["comment"] = "0 where the point failed, see outcome"
+    flags = endings()
+    dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
+    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
+    return dataset
+
+
+def write_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """The file as xarray writes it."""
+    encoding: dict[str, dict[str, object]] = {}
+    for name in dataset.data_vars:
+        encoding[str(name)] = {"zlib": True, "complevel": 1, "shuffle": True}
+    for key, coordinate in dataset.coords.items():
+        # Every coordinate value is there: no mark for missing ones.
+        encoding[str(key)] = {"_FillValue": None} if coordinate.dtype.kind == "f" else {}
+    dataset.to_netcdf(path, engine="netcdf4", format="NETCDF4", encoding=encoding)

@@ -1,0 +1,80 @@
+"""How far a study is, and a replay of many ranks: every march is done once, and the ranks are busy."""
+
+from __future__ import annotations
+
+import pytest
+
+from studyrunner.results import StartResult
+from studyrunner.run import Course
+from studyrunner.study_file import read_study
+from studyrunner.tasks import BranchTask, TaskPlan, build_tasks
+from tests.benchmarks.scheduling import SHAPES, replay_shape
+from tests.benchmarks.simulation import Overheads, replay
+from tests.studyrunner.fakes import fake_branch, fake_march
+
+
+def plan_of() -> TaskPlan:
+    overrides = ("axes.frequency={start=1, stop=2, num=8}", "axes.step=[100, 1000]", "axes.sweep=['up', 'down']")
+    return build_tasks(read_study("sdof_slider", overrides), 2)
+
+
+def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
+    plan = plan_of()
+    course = Course(plan, lambda *_: None)
+    spent, expected = course.seconds
+    assert (spent, expected) == (0.0, pytest.approx(plan.cost))
+    marches = []
+    for branch in plan.branches:
+        for started in fake_branch(branch):
+            course.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
+            marches.extend(course.take(branch, started))
+    assert course.n_starts_left == 0
+    for task in marches:
+        course.costs.learn(task.kin, task.cost, 3.0)
+        course.take(task, fake_march(task))
+        spent, expected = course.seconds
+        assert spent <= expected
+    assert course.n_points == plan.n_points
+    n_starts = sum(branch.n_results for branch in plan.branches)
+    assert course.seconds == (pytest.approx(n_starts + 3.0 * len(marches)),) * 2
+
+
+def test_finished_marches_are_kept_with_their_results() -> None:
+    plan = plan_of()
+    kept = []
+    course = Course(plan, lambda task, result: kept.append((task.number, result.points)))
+    for branch in plan.branches:
+        for started in fake_branch(branch):
+            for task in course.take(branch, started):
+                course.take(task, fake_march(task))
+    assert sorted(kept) == [(task.number, task.points) for line in plan.marches for task in line]
+
+
+@pytest.mark.parametrize("n_ranks", [1, 3, 1000])
+def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks: int) -> None:
+    """Equal costs and no overheads: the time is that of the work, or of a branch and a march."""
+    plan = plan_of()
+
+    def started(branch: BranchTask, position: int) -> tuple[StartResult, float]:
+        return StartResult(position, None, moves=True, n_unknowns=6), 1.0
+
+    found = replay(plan, started, lambda _: 10.0, n_ranks, Overheads(0.0, 0.0, 0.0))
+    n_starts, n_marches = 16, sum(len(line) for line in plan.marches)
+    assert found.n_unfinished == 0
+    assert found.work == pytest.approx(n_starts + 10.0 * n_marches)
+    assert found.longest_way == pytest.approx(8.0 + 10.0)
+    shortest = max(found.longest_way, found.work / n_ranks)
+    assert shortest - 1e-9 <= found.makespan <= shortest + 10.0
+    if n_ranks in (1, 1000):
+        assert found.makespan == pytest.approx(shortest)
+
+
+def test_a_thousand_ranks_are_busy_with_ten_thousand_uneven_points() -> None:
+    found = replay_shape(SHAPES["steps"], 1024, Overheads())
+    assert found.n_unfinished == 0
+    assert found.efficiency >= 0.95
+
+
+def test_costs_with_a_long_tail_keep_256_ranks_busy() -> None:
+    """Some marches take a hundred times as long as most, which shows only while they run."""
+    assert replay_shape(SHAPES["usual"], 256, Overheads()).efficiency >= 0.93

@@ -1,0 +1,203 @@
+"""Which rank gets which task, and what is learnt of costs: without clock and messages."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import pytest
+
+from studyrunner import dispatch
+from studyrunner.costs import LearnedCosts
+from studyrunner.dispatch import AHEAD_SECONDS, WATCH_SECONDS, Dispatcher
+
+
+@dataclass(frozen=True)
+class Job:
+    kind: str
+    cost: float
+    n_results: int = 1
+    opens_others: bool = False
+
+    @property
+    def kin(self) -> tuple[tuple[str, ...], ...]:
+        return (("all", self.kind),)
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def make(n_ranks: int, *jobs: Job) -> tuple[Dispatcher[Job], Clock]:
+    clock = Clock()
+    dispatcher: Dispatcher[Job] = Dispatcher(n_ranks, LearnedCosts(), clock)
+    dispatcher.add(jobs)
+    return dispatcher, clock
+
+
+def handed_out(dispatcher: Dispatcher[Job]) -> list[tuple[int, int]]:
+    return [(rank, assignment.number) for rank, assignment in dispatcher.assign()]
+
+
+def test_openers_then_the_longest() -> None:
+    jobs = [Job("a", 5.0), Job("a", 7.0), Job("b", 3.0), Job("b", 9.0), Job("c", 0.5, 2, True)]
+    dispatcher, _ = make(1, *jobs)
+    order = []
+    for _ in jobs:
+        ((rank, number),) = handed_out(dispatcher)
+        order.append(number)
+        for _ in range(jobs[number].n_results):
+            dispatcher.deliver(rank, number, jobs[number].cost / jobs[number].n_results)
+    assert order == [4, 3, 1, 0, 2]
+    assert dispatcher.done
+
+
+def test_every_task_is_handed_out_once_and_no_rank_holds_more_than_two() -> None:
+    jobs = [Job(str(place % 7), 0.01 if place % 3 else 1.0) for place in range(200)]
+    dispatcher, clock = make(5, *jobs)
+    holds: dict[int, list[int]] = {rank: [] for rank in range(5)}
+    seen: list[int] = []
+    while not dispatcher.done:
+        for rank, number in handed_out(dispatcher):
+            holds[rank].append(number)
+            seen.append(number)
+        assert all(1 <= len(held) <= 2 for held in holds.values()) or len(seen) == len(jobs)
+        rank = max(holds, key=lambda rank: len(holds[rank]))
+        clock.now += 0.1
+        number = holds[rank].pop(0)
+        assert dispatcher.deliver(rank, number, jobs[number].cost) is jobs[number]
+    assert sorted(seen) == list(range(200))
+
+
+def test_nothing_waits_behind_a_long_task_or_a_row_of_results() -> None:
+    long, short, row = Job("a", 2.0 * AHEAD_SECONDS), Job("b", 0.5 * AHEAD_SECONDS), Job("c", 0.1, 5, True)
+    for job, n_held in ((long, 1), (short, 2), (row, 1)):
+        dispatcher, _ = make(1, job, *([short] * 5 if job is short else [long] * 5))
+        assert len(handed_out(dispatcher)) == n_held
+
+
+def test_near_the_end_nobody_holds_two() -> None:
+    short = Job("a", 0.5 * AHEAD_SECONDS)
+    dispatcher, _ = make(3, *[short] * 6)
+    assert len(handed_out(dispatcher)) == 3
+    dispatcher, _ = make(3, *[short] * 9)
+    assert len(handed_out(dispatcher)) == 6
+
+
+def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A branch does not go first where more waits than all ranks have use for."""
+    monkeypatch.setattr(dispatch, "_WAITING", 10)
+    monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
+    branches = [Job("branch", 1.0, 4, True)] * 50
+    dispatcher, _ = make(1, *branches)
+    most, n_done, held = 0, 0, 0
+    while not dispatcher.done:
+        ((rank, assignment),) = dispatcher.assign()
+        for _ in range(assignment.task.n_results):
+            dispatcher.deliver(rank, assignment.number, 1.0)
+            if assignment.task.opens_others:
+                dispatcher.add([Job("march", 1.0)])
+                held += 1
+        if not assignment.task.opens_others:
+            n_done, held = n_done + 1, held - 1
+        most = max(most, held)
+    assert (n_done, held) == (200, 0)
+    assert most < 10 + 4
+
+
+def test_measured_times_change_the_order() -> None:
+    # After 16 lessons: a takes a tenth of what was said, and of b that is less certain.
+    jobs = [Job("a", 2.0)] * 30 + [Job("b", 1.9)] * 30
+    dispatcher, _ = make(1, *jobs)
+    kinds = []
+    for _ in range(20):
+        ((rank, number),) = handed_out(dispatcher)
+        kinds.append(jobs[number].kind)
+        dispatcher.deliver(rank, number, 0.2 if jobs[number].kind == "a" else 10.0)
+    assert kinds[:16] == ["a"] * 16
+    assert kinds[16:] == ["b"] * 4
+
+
+def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does() -> None:
+    jobs = [Job("a", 2.0), *[Job("b", 2.0)] * 20, *[Job("a", 1.5)] * 20]
+    dispatcher, clock = make(2, *jobs)
+    first, (rank, number) = handed_out(dispatcher)
+    assert (jobs[first[1]].kind, jobs[number].kind) == ("a", "b")
+    clock.now = 99.0
+    dispatcher.deliver(rank, number, 2.0)
+    ((rank, number),) = handed_out(dispatcher)
+    assert jobs[number].kind == "b"
+    clock.now = 100.0
+    dispatcher.watch()
+    dispatcher.deliver(rank, number, 2.0)
+    ((_, number),) = handed_out(dispatcher)
+    assert jobs[number].kind == "a"
+    costs = dispatcher._costs
+    late = costs.correction((("all", "a"),))
+    dispatcher.deliver(first[0], first[1], 2.0)
+    assert costs.measured("a") == 2.0
+    assert costs.correction((("all", "a"),)) < 2.0 < late
+
+
+def test_tasks_that_run_are_looked_at_now_and_then_only() -> None:
+    dispatcher, clock = make(1, *[Job("a", 0.1)] * 5)
+    handed_out(dispatcher)
+    clock.now = 0.9 * WATCH_SECONDS
+    dispatcher.watch()
+    assert dispatcher._costs.measured("a") == 0.0
+    clock.now = 1.1 * WATCH_SECONDS
+    dispatcher.watch()
+    assert dispatcher._costs.measured("a") == pytest.approx(2.2 * WATCH_SECONDS)
+
+
+def test_a_message_costs_the_same_with_any_number_of_ranks() -> None:
+    def seconds(n_ranks: int) -> float:
+        dispatcher, _ = make(n_ranks, *[Job("a", 1.0)] * (n_ranks + 3000))
+        busy = handed_out(dispatcher)
+        times = []
+        for _ in range(2000):
+            rank, number = busy.pop(0)
+            began = time.perf_counter()
+            dispatcher.deliver(rank, number, 1.0)
+            busy.extend(handed_out(dispatcher))
+            times.append(time.perf_counter() - began)
+        return sorted(times)[len(times) // 2]
+
+    assert seconds(20_000) < 20.0 * seconds(1)
+
+
+def test_a_correction_is_the_ratio_of_sums_with_the_parent_as_one_more() -> None:
+    costs = LearnedCosts()
+    costs.learn((("all", "a"),), 1.0, 3.0)
+    costs.learn((("all", "a"),), 3.0, 5.0)
+    # mean estimate 2 s; the parent of "all" says 1: (8 + 2) / (4 + 2); that of "a" says 10 / 6.
+    of_all = 10.0 / 6.0
+    assert costs.correction((("all",),)) == pytest.approx(of_all)
+    assert costs.correction((("all", "a"),)) == pytest.approx((8.0 + 2.0 * of_all) / 6.0)
+    assert costs.correction((("all", "b"),)) == pytest.approx(of_all)
+    assert costs.correction((("other",),)) == 1.0
+
+
+def test_two_respects_multiply_and_are_told_apart() -> None:
+    costs = LearnedCosts()
+    truth = {"cheap": 1.0, "dear": 8.0, "fine": 5.0, "coarse": 1.0}
+    for _ in range(200):
+        for place in ("cheap", "dear"):
+            for scheme in ("fine", "coarse"):
+                costs.learn(((place,), (scheme,)), 1.0, truth[place] * truth[scheme])
+    for place, scheme in (("cheap", "coarse"), ("dear", "fine")):
+        found = costs.correction(((place,), (scheme,)))
+        assert found == pytest.approx(truth[place] * truth[scheme], rel=0.1)
+
+
+def test_forgetting_takes_everything_back() -> None:
+    costs = LearnedCosts()
+    kin = (("all", "a"), ("scheme",))
+    costs.learn(kin, 1.0, 3.0)
+    before = costs.correction(kin)
+    costs.forget(costs.learn(kin, 2.0, 70.0))
+    assert costs.correction(kin) == pytest.approx(before)
