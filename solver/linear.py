@@ -15,7 +15,8 @@ from solver.model import ComplexArray, FloatArray, IntArray
 from solver.slip_space import build_slip_factor, find_slip_space
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
-KRYLOV = 30  # products after which a kept factorisation has aged too much
+AGED = 12  # products after which a kept factorisation has aged too much: a new one takes as long
+KRYLOV = 30  # the same where a new one would not be exact either
 RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
 FORCING = 1e-3  # relative residual of an iterative solve
 ARNOLDI = 24  # products from which the sign of a determinant is taken where a kept factorisation serves
@@ -101,14 +102,15 @@ class JacobianSolver:
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
-            solution, found = self._iterate(self._factor, tangent, rows, right, 1)
+            products = AGED if self._factor.exact else KRYLOV
+            solution, found = self._iterate(self._factor, tangent, rows, right, products, 1)
             if found:
                 return solution
         self._factor = build_factor(tangent, pairs)
         if self._factor.exact:
             return self._solve_exactly(self._factor, tangent, rows, right)
         # as far as it gets: Newton judges by the true residual
-        return self._iterate(self._factor, tangent, rows, right, RESTARTS)[0]
+        return self._iterate(self._factor, tangent, rows, right, KRYLOV, RESTARTS)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve takes away what `NEUTRAL` has put in."""
@@ -122,7 +124,13 @@ class JacobianSolver:
         return solution if np.all(np.isfinite(solution)) else first[rows]
 
     def _iterate(
-        self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray, restarts: int
+        self,
+        factor: Factor,
+        tangent: Linearisation,
+        rows: IntArray,
+        right: FloatArray,
+        products: int,
+        restarts: int,
     ) -> tuple[FloatArray, bool]:
         """Solution (n_rows, m) by GMRES, and whether it was found."""
         full = np.zeros((tangent.joint.slots.size, right.shape[1]))
@@ -142,7 +150,7 @@ class JacobianSolver:
             LinearOperator((right.size, right.size), matvec=product, dtype=float),
             right.ravel(),
             rtol=FORCING,
-            restart=KRYLOV,
+            restart=products,
             maxiter=restarts,
         )
         return precondition(solution), not failed

@@ -48,8 +48,11 @@ class Recorder:
         self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
         self._kept["stable"] = np.ones(n_output, np.bool_)
 
-    def add(self, cycle: float, report: StateReport, wear_coefficient: float) -> None:
-        """State at the end of a step; `cycle` never falls."""
+    def add(self, cycle: float, report: StateReport, wear_coefficient: float, error: float | None = None) -> None:
+        """State at the end of a step; `cycle` never falls.
+
+        error: estimated local error of the step, as worn volume, m3; None for that of an Euler step.
+        """
         rate = wear_coefficient * float(report.slip_work.sum())
         if self._last is None:
             wanted = self.cycles == cycle
@@ -58,7 +61,8 @@ class Recorder:
             before, before_report, before_rate = self._last
             wanted = (self.cycles > before) & (self.cycles <= cycle)
             # Euler against the trapezoidal rule: the leading error of the step, whose share of the volume is reported
-            self._local_errors += 0.5 * (cycle - before) * abs(rate - before_rate)
+            euler = 0.5 * (cycle - before) * abs(rate - before_rate)
+            self._local_errors += euler if error is None else error
             # and what each wear rate is wrong by for want of harmonics and samples
             for value, of in ((before_rate, before_report), (rate, report)):
                 self._local_errors += 0.5 * (cycle - before) * value * np.nan_to_num(of.certificate.wear_rate_error)

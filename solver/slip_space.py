@@ -83,13 +83,15 @@ def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: 
 class SlipFactor:
     """Factorisation of `I + V^T (Z_r D V - S V)`, and what leads there and back.
 
-    moved, held: `D V` and `S V` of each pair of the space, (3m, r). pairs, rows: all of the joint.
+    there (n, r_most, 3m): `V^T` of each pair of the space, filled up with zeros to the largest rank. kept
+    (n, r_most): which of these rows there are. back (n, 6m, r_most): `D V` and `S V`. pairs, rows: all of the joint.
     """
 
     joint: Joint
     space: SlipSpace
-    moved: tuple[FloatArray, ...]
-    held: tuple[FloatArray, ...]
+    there: FloatArray
+    kept: BoolArray
+    back: FloatArray
     factor: tuple[FloatArray, IntArray]
     pairs: IntArray
     rows: IntArray
@@ -108,21 +110,18 @@ class SlipFactor:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate (where `exact`: the) solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
-        m = right.shape[1]
-        spread = self.joint.to_pairs(right).reshape(-1, 3 * m)
-        parts = [basis.T @ spread[pair] for pair, basis in zip(self.space.pairs, self.space.bases, strict=True)]
-        if not parts:
+        joint, pairs, m = self.joint, self.space.pairs, right.shape[1]
+        if not pairs.size:
             return right
-        slips = scipy.linalg.lu_solve(self.factor, np.concatenate(parts), check_finite=False)
-        motion, force = np.zeros_like(spread), np.zeros_like(spread)
-        place = 0
-        for pair, moved, held in zip(self.space.pairs, self.moved, self.held, strict=True):
-            own = slips[place : place + held.shape[1]]
-            motion[pair], force[pair] = moved @ own, held @ own
-            place += own.size
-        joint = self.joint
-        pushed = joint.structure.apply(joint.to_relative(motion.reshape(-1, 3, m)))
-        return right - pushed + joint.to_relative(force.reshape(-1, 3, m))
+        spread = joint.to_pairs(right).reshape(-1, 3 * m)
+        slips = np.zeros(self.kept.shape)
+        slips[self.kept] = scipy.linalg.lu_solve(
+            self.factor, np.matmul(self.there, spread[pairs][:, :, None])[self.kept, 0], check_finite=False
+        )
+        both = np.matmul(self.back, slips[:, :, None]).reshape(-1, 2, 3, m)
+        motion, force = np.zeros((2, joint.contact.n_contact, 3, m))
+        motion[pairs], force[pairs] = both[:, 0], both[:, 1]
+        return right - joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
 
 
 def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
@@ -150,8 +149,15 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
         # an exactly singular matrix: Newton's method goes on and judges by the residual
         warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
         factor = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+    most = max((basis.shape[1] for basis in space.bases), default=0)
+    there, back = np.zeros((space.pairs.size, most, 3 * m)), np.zeros((space.pairs.size, 6 * m, most))
+    kept = np.zeros((space.pairs.size, most), bool)
+    for place, (basis, motion, force) in enumerate(zip(space.bases, moved, held, strict=True)):
+        rank = basis.shape[1]
+        there[place, :rank], kept[place, :rank] = basis.T, True
+        back[place, : 3 * m, :rank], back[place, 3 * m :, :rank] = motion, force
     every = np.arange(joint.contact.n_contact), np.arange(joint.slots.size)
-    return SlipFactor(joint, space, moved, held, cast("tuple[FloatArray, IntArray]", factor), *every)
+    return SlipFactor(joint, space, there, kept, back, cast("tuple[FloatArray, IntArray]", factor), *every)
 
 
 def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> FloatArray:

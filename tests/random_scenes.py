@@ -27,9 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from solver.march import Scheme
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.structure import condense
+from solver.trajectory import Scheme
 
 SALT = 1931  # Den Hartog's year: other seeds of the tests have nothing to do with these
 COMPONENTS = {

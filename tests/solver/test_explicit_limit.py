@@ -9,9 +9,10 @@ import pytest
 
 from solver.explicit_limit import wear_oscillates
 from solver.history import WearHistory
-from solver.march import Scheme, march_wear
+from solver.march import march_wear
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.settings import SolverSettings
+from solver.trajectory import Scheme
 from tests.solver.models import branch_states, scene
 
 STIFFNESS = 1e6  # N/m, of each pair towards the block

@@ -17,10 +17,11 @@ from solver.certificate import certify
 from solver.continuation import follow_branch
 from solver.history import StartState, WearHistory
 from solver.joint import build_case
-from solver.march import Scheme, march_wear
+from solver.march import march_wear
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.trajectory import Scheme
 from tests.references import slider_amplitude
 from tests.solver.models import OMEGA, dovetail, random_model, scene
 

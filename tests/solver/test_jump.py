@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from solver.history import StartState, WearHistory
-from solver.march import Scheme, march_wear
+from solver.march import march_wear
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.trajectory import Scheme
 from tests.references import vibro_impact_orbit
 from tests.solver.models import branch_states
 

@@ -20,12 +20,13 @@ from solver.certificate import LIMITS, LOSS
 from solver.history import WearHistory
 from solver.joint import Joint, build_case
 from solver.linear import JacobianSolver
-from solver.march import Scheme, march_wear
+from solver.march import march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
 from solver.response import solve_first_state
 from solver.settings import SolverSettings
+from solver.trajectory import Scheme
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import start_state
 

@@ -1,0 +1,127 @@
+"""Error-controlled steps on the slow time scale: backward differences of second order with steps of any length (BDF2).
+
+With w = h_n / h_(n-1), the ratio of two steps, and the wear rate g = dW/dt of Eqs. (7), (21)
+
+    W_(n+1) = W_n + w^2 / (1 + 2 w) (W_n - W_(n-1)) + (1 + w) / (1 + 2 w) h_n g(W_(n+1)),
+
+which is an implicit Euler step from a depth that is already worn and with a shorter h, so that a step costs one balance
+like any other, Eq. (24). It is L-stable for equal steps and zero-stable as long as w < 1 + sqrt(2); both shares are
+positive, so that wear never falls. The local error follows from the difference to an explicit formula of the same order
+(Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, III.5; Gresho, Lee, Sani 1980):
+
+    P = W_n + (1 + w) h_n g_n - w^2 (W_n - W_(n-1)),      e = c / (c + c_P) (W_(n+1) - P),
+    c = (1 + w)^2 / (6 w (1 + 2 w)),      c_P = (1 + 1 / w) / 6.
+
+The first step, and the first one behind a corner of the wear rate (a pair begins to slip or to open) or a jump, is an
+implicit Euler step, whose error is that against the trapezoidal rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from solver.balance import Balance
+from solver.model import FloatArray
+from solver.path import PathPoint, final_history, solve_balance
+from solver.trajectory import RESOLUTION, Trajectory
+
+SHARE = 0.5  # of rtol; an error is judged by what the step has worn, or would have worn at the mean rate so far
+LONGEST_RATIO = 2.0  # of two steps
+SHORTEST_RATIO = 0.2
+SAFETY = 0.85
+CAREFUL = 0.8  # a step is not changed for less
+FIRST = 1e-3  # of all cycles: the first step, before anything is known of the error
+ITERATIONS = 10  # of a step: one that takes more is halved
+SHORTEST_FIRST = 1e-6  # of all cycles
+
+
+@dataclass
+class AdaptiveSteps:
+    """Takes a trajectory to the cycle count `end` with a relative error of the worn volume near `rtol`."""
+
+    trajectory: Trajectory
+    end: float
+    rtol: float
+    error: float = field(init=False, default=0.0)
+    _length: float = field(init=False)
+    _before: tuple[float, FloatArray] | None = field(init=False, default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        limit = self.trajectory.step_limit
+        self._length = min(FIRST * self.end, limit) if limit > 0.0 else FIRST * self.end
+
+    def advance(self) -> tuple[bool, float]:
+        """One step that is accurate enough. Whether the branch goes on, and the length of the step that was tried.
+
+        `error` is then the estimated error of the step, as worn volume, m3. Where the error does not fall with the
+        step, down to the resolution of jumps, an Euler step of that length finds out whether the branch ends there.
+        """
+        way = self.trajectory
+        while True:
+            left = self.end - way.cycle
+            # no remainder that is much shorter than the steps before it
+            length = left if left <= 1.0001 * self._length else min(self._length, 0.5 * left)
+            shortest = max(0.5 * RESOLUTION * way.cycle, SHORTEST_FIRST * self.end)
+            tried = self._attempt(length)
+            if tried is not None:
+                ratio, point, error = tried
+                if ratio <= 1.0:
+                    self._accept(point, length)
+                    self.error = error
+                    self._length = length * float(np.clip(SAFETY * ratio**-0.5, CAREFUL, LONGEST_RATIO))
+                    return True, length
+                shorter = float(np.clip(SAFETY * ratio**-0.5, SHORTEST_RATIO, CAREFUL))
+            else:
+                shorter = 0.25
+            if length <= shortest:
+                self._before = None
+                rate = way.rate()
+                arrived = way.advance(way.cycle + length)
+                self.error = 0.5 * length * float(np.abs(way.rate() - rate) @ way.joint.contact.area)
+                self._length = length
+                return arrived, length
+            self._length = max(shorter * length, 0.999 * shortest)
+            if length < 0.3 * (self._before[0] if self._before else 0.0):
+                # the error falls slower than it would if the rate were smooth: what came before tells nothing
+                self._before = None
+
+    def restart(self) -> None:
+        """What came before tells nothing of what follows: behind a jump."""
+        self._before = None
+
+    def _attempt(self, length: float) -> tuple[float, PathPoint, float] | None:
+        """Error of a step over what is allowed, its end, and its error as worn volume; None where it is not found."""
+        way = self.trajectory
+        depth, rate, area = way.point.evaluation.wear_depth, way.rate(), way.joint.contact.area
+        base, share, grown = depth, 1.0, np.zeros_like(depth)
+        if self._before is not None:
+            ratio = length / self._before[0]
+            grown = depth - self._before[1]
+            base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
+            share = (1.0 + ratio) / (1.0 + 2.0 * ratio)
+        gain = share * length * way.wear_coefficient / area
+        balance = Balance(way.joint, way.point.history, base, gain)
+        start = way.predicted(balance, length)
+        result = solve_balance(balance, start, way.solver, way.case.settings.tolerance, way.effort, ITERATIONS)
+        if not result.converged:
+            return None
+        new = result.evaluation
+        new_rate = way.wear_coefficient / area * new.slip_work
+        if self._before is None:
+            error = 0.5 * length * (new_rate - rate)
+        else:
+            explicit = depth + (1.0 + ratio) * length * rate - ratio**2 * grown
+            own, other = (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio)), (1.0 + 1.0 / ratio) / 6.0
+            error = own / (own + other) * (new.wear_depth - explicit)
+        worn, before = float(new.wear_depth @ area), float(depth @ area)
+        allowed = SHARE * self.rtol * max(worn - before, worn * length / self.end)
+        size = float(np.abs(error) @ area)
+        point = PathPoint(0.0, new, final_history(balance, new))
+        return (size / allowed if allowed > 0.0 else 0.0), point, size
+
+    def _accept(self, point: PathPoint, length: float) -> None:
+        depth = self.trajectory.point.evaluation.wear_depth
+        self._before = (length, depth)
+        self.trajectory.accept(point, length)

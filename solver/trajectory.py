@@ -1,0 +1,276 @@
+"""The state of a joint while it wears: one step on the slow time scale, and what happens where a branch ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from solver.adapt import Estimate, refine
+from solver.balance import Balance, Evaluation
+from solver.certificate import certify
+from solver.explicit_limit import explicit_step_limit, wear_oscillates
+from solver.history import StartState
+from solver.joint import Case, Joint
+from solver.jump import landings
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.path import (
+    SMALLEST_SHARE,
+    BalanceAt,
+    Effort,
+    PathPoint,
+    final_history,
+    follow_naturally,
+    solve_balance,
+    vibration_change,
+)
+from solver.response import StateReport, report_state
+from solver.stability import is_stable
+
+Scheme = Literal["explicit", "implicit", "adaptive"]
+
+RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
+SMALLEST_RESOLUTION = 2.0**-10  # of a step
+JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
+MOST_JUMPS = 12
+RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
+
+
+@dataclass
+class Trajectory:
+    """The current state of a joint that wears, and how it goes on."""
+
+    case: Case
+    start: StartState
+    wear_coefficient: float
+    scheme: Scheme
+
+    def __post_init__(self) -> None:
+        state = self.start.state
+        assert state is not None
+        self.joint: Joint = self.case.joint(state.omega, state.excitation_amplitude)
+        self.solver = JacobianSolver()
+        self.effort = Effort()
+        self.cycle = 0.0
+        self.jump_cycle = float("nan")
+        self.still = np.zeros(self.case.model.contact.n_contact)
+        self.last_change: tuple[float, FloatArray] | None = None
+        self.unresolved = 0.0
+        self.jumps = 0
+        self.failure = Outcome.MARCH_FAILED
+        self.step_limit = float("nan")
+        self.rates: list[float] = []
+        self.pair_rates: list[FloatArray] = []
+        self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
+
+    def begin(self) -> Outcome:
+        """Take up the unworn state: it is evaluated, not solved again."""
+        state = self.start.state
+        assert state is not None
+        balance = Balance(self.joint, state.start_history, state.wear_depth, self.still)
+        predicted = balance.predict(state.displacement_h, state.contact_force_h)
+        evaluation = balance.evaluate(predicted)
+        self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
+        self._note()
+        self.estimated_for = evaluation.predicted_h
+        return self.check()
+
+    def check(self) -> Outcome:
+        """Whether the current state may be reported: errors below rtol and a certificate that holds."""
+        now = self.point.evaluation.predicted_h[:, 1:]
+        changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
+        accurate = True
+        if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
+            accurate = self._refine()
+        holds = self._certify()
+        if not holds and accurate and self.case.settings.automatic:
+            # more harmonics or samples may be all that it needs
+            accurate = self._refine()
+            holds = self._certify()
+        if not accurate:
+            return Outcome.INACCURATE
+        return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
+
+    def _certify(self) -> bool:
+        """Certificate of the current state, and whether it holds."""
+        self.certificate = replace(
+            certify(self.joint, self.point.evaluation),
+            response_error=self.estimate.response,
+            wear_rate_error=self.estimate.wear_rate,
+        )
+        return self.certificate.holds(self.case.settings.tolerance)
+
+    def _refine(self) -> bool:
+        """Estimate the errors of the current state; False where they cannot be kept below rtol."""
+        refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
+        self.estimate, self.point = refined.estimate, refined.point
+        if refined.case is not self.case:
+            self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None
+            self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        self.estimated_for = self.point.evaluation.predicted_h
+        return refined.accurate
+
+    def report(self) -> StateReport:
+        """What is reported of the current state."""
+        return report_state(self.joint, self.point.evaluation, self.certificate)
+
+    def rate(self) -> FloatArray:
+        """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21)."""
+        return self.wear_coefficient / self.joint.contact.area * self.point.evaluation.slip_work
+
+    def wears(self) -> bool:
+        """Whether anything wears at all."""
+        return bool(self.rate().max(initial=0.0) > 0.0)
+
+    def planned_step(self, step: float, largest_depth: float | None) -> float:
+        """Step h in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
+        if largest_depth is None or self.scheme != "explicit":
+            return step
+        return largest_depth / float(self.rate().max())
+
+    def advance(self, reach: float) -> bool:
+        """One Euler step to the cycle count `reach`; False where the branch ends before: then the step has gone as far
+        as there is a stable state, to within `RESOLUTION`, and `jump` goes on.
+        """
+        length = reach - self.cycle
+        balance_at = self._step(length)
+        base = PathPoint(0.0, self.point.evaluation, self.point.history)
+        found = self._extrapolated(balance_at(1.0, base.history), length)
+        if found is not None:
+            self.take(PathPoint(1.0, found, base.history), balance_at, length)
+            return True
+        # the end of a branch is to be known to a share of the count; in the first step to that of the step
+        resolution = RESOLUTION * (self.cycle if self.cycle > 0.0 else length) / length
+        shortest = max(min(resolution, SMALLEST_SHARE), SMALLEST_RESOLUTION)
+        last, arrived = follow_naturally(
+            balance_at,
+            base,
+            1.0,
+            self.solver,
+            self.case.settings.tolerance,
+            self.effort,
+            keep_history=True,
+            shortest=shortest,
+        )
+        if not self.is_stable(last.evaluation):
+            # where it has become unstable is not known: the jump is made from the start of the step
+            last, arrived = base, False
+        if arrived or last.parameter > 0.0:
+            self.take(last, balance_at, length)
+        self.unresolved = shortest * length
+        return arrived
+
+    def jump(self, length: float) -> bool:
+        """The branch has ended at the current count, in a step of the given length: land on another stable state a
+        little beyond; False where there is none.
+        """
+        self.jumps += 1
+        if self.jumps > MOST_JUMPS:
+            return False
+        beyond = min(2.0 * self.unresolved, length)
+        worn = self.point.evaluation.wear_depth + beyond * self.rate()
+        self.last_change = None
+        for landed in landings(self.case, self.joint, self.point, worn, self.solver, self.effort):
+            if isinstance(landed, Outcome):
+                self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
+                break
+            # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
+            balance_at = self._held(landed.evaluation.wear_depth, worn)
+            start = PathPoint(0.0, landed.evaluation, landed.history)
+            point, arrived = follow_naturally(
+                balance_at, start, 1.0, self.solver, self.case.settings.tolerance, self.effort, keep_history=True
+            )
+            if not arrived or not self.is_stable(point.evaluation):
+                continue
+            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED and np.isnan(self.jump_cycle):
+                self.jump_cycle = self.cycle
+            self.point = PathPoint(
+                0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation)
+            )
+            self.cycle += beyond
+            return True
+        return False
+
+    def stays(self) -> bool:
+        """Whether the current state is stable."""
+        return self.is_stable(self.point.evaluation)
+
+    def pairs_oscillate(self) -> bool:
+        """Whether the wear rate of some pair went up and down from step to step."""
+        return any(wear_oscillates(pair) for pair in np.array(self.pair_rates).T)
+
+    def is_stable(self, evaluation: Evaluation) -> bool:
+        """Whether a state is stable with its wear held."""
+        held = Balance(self.joint, evaluation.history, evaluation.wear_depth, self.still)
+        return is_stable(held.linearise(evaluation), self.solver)
+
+    def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
+        """Make the state at a share of a step the current one."""
+        balance = balance_at(point.parameter, self.point.history)
+        self.accept(
+            PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), point.parameter * length
+        )
+
+    def accept(self, point: PathPoint, length: float) -> None:
+        """Make a state that is so many cycles ahead the current one."""
+        self.last_change = (length, point.evaluation.predicted_h - self.point.evaluation.predicted_h)
+        self.point = point
+        self.cycle += length
+        self._note()
+
+    def _note(self) -> None:
+        """Keep the wear rate of the current state, and the limit of the explicit step at the first one that wears."""
+        rate = self.rate()
+        self.pair_rates.append(rate)
+        self.rates.append(float(rate @ self.joint.contact.area))
+        if np.isnan(self.step_limit) and self.wears():
+            balance = Balance(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth, self.still)
+            per_work = self.wear_coefficient / self.joint.contact.area
+            self.step_limit = explicit_step_limit(balance, self.point.evaluation, per_work, self.solver)
+
+    def _step(self, length: float) -> BalanceAt:
+        return self._explicit(length) if self.scheme == "explicit" else self._implicit(length)
+
+    def _held(self, before: FloatArray, after: FloatArray) -> BalanceAt:
+        def balance_at(share: float, history: FloatArray) -> Balance:
+            return Balance(self.joint, history, before + share * (after - before), self.still)
+
+        return balance_at
+
+    def _explicit(self, length: float) -> BalanceAt:
+        before, grown = self.point.evaluation.wear_depth, length * self.rate()
+
+        def balance_at(share: float, history: FloatArray) -> Balance:
+            return Balance(self.joint, history, before + share * grown, self.still)
+
+        return balance_at
+
+    def _implicit(self, length: float) -> BalanceAt:
+        before = self.point.evaluation.wear_depth
+        gain = length * self.wear_coefficient / self.joint.contact.area
+
+        def balance_at(share: float, history: FloatArray) -> Balance:
+            return Balance(self.joint, history, before, share * gain)
+
+        return balance_at
+
+    def predicted(self, balance: Balance, length: float) -> FloatArray:
+        """Predicted force (n_rel, m), N, to begin a step with: extrapolated over the last step, or that of now."""
+        now = self.point.evaluation.predicted_h
+        if self.last_change is None:
+            return now
+        before, change = self.last_change
+        ahead = now + (length / before) * change
+        nearer = balance.evaluate(ahead).scaled_residual() <= balance.evaluate(now).scaled_residual()
+        return ahead if nearer else now
+
+    def _extrapolated(self, balance: Balance, length: float) -> Evaluation | None:
+        """State at the end of the step from a start extrapolated over the last one; None where it does not converge."""
+        start = self.predicted(balance, length)
+        if start is self.point.evaluation.predicted_h:
+            return None
+        result = solve_balance(balance, start, self.solver, self.case.settings.tolerance, self.effort, 8)
+        return result.evaluation if result.converged else None
