@@ -24,14 +24,14 @@ import numpy as np
 
 from solver.balance import Balance
 from solver.model import FloatArray
-from solver.path import PathPoint, final_history, solve_balance
+from solver.path import CALM, PathPoint, final_history, solve_balance, vibration_change
 from solver.trajectory import RESOLUTION, Trajectory
 
 SHARE = 0.5  # of rtol; an error is judged by what the step has worn, or would have worn at the mean rate so far
 LONGEST_RATIO = 2.0  # of two steps
 SHORTEST_RATIO = 0.2
 SAFETY = 0.85
-CAREFUL = 0.8  # a step is not changed for less
+CAREFUL = 0.8  # a step that was refused is cut by at least so much
 FIRST = 1e-3  # of all cycles: the first step, before anything is known of the error
 ITERATIONS = 10  # of a step: one that takes more is halved
 SHORTEST_FIRST = 1e-6  # of all cycles
@@ -55,8 +55,9 @@ class AdaptiveSteps:
     def advance(self) -> tuple[bool, float]:
         """One step that is accurate enough. Whether the branch goes on, and the length of the step that was tried.
 
-        `error` is then the estimated error of the step, as worn volume, m3. Where the error does not fall with the
-        step, down to the resolution of jumps, an Euler step of that length finds out whether the branch ends there.
+        `error` is then the estimated error of the step, as worn volume, m3. Steps are not cut below half the resolution
+        of jumps: where the vibration changes over one of that length, or none is found, an Euler step finds out whether
+        the branch ends there.
         """
         way = self.trajectory
         while True:
@@ -65,27 +66,24 @@ class AdaptiveSteps:
             length = left if left <= 1.0001 * self._length else min(self._length, 0.5 * left)
             shortest = max(0.5 * RESOLUTION * way.cycle, SHORTEST_FIRST * self.end)
             tried = self._attempt(length)
+            shorter = 0.25
             if tried is not None:
                 ratio, point, error = tried
-                if ratio <= 1.0:
+                # down there the wear rate has a corner, or the branch ends, which shows in the vibration
+                calm = vibration_change(way.point.evaluation, point.evaluation) < CALM
+                if ratio <= 1.0 or (length <= shortest and calm):
                     self._accept(point, length)
                     self.error = error
-                    self._length = length * float(np.clip(SAFETY * ratio**-0.5, CAREFUL, LONGEST_RATIO))
+                    self._length = length * float(np.clip(SAFETY / np.sqrt(max(ratio, 1e-12)), CAREFUL, LONGEST_RATIO))
                     return True, length
-                shorter = float(np.clip(SAFETY * ratio**-0.5, SHORTEST_RATIO, CAREFUL))
-            else:
-                shorter = 0.25
+                shorter = float(np.clip(SAFETY / np.sqrt(max(ratio, 1e-12)), SHORTEST_RATIO, CAREFUL))
             if length <= shortest:
-                self._before = None
-                rate = way.rate()
+                rate, depth = way.rate(), way.point.evaluation.wear_depth
                 arrived = way.advance(way.cycle + length)
                 self.error = 0.5 * length * float(np.abs(way.rate() - rate) @ way.joint.contact.area)
-                self._length = length
+                self._before, self._length = (length, depth), length
                 return arrived, length
             self._length = max(shorter * length, 0.999 * shortest)
-            if length < 0.3 * (self._before[0] if self._before else 0.0):
-                # the error falls slower than it would if the rate were smooth: what came before tells nothing
-                self._before = None
 
     def restart(self) -> None:
         """What came before tells nothing of what follows: behind a jump."""

@@ -39,7 +39,7 @@ def march_wear(
     last of them. largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
     """
     started = time.thread_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time)
+    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, smooth=scheme == "adaptive")
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency)

@@ -71,8 +71,10 @@ def test_the_exact_branch_ends_at_the_depth_of_the_jump(share: float, impacts: b
     assert (abs(orbit.harmonic(0)) > 0.05) == impacts
 
 
-@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
-@pytest.mark.parametrize("step", [50.0, 1000.0])
+@pytest.mark.parametrize(
+    ("scheme", "step"),
+    [("explicit", 50.0), ("implicit", 50.0), ("explicit", 1000.0), ("implicit", 1000.0), ("adaptive", 0.0)],
+)
 def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) -> None:
     found = history(step, scheme)
     assert found.outcome is Outcome.CONVERGED
@@ -94,6 +96,7 @@ def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) ->
 def test_the_jump_cycle_does_not_depend_much_on_the_step() -> None:
     fine = history(5.0, "implicit").jump_cycle
     assert history(50.0, "implicit").jump_cycle == pytest.approx(fine, rel=0.1, abs=0.0)
+    assert history(0.0, "adaptive").jump_cycle == pytest.approx(fine, rel=0.02, abs=0.0)
 
 
 def test_on_the_branch_without_impacts_nothing_jumps() -> None:
