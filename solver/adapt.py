@@ -126,6 +126,18 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         here = next_level
 
 
+def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort) -> Refined | None:
+    """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
+    here = _Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
+    while here.joint.slots.size * (2 * len(here.case.resolution.orders) + 1) > most:
+        lower = _fewer(here.case)
+        level = here.solve_at(lower, effort) if lower != here.case.resolution else None
+        if level is None:
+            return None
+        here = level
+    return Refined(here.case, here.point, UNKNOWN, False)
+
+
 def transfer(
     case: Case, joint: Joint, evaluation: Evaluation, old_orders: tuple[int, ...]
 ) -> tuple[Balance, FloatArray]:

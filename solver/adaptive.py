@@ -12,8 +12,11 @@ positive, so that wear never falls. The local error follows from the difference 
     P = W_n + (1 + w) h_n g_n - w^2 (W_n - W_(n-1)),      e = c / (c + c_P) (W_(n+1) - P),
     c = (1 + w)^2 / (6 w (1 + 2 w)),      c_P = (1 + 1 / w) / 6.
 
-The first step, and the first one behind a corner of the wear rate (a pair begins to slip or to open) or a jump, is an
-implicit Euler step, whose error is that against the trapezoidal rule.
+The first step, and the first one behind a jump, is an implicit Euler step, whose error is that against the trapezoidal
+rule.
+
+The steps know neither the last cycle count nor the wear coefficient but through `k_w h`: they go beyond the end, which
+is interpolated, and runs that differ in k_w alone are the same trajectory.
 """
 
 from __future__ import annotations
@@ -32,39 +35,46 @@ LONGEST_RATIO = 2.0  # of two steps
 SHORTEST_RATIO = 0.2
 SAFETY = 0.85
 CAREFUL = 0.8  # a step that was refused is cut by at least so much
-FIRST = 1e-3  # of all cycles: the first step, before anything is known of the error
+FIRST = 0.05  # of the explicit step limit: the first step, before anything is known of the error
+FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears where there is no limit
 ITERATIONS = 10  # of a step: one that takes more is halved
-SHORTEST_FIRST = 1e-6  # of all cycles
+SHORTEST = 1e-4  # of the first step
 
 
 @dataclass
 class AdaptiveSteps:
-    """Takes a trajectory to the cycle count `end` with a relative error of the worn volume near `rtol`."""
+    """Steps of a trajectory with a relative error of the worn volume near `rtol`.
+
+    error: estimated error of the last step, as worn volume, m3.
+    """
 
     trajectory: Trajectory
-    end: float
     rtol: float
     error: float = field(init=False, default=0.0)
     _length: float = field(init=False)
+    _shortest: float = field(init=False, repr=False)
     _before: tuple[float, FloatArray] | None = field(init=False, default=None, repr=False)
 
     def __post_init__(self) -> None:
-        limit = self.trajectory.step_limit
-        self._length = min(FIRST * self.end, limit) if limit > 0.0 else FIRST * self.end
+        way = self.trajectory
+        limit, fastest = way.step_limit, float(way.rate().max(initial=0.0))
+        if np.isfinite(limit):
+            self._length = FIRST * limit
+        elif fastest > 0.0:
+            self._length = FIRST_DEPTH * float(np.abs(way.point.evaluation.displacement_h[:, :, 1:]).max()) / fastest
+        else:
+            self._length = 1.0
+        self._shortest = SHORTEST * self._length
 
     def advance(self) -> tuple[bool, float]:
         """One step that is accurate enough. Whether the branch goes on, and the length of the step that was tried.
 
-        `error` is then the estimated error of the step, as worn volume, m3. Steps are not cut below half the resolution
-        of jumps: where the vibration changes over one of that length, or none is found, an Euler step finds out whether
-        the branch ends there.
+        Steps are not cut below half the resolution of jumps: where the vibration changes over one of that length, or
+        none is found, an Euler step finds out whether the branch ends there.
         """
         way = self.trajectory
         while True:
-            left = self.end - way.cycle
-            # no remainder that is much shorter than the steps before it
-            length = left if left <= 1.0001 * self._length else min(self._length, 0.5 * left)
-            shortest = max(0.5 * RESOLUTION * way.cycle, SHORTEST_FIRST * self.end)
+            length, shortest = self._length, max(0.5 * RESOLUTION * way.cycle, self._shortest)
             tried = self._attempt(length)
             shorter = 0.25
             if tried is not None:
@@ -114,7 +124,7 @@ class AdaptiveSteps:
             own, other = (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio)), (1.0 + 1.0 / ratio) / 6.0
             error = own / (own + other) * (new.wear_depth - explicit)
         worn, before = float(new.wear_depth @ area), float(depth @ area)
-        allowed = SHARE * self.rtol * max(worn - before, worn * length / self.end)
+        allowed = SHARE * self.rtol * max(worn - before, worn * length / (way.cycle + length))
         size = float(np.abs(error) @ area)
         point = PathPoint(0.0, new, final_history(balance, new))
         return (size / allowed if allowed > 0.0 else 0.0), point, size

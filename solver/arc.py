@@ -69,6 +69,8 @@ def follow_arc(
     low = min(start.parameter, target) - FARTHEST * abs(span)
     high = max(start.parameter, target) + FARTHEST * abs(span)
     for _ in range(ARC_STEPS):
+        if effort.exhausted:
+            break
         point = points[-1]
         tangent = arc.tangent(point.parameter, point.evaluation)
         if tangent is None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from solver.adapt import UNKNOWN, Refined, refine
+from solver.adapt import UNKNOWN, Refined, lighter, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.certificate import certify
@@ -31,6 +31,10 @@ FINE = 0.001  # of the frequency: steps that a sweep may always take
 SPAN = 0.05  # of the frequency: natural length of arc-length steps
 OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
 FEW_PAIRS = 12  # up to which a state that is not accurate is sought from nothing as well: impacts have many others
+COSTLY = 2500  # unknowns from which a branch is followed with fewer harmonics than its states are refined to
+LIGHT = 1600  # unknowns of a state that a branch is followed with then
+ALIKE = 0.2  # relative difference of the first harmonics of such a state to the refined one
+MOST_ITERATIONS = 2500  # from one frequency to the next
 MOST_LANDINGS = 6  # ends of branches on the way from one frequency to the next
 
 Sweep = Literal["up", "down"]
@@ -87,7 +91,8 @@ def follow_branch(
 class _Line:
     """The last state of a sweep and how it goes on.
 
-    branch: folds jumped over so far. fold: rad/s, the fold at which the branch was left last, NaN if none.
+    light: the last state with fewer harmonics, where its own are too many to follow a branch with. branch: folds jumped
+    over so far. fold: rad/s, the fold at which the branch was left last, NaN if none.
     """
 
     def __init__(self, case: Case, excitation_amplitude: float) -> None:
@@ -97,6 +102,7 @@ class _Line:
         self.solver = JacobianSolver()
         self.effort = Effort()
         self.point: PathPoint | None = None
+        self.light: Refined | None = None
         self.failure = Outcome.START_FAILED
         self.branch = 0
         self.fold = float("nan")
@@ -105,14 +111,16 @@ class _Line:
         """State at the next angular frequency, rad/s, with the harmonics that it needs."""
         if self.point is None:
             self._lead_in(omega, sweep)
+        self.effort.limit = self.effort.iterations + MOST_ITERATIONS
         try:
-            reached = self._next(omega) if self.point is not None else None
-            reached = reached or self._first(omega)
-            refined = None
-            if reached is not None:
-                refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
-                if not refined.accurate and refined.case.model.contact.n_contact <= FEW_PAIRS:
-                    refined = self._afresh(omega) or refined
+            refined = self._lightly(omega)
+            if refined is None:
+                reached = self._next(omega) if self.point is not None else None
+                reached = reached or self._first(omega)
+                if reached is not None:
+                    refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
+                    if not refined.accurate and refined.case.model.contact.n_contact <= FEW_PAIRS:
+                        refined = self._afresh(omega) or refined
         except np.linalg.LinAlgError:
             return Outcome.SINGULAR, None
         if refined is None:
@@ -125,6 +133,7 @@ class _Line:
         if refined.case is not self.case:
             self.solver = JacobianSolver()
         self.case, self.point = refined.case, refined.point
+        self.light = lighter(refined, omega, self.excitation_amplitude, LIGHT, self.effort) if self._costly() else None
         if not refined.accurate:
             return Outcome.INACCURATE, None
         joint = refined.case.joint(omega, self.excitation_amplitude)
@@ -132,6 +141,27 @@ class _Line:
         if not certificate.holds(self.case.settings.tolerance):
             return Outcome.CERTIFICATE_FAILED, None
         return Outcome.CONVERGED, refined
+
+    def _costly(self) -> bool:
+        n_rel = int(np.count_nonzero(self.case.model.contact.dofs >= 0))
+        return n_rel * (2 * len(self.case.resolution.orders) + 1) > COSTLY
+
+    def _lightly(self, omega: float) -> Refined | None:
+        """State at the next frequency by way of states with few harmonics; None where there is none, or where this way
+        is not sure: it jumps, or its end is not like the refined state.
+        """
+        if self.light is None:
+            return None
+        before = self.case, self.point, self.solver, self.branch, self.fold
+        self.case, self.point, self.solver = self.light.case, self.light.point, JacobianSolver()
+        reached = self._next(omega)
+        if reached is not None and self.branch == before[3]:
+            refined = refine(self.case, omega, self.excitation_amplitude, reached, self.effort)
+            one, other = (point.evaluation.displacement_h[:, :, 1:3] for point in (reached, refined.point))
+            if refined.accurate and np.linalg.norm(one - other) <= ALIKE * np.linalg.norm(other):
+                return refined
+        self.case, self.point, self.solver, self.branch, self.fold = before
+        return None
 
     def _afresh(self, omega: float) -> Refined | None:
         """An accurate state from nothing with other harmonics, where those of the branch are a dead end."""
@@ -187,6 +217,8 @@ class _Line:
         tolerance = self.case.settings.tolerance
         start = self.point
         for _ in range(MOST_LANDINGS):
+            if self.effort.exhausted:
+                break
             point, arrived = follow_naturally(
                 self._balance_at, start, omega, self.solver, tolerance, self.effort, fine=FINE * omega
             )

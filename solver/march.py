@@ -50,9 +50,7 @@ def march_wear(
         recorder.add(0.0, march.report(), wear_coefficient)
         end, n_steps = float(cycles[-1]), 0
         steps: AdaptiveSteps | FixedSteps = (
-            AdaptiveSteps(march, end, settings.rtol)
-            if scheme == "adaptive"
-            else FixedSteps(march, end, step, largest_depth)
+            AdaptiveSteps(march, settings.rtol) if scheme == "adaptive" else FixedSteps(march, end, step, largest_depth)
         )
         while outcome is Outcome.CONVERGED and march.cycle < end:
             if not march.wears():
@@ -81,7 +79,9 @@ def march_wear(
     except np.linalg.LinAlgError:
         outcome = Outcome.SINGULAR
     spent = time.thread_time() - started
-    history = recorder.finish(outcome, march.jump_cycle, march.effort.iterations, spent)
+    # adaptive steps go beyond the end
+    jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
+    history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent)
     return replace(
         history,
         branch=start.branch,

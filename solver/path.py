@@ -38,9 +38,15 @@ class PathPoint:
 
 @dataclass
 class Effort:
-    """Newton iterations spent; shared by the parts of one computation."""
+    """Newton iterations spent; shared by the parts of one computation. limit: after which a branch is given up."""
 
     iterations: int = 0
+    limit: float = np.inf
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no more steps are to be begun."""
+        return self.iterations > self.limit
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
@@ -108,7 +114,7 @@ def follow_naturally(
         else:
             share *= 0.5
             failures += not result.converged
-            if share < shortest or failures > MOST_FAILURES:
+            if share < shortest or failures > MOST_FAILURES or effort.exhausted:
                 return point, False
     return point, point.parameter == target
 

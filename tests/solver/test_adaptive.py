@@ -57,18 +57,25 @@ def test_steps_are_of_second_order() -> None:
     assert -0.5 < slope < -0.3
 
 
-def test_a_step_solves_its_own_equation() -> None:
-    # no errors are refused, so that the steps are known: the first one Euler's, the second one by the formula with w
-    history = None
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(adaptive, "SHARE", 1e9)
-        history = adaptive_march(1.0, cycles=np.array([0.0, 80.0, 240.0, 560.0, END]))
-    first, second = 80.0, 160.0
+def test_a_step_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None:
+    # no error is refused, so that the steps are known: the first one Euler's, the second one by the formula with w
+    monkeypatch.setattr(adaptive, "SHARE", 1e9)
+    monkeypatch.setattr(adaptive, "FIRST", 1e-2)
+    first = 1e-2 * adaptive_march(1.0).step_limit
+    w = adaptive.LONGEST_RATIO
+    history = adaptive_march(1.0, cycles=np.array([0.0, first, (1 + w) * first, END]))
     depth, rate = history.wear_depth[:, 0], history.wear_rate / AREA
     assert depth[1] == pytest.approx(first * rate[1], rel=1e-9)
-    w = second / first
-    expected = depth[1] + w**2 / (1 + 2 * w) * depth[1] + (1 + w) / (1 + 2 * w) * second * rate[2]
+    expected = depth[1] + w**2 / (1 + 2 * w) * depth[1] + (1 + w) / (1 + 2 * w) * w * first * rate[2]
     assert depth[2] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_end_is_not_seen_by_the_steps() -> None:
+    whole = adaptive_march(1e-2)
+    part = adaptive_march(1e-2, cycles=FINE_OUTPUT[:31])
+    assert part.newton_iterations < whole.newton_iterations
+    assert part.wear_depth == pytest.approx(whole.wear_depth[:31], rel=1e-12)
+    assert part.wear_rate == pytest.approx(whole.wear_rate[:31], rel=1e-12)
 
 
 def test_wear_never_falls_between_the_steps() -> None:
@@ -78,8 +85,9 @@ def test_wear_never_falls_between_the_steps() -> None:
 
 def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
     once = adaptive_march(1e-2)
-    twice = adaptive_march(1e-2, 2.0 * WEAR, 0.5 * FINE_OUTPUT)
-    assert twice.wear_depth == pytest.approx(once.wear_depth, rel=1e-9, abs=1e-20)
+    other = adaptive_march(1e-2, 3.0 * WEAR, FINE_OUTPUT / 3.0)
+    assert other.wear_depth == pytest.approx(once.wear_depth, rel=1e-9, abs=1e-20)
+    assert other.wear_rate == pytest.approx(3.0 * once.wear_rate, rel=1e-9)
 
 
 def test_nothing_is_marched_where_nothing_slips() -> None:

@@ -1,0 +1,63 @@
+"""The same branch and the same wear with every system solved densely: fast solves change nothing but the time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import linear
+from solver.balance import Linearisation
+from solver.continuation import follow_branch
+from solver.history import StartState, WearHistory
+from solver.linear import JacobianSolver
+from solver.march import march_wear
+from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.trajectory import Scheme
+from studies.scenes import build_scene, scene_parameters
+
+SETTINGS = SolverSettings(harmonics=5, samples=64, tolerance=1e-11)
+FREQUENCIES = np.array([211.0, 212.0, 212.86])
+CYCLES = np.linspace(0.0, 6000.0, 4)
+WEAR = 1.1e-11
+
+
+def dense_solve(self: JacobianSolver, tangent: Linearisation, right: FloatArray) -> FloatArray:
+    """The whole Jacobian, all pairs, all harmonics."""
+    matrix = tangent.dense(np.arange(tangent.joint.contact.n_contact))
+    return np.linalg.solve(matrix, right.ravel()).reshape(right.shape)
+
+
+def sector() -> ReducedModel:
+    """The dovetail sector with a coarse mesh: 264 unknowns, above the size that is always solved densely."""
+    model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(mesh=1), 5)
+    assert 11 * 3 * model.contact.n_contact > linear.SMALL
+    return model
+
+
+def computed(model: ReducedModel, scheme: Scheme) -> tuple[list[StartState], list[WearHistory]]:
+    starts = [start for _, start in follow_branch(model, 0.5, 0.5, FREQUENCIES, "up", SETTINGS)]
+    histories = [march_wear(model, 0.5, start, WEAR, 2000.0, scheme, CYCLES, SETTINGS) for start in starts]
+    return starts, histories
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "explicit", "adaptive"])
+def test_states_and_wear_are_those_of_dense_solves(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = sector()
+    starts, histories = computed(model, scheme)
+    monkeypatch.setattr(JacobianSolver, "solve", dense_solve)
+    dense_starts, dense_histories = computed(model, scheme)
+    assert any(history.wear_depth[-1].max() > 1e-9 for history in histories)
+    for start, exact in zip(starts, dense_starts, strict=True):
+        assert start.outcome is exact.outcome is Outcome.CONVERGED
+        assert start.state is not None
+        assert exact.state is not None
+        for name in ("displacement_h", "contact_force_h"):
+            found, wanted = getattr(start.state, name), getattr(exact.state, name)
+            assert np.linalg.norm(found - wanted) < 1e-9 * np.linalg.norm(wanted)
+    for history, wanted in zip(histories, dense_histories, strict=True):
+        assert history.outcome is wanted.outcome is Outcome.CONVERGED
+        for name in ("wear_depth", "wear_rate", "response"):
+            one, other = getattr(history, name), getattr(wanted, name)
+            assert np.linalg.norm(one - other) <= 1e-9 * np.linalg.norm(other)
