@@ -17,8 +17,8 @@ from solver.settings import SolverSettings
 from solver.trajectory import Scheme
 from studies.scenes import build_scene, scene_parameters
 
-SETTINGS = SolverSettings(harmonics=5, samples=64, tolerance=1e-11)
-FREQUENCIES = np.array([211.0, 212.0, 212.86])
+SETTINGS = SolverSettings(harmonics=5, samples=64, tolerance=1e-10)
+FREQUENCIES = np.array([212.86, 213.5])
 CYCLES = np.linspace(0.0, 6000.0, 4)
 WEAR = 1.1e-11
 
