@@ -149,21 +149,24 @@ class Linearisation:
         whole = self.joint.basis.synthesis.shape[0]
         m = whole if n_harmonics is None else 2 * n_harmonics + 1
         rows, pair, component = self._rows(pairs)
-        n_rows, n_pairs = rows.size, pairs.size
-        motion, force = (
-            part[pairs].reshape(n_pairs, 3, whole, 3, whole)[:, :, :m, :, :m]
-            for part in (self.motion_tangent, self.force_tangent)
-        )
-        matrix = np.empty((n_rows, m, n_pairs, 3, m))
+        n_rows = rows.size
+        # blocks of the pairs, spread over the rows and columns that there are: (row, harmonic, column, harmonic)
+        spread = np.zeros((2, n_rows, m, n_rows, m))
+        same = pair[:, None] == pair[None, :]
+        row, column = np.nonzero(same)
+        for place, part in enumerate((self.motion_tangent, self.force_tangent)):
+            blocks = part[pairs].reshape(pairs.size, 3, whole, 3, whole)
+            spread[place][row, :, column] = blocks[pair[row], component[row], :m, component[column], :m]
+        motion, matrix = spread[0].reshape(n_rows, m, -1), spread[1].reshape(n_rows, m, -1)
         structure = self.joint.structure
-        matrix[:, 0] = self._spread(structure.static_stiffness, rows, pair, component, motion[:, :, 0])
-        for place in range((m - 1) // 2):
-            amplitude = motion[:, :, 2 * place + 1] - 1j * motion[:, :, 2 * place + 2]
-            moved = self._spread(structure.dynamic_stiffness[place], rows, pair, component, amplitude)
-            matrix[:, 2 * place + 1], matrix[:, 2 * place + 2] = moved.real, -moved.imag
-        matrix[np.arange(n_rows), :, pair] += force[pair, component]
-        chosen = matrix.reshape(n_rows, m, 3 * n_pairs, m)[:, :, 3 * pair + component]
-        return chosen.reshape(n_rows * m, n_rows * m)
+        matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
+        if m > 1:
+            amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
+            stiffness = structure.dynamic_stiffness[: (m - 1) // 2, rows[:, None], rows]
+            moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
+            matrix[:, 1::2] += moved.real
+            matrix[:, 2::2] -= moved.imag
+        return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
 
     def dense_harmonic(self, pairs: IntArray, place: int) -> ComplexArray:
         """What the Jacobian does within one harmonic above the static one: a complex matrix over the rows of `pairs`.

@@ -300,7 +300,7 @@ def mass_tangent(
     mean_t = np.ascontiguousarray(step_synthesis.T)
     out = np.empty(7)
     local = np.empty((5, 5))
-    entry = np.empty((5, 3 * m + 2))
+    entry = np.empty((2, 3 * m + 2))
     leave = np.empty((5, 3 * m + 2))
     analysis_t = np.ascontiguousarray(step_analysis.T)
     dforce_t = np.empty((n_samples, 2, 3 * m + 2))
@@ -311,17 +311,24 @@ def mass_tangent(
         velocity = start[pair].copy()
         # columns: the harmonics of the predicted force, then the velocity at the start
         entry[:, :] = 0.0
-        entry[2, 3 * m] = 1.0
-        entry[3, 3 * m + 1] = 1.0
+        entry[0, 3 * m] = 1.0
+        entry[1, 3 * m + 1] = 1.0
         work[:] = 0.0
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
             step_mass(predicted_t[pair, 1:, n], velocity, friction * normal, gain, loss, line[pair], out, local)
-            for k in range(m):
-                entry[0, m + k] = mean_t[n, k]
-                entry[1, 2 * m + k] = mean_t[n, k]
-                entry[4, k] = friction * point_t[n, k] if normal > 0.0 and has_normal[pair] else 0.0
-            leave[:, :] = local @ entry
+            # entry holds the velocities; both forces and the friction limit have columns of their own
+            for row in range(5):
+                first, second = local[row, 2], local[row, 3]
+                for column in range(3 * m + 2):
+                    leave[row, column] = first * entry[0, column] + second * entry[1, column]
+                for k in range(m):
+                    leave[row, m + k] += local[row, 0] * mean_t[n, k]
+                    leave[row, 2 * m + k] += local[row, 1] * mean_t[n, k]
+                if normal > 0.0 and has_normal[pair]:
+                    limit = friction * local[row, 4]
+                    for k in range(m):
+                        leave[row, k] += limit * point_t[n, k]
             dforce_t[n] = leave[:2]
             for column in range(3 * m + 2):
                 work[column] += normal * step * leave[4, column]
@@ -330,16 +337,16 @@ def mass_tangent(
                     work[k] += out[6] * step * point_t[n, k]
             velocity[0] = out[2]
             velocity[1] = out[3]
-            entry[2, :] = leave[2]
-            entry[3, :] = leave[3]
+            entry[0, :] = leave[2]
+            entry[1, :] = leave[3]
         # the start of the period is its end: v0 = v(x, v0)
-        determinant = (1.0 - entry[2, 3 * m]) * (1.0 - entry[3, 3 * m + 1]) - entry[2, 3 * m + 1] * entry[3, 3 * m]
+        determinant = (1.0 - entry[0, 3 * m]) * (1.0 - entry[1, 3 * m + 1]) - entry[0, 3 * m + 1] * entry[1, 3 * m]
         dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, 3 * m + 2)
         for column in range(3 * m):
             first = (
-                (1.0 - entry[3, 3 * m + 1]) * entry[2, column] + entry[2, 3 * m + 1] * entry[3, column]
+                (1.0 - entry[1, 3 * m + 1]) * entry[0, column] + entry[0, 3 * m + 1] * entry[1, column]
             ) / determinant
-            second = ((1.0 - entry[2, 3 * m]) * entry[3, column] + entry[3, 3 * m] * entry[2, column]) / determinant
+            second = ((1.0 - entry[0, 3 * m]) * entry[1, column] + entry[1, 3 * m] * entry[0, column]) / determinant
             for component in range(2):
                 for k in range(m):
                     force_tangent[pair, (1 + component) * m + k, column] = (

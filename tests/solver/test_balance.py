@@ -83,7 +83,8 @@ def test_dense_of_some_pairs_is_a_block_of_the_whole() -> None:
     m = predicted.shape[1]
     pairs = np.array([1, 3, 4])
     chosen = np.flatnonzero(np.repeat(np.isin(balance.joint.slots // 3, pairs), m))
-    assert np.array_equal(tangent.dense(pairs), whole[np.ix_(chosen, chosen)])
+    # the order of sums depends on the size of the products: round-off
+    assert tangent.dense(pairs) == pytest.approx(whole[np.ix_(chosen, chosen)], abs=1e-14 * np.abs(whole).max())
 
 
 def test_wear_is_a_change_of_rank_one_of_the_columns_of_a_pair() -> None:
