@@ -27,21 +27,24 @@ def run(n_ranks: int, arguments: list[str], folder: Path) -> float:
     return time.perf_counter() - started
 
 
+def compare(arguments: list[str], folder: Path) -> None:
+    """Runs a study and prints its row of the table."""
+    first = run(2, arguments, folder)
+    print(f"first run on two ranks: {first:.0f} s (with compilation, if caches were cold)")
+    times: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(REPEATS):
+        for n_ranks, spent in times.items():
+            spent.append(run(n_ranks, arguments, folder))
+    best = {n_ranks: min(spent) for n_ranks, spent in times.items()}
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    print(f"one rank {best[1]:.1f} s, two ranks {best[2]:.1f} s: {best[2] / best[1]:.2f} of the time (0.52)")
+    print(f"largest memory of a rank: {peak:.0f} MiB")
+
+
 def main() -> None:
     """Prints the table."""
-    arguments = sys.argv[1:]
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        first = run(2, arguments, folder)
-        print(f"first run on two ranks: {first:.0f} s (with compilation, if caches were cold)")
-        times: dict[int, list[float]] = {1: [], 2: []}
-        for _ in range(REPEATS):
-            for n_ranks, spent in times.items():
-                spent.append(run(n_ranks, arguments, folder))
-        best = {n_ranks: min(spent) for n_ranks, spent in times.items()}
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    print(f"one rank {best[1]:.1f} s, two ranks {best[2]:.1f} s: {best[2] / best[1]:.2f} of the time")
-    print(f"largest memory of a rank: {peak:.0f} MiB")
+        compare(sys.argv[1:], Path(name))
 
 
 if __name__ == "__main__":

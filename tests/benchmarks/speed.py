@@ -1,0 +1,208 @@
+"""What a Newton iteration, a slow-time step, a whole trajectory and a larger joint cost, as ratios in one process.
+
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [ranks] [start]
+
+Without arguments all rows of the table. The bundled dovetail sector near its resonance: 48 pairs, 5 harmonics, 128
+samples, 1584 unknowns; the unit is one `numpy.linalg.solve` of as many. Medians over repeats that take turns. How busy
+simulated ranks are says `tests.benchmarks.scheduling`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from solver.balance import Balance
+from solver.continuation import follow_branch
+from solver.history import StartState
+from solver.joint import build_case
+from solver.linear import JacobianSolver
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.trajectory import Scheme
+from studies.scenes import build_scene, scene_parameters
+from tests.benchmarks import ranks
+
+FREQUENCY, AMPLITUDE, FRICTION, WEAR = 211.75, 0.5, 0.5, 1.1e-11
+SETTINGS = SolverSettings(harmonics=5, samples=128)
+STEP, N_STEPS, CYCLES = 1000.0, 30, 1e5
+REPEATS = 7
+EULER_STEPS = (800.0, 640.0, 500.0, 400.0, 320.0, 250.0, 200.0, 160.0)
+REFERENCE_STEP = 62.5
+
+
+def in_turns(*runs: Callable[[], object], repeats: int = REPEATS) -> list[float]:
+    """Median times of several things that take turns, after one round that is not counted, s of this thread."""
+    times: list[list[float]] = [[] for _ in runs]
+    for turn in range(repeats + 1):
+        for run, spent in zip(runs, times, strict=True):
+            started = time.thread_time()
+            run()
+            if turn:
+                spent.append(time.thread_time() - started)
+    return [float(np.median(spent)) for spent in times]
+
+
+def dense_solve(n: int) -> Callable[[], object]:
+    """The unit for n unknowns."""
+    matrix, right = np.random.default_rng(0).standard_normal((n, n)), np.ones(n)
+    return lambda: np.linalg.solve(matrix, right)
+
+
+def start_at(model: ReducedModel, frequencies: list[float], amplitude: float, settings: SolverSettings) -> StartState:
+    """The start state with the largest motion among those along a branch."""
+    branch = follow_branch(model, FRICTION, amplitude, np.array(frequencies), "up", settings)
+    found = [start for _, start in branch if start.state is not None]
+    return max(found, key=lambda start: float(np.abs(start.state.displacement_h[:, :, 1:]).max()) if start.state else 0)
+
+
+def iteration_at(model: ReducedModel, start: StartState, settings: SolverSettings, kept: bool) -> Callable[[], object]:
+    """One Newton iteration at a state, with a kept factorisation or with one of its own."""
+    state = start.state
+    assert state is not None
+    case = build_case(model, FRICTION, start.penalty_omega, settings)
+    joint = case.joint(state.omega, state.excitation_amplitude)
+    balance = Balance(joint, state.start_history, state.wear_depth, np.zeros(model.contact.n_contact))
+    predicted = balance.predict(state.displacement_h, state.contact_force_h)
+    solver = JacobianSolver()
+
+    def run() -> None:
+        evaluation = balance.evaluate(predicted)
+        (solver if kept else JacobianSolver()).solve(balance.linearise(evaluation), -evaluation.residual + 1e-3)
+
+    return run
+
+
+def march(
+    model: ReducedModel, start: StartState, step: float, scheme: Scheme, cycles: float, rtol: float = 1e-2
+) -> tuple[float, float]:
+    """Worn volume, m3, and iterations of a march."""
+    settings = replace(SETTINGS, rtol=rtol)
+    history = march_wear(model, FRICTION, start, WEAR, step, scheme, np.array([0.0, cycles]), settings)
+    if history.outcome is not Outcome.CONVERGED:
+        raise RuntimeError(history.outcome.sentence)
+    return float(history.worn_volume[-1]), history.newton_iterations - start.newton_iterations
+
+
+def dovetail(mesh: int = 2) -> ReducedModel:
+    """The bundled sector."""
+    return build_scene("dovetail_sector", scene_parameters("dovetail_sector")(mesh=mesh), 5)
+
+
+def steps() -> None:
+    """Rows 1 and 2."""
+    model = dovetail()
+    start = start_at(model, [FREQUENCY], AMPLITUDE, SETTINGS)
+    n = 11 * 3 * model.contact.n_contact
+    unit, kept, fresh = in_turns(
+        dense_solve(n), *(iteration_at(model, start, SETTINGS, kept) for kept in (True, False))
+    )
+    print(f"{n} unknowns; unit: one numpy.linalg.solve of as many, {1e3 * unit:.0f} ms here")
+    print(f"one Newton iteration: {kept / unit:.2f} with a kept factorisation, {fresh / unit:.2f} with its own (0.2)")
+    schemes: tuple[Scheme, ...] = ("implicit", "explicit")
+    for scheme in schemes:
+        whole, begun, unit = in_turns(
+            lambda scheme=scheme: march(model, start, STEP, scheme, N_STEPS * STEP),
+            lambda scheme=scheme: march(model, start, STEP, scheme, STEP),
+            dense_solve(n),
+            repeats=3,
+        )
+        iterations = march(model, start, STEP, scheme, N_STEPS * STEP)[1] / N_STEPS
+        print(f"one {scheme} step: {(whole - begun) / (N_STEPS - 1) / unit:.2f}, {iterations:.1f} iterations (0.5)")
+
+
+def adaptive() -> None:
+    """Row 3: adaptive steps over implicit Euler ones that are just short enough for 1 %."""
+    model = dovetail()
+    start = start_at(model, [FREQUENCY], AMPLITUDE, SETTINGS)
+    # the errors of both Euler schemes are opposite to first order
+    implicit, explicit = (march(model, start, REFERENCE_STEP, scheme, CYCLES)[0] for scheme in ("implicit", "explicit"))
+    exact = 0.5 * (implicit + explicit)
+    step = next(h for h in EULER_STEPS if abs(march(model, start, h, "implicit", CYCLES)[0] / exact - 1.0) <= 0.01)
+    volume, iterations = march(model, start, 0.0, "adaptive", CYCLES)
+    euler, own = in_turns(
+        lambda: march(model, start, step, "implicit", CYCLES),
+        lambda: march(model, start, 0.0, "adaptive", CYCLES),
+        repeats=3,
+    )
+    print(f"adaptive at rtol 0.01: error {abs(volume / exact - 1.0):.2%}, {iterations:.0f} iterations")
+    print(f"adaptive over implicit Euler with h = {step:g}, just short enough for 1 %: {own / euler:.2f} (0.5)")
+
+
+def slider() -> None:
+    """Row 4: what Python costs where there is next to nothing to compute."""
+    settings = SolverSettings(harmonics=21, samples=256)
+    model = build_scene("sdof_slider", scene_parameters("sdof_slider")(), 21)
+    start = start_at(model, [160.0], 10.0, settings)
+    unit, own = in_turns(dense_solve(43), iteration_at(model, start, settings, kept=True), repeats=201)
+    print(f"one Newton iteration of sdof_slider, 21 harmonics: {own / unit:.0f} solves of 43 unknowns (10)")
+
+
+def pairs() -> None:
+    """Row 8: the exponent with which an iteration of a march grows with the number of pairs."""
+    sizes, times = [], []
+    for mesh in (1, 2, 3):
+        model = dovetail(mesh)
+        start = start_at(model, [211.0, 211.5, 212.0, 212.5], AMPLITUDE, SETTINGS)
+        spent, begun = in_turns(
+            lambda model=model, start=start: march(model, start, STEP, "implicit", 10 * STEP),
+            lambda model=model, start=start: march(model, start, STEP, "implicit", STEP),
+            repeats=3,
+        )
+        counts = [march(model, start, STEP, "implicit", n * STEP)[1] for n in (10, 1)]
+        sizes.append(model.contact.n_contact)
+        times.append((spent - begun) / (counts[0] - counts[1]))
+        print(f"{sizes[-1]} pairs: {1e3 * times[-1]:.1f} ms an iteration")
+    print(f"exponent {np.polyfit(np.log(sizes), np.log(times), 1)[0]:.2f} (below 2)")
+
+
+def two_ranks() -> None:
+    """Row 5."""
+    with tempfile.TemporaryDirectory() as name:
+        ranks.compare([], Path(name))
+
+
+def start() -> None:
+    """Row 7: `--plan` over the imports that nothing can do without."""
+    plan = [str(ranks.RUN_STUDY), "sdof_slider", "--plan"]
+    imports = [sys.executable, "-c", "import xarray, scipy.linalg"]
+    times: list[list[float]] = [[], []]
+    for turn in range(REPEATS + 1):
+        for command, spent in zip((plan, imports), times, strict=True):
+            began = time.perf_counter()
+            subprocess.run(command, check=True, capture_output=True)
+            if turn:
+                spent.append(time.perf_counter() - began)
+    print(
+        f"run-study --plan over importing xarray and scipy.linalg: {np.median(times[0]) / np.median(times[1]):.2f} (1.5)"
+    )
+
+
+ROWS: dict[str, Callable[[], None]] = {
+    "steps": steps,
+    "adaptive": adaptive,
+    "slider": slider,
+    "pairs": pairs,
+    "ranks": two_ranks,
+    "start": start,
+}
+
+
+def main() -> None:
+    """Prints the table; behind each figure the one to reach."""
+    for name in sys.argv[1:] or ROWS:
+        ROWS[name]()
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
