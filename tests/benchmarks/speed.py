@@ -182,9 +182,8 @@ def start() -> None:
             subprocess.run(command, check=True, capture_output=True)
             if turn:
                 spent.append(time.perf_counter() - began)
-    print(
-        f"run-study --plan over importing xarray and scipy.linalg: {np.median(times[0]) / np.median(times[1]):.2f} (1.5)"
-    )
+    ratio = np.median(times[0]) / np.median(times[1])
+    print(f"run-study --plan over importing xarray and scipy.linalg: {ratio:.2f} (1.5)")
 
 
 ROWS: dict[str, Callable[[], None]] = {
