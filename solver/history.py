@@ -61,7 +61,8 @@ class WearHistory:
     slip_range (m), open_fraction (n_output, n_contact); response (n_output, n_response) complex first harmonic, m;
     response_peak (n_output, n_response) m. Output counts that were not reached hold NaN; where the point failed all do.
     jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    error_estimate: estimated relative error of the last worn volume.
+    error_estimate: estimated relative error of the last worn volume. volume_error (n_output,): m3, estimated error of
+        the worn volume at the end of the step that a count lies in.
     residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,): the
         certificate of the states, all relative; NaN where not estimated. stable (n_output,): bool.
     harmonics_used, samples_used (n_output,): int, 0 where there is no state.
@@ -100,6 +101,7 @@ class WearHistory:
     harmonics_used: IntArray
     samples_used: IntArray
     stable: BoolArray
+    volume_error: FloatArray
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf

@@ -50,7 +50,7 @@ class Recorder:
             name: np.full((n_output, width), np.nan, complex if name == "response" else float)
             for name, width in widths.items()
         }
-        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", *CERTIFIED)}
+        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "volume_error", *CERTIFIED)}
         self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
         self._kept["stable"] = np.ones(n_output, np.bool_)
 
@@ -89,6 +89,7 @@ class Recorder:
         self._kept["harmonics_used"][wanted] = report.resolution.highest
         self._kept["samples_used"][wanted] = report.resolution.samples
         self._kept["stable"][wanted] = report.certificate.stable
+        self._kept["volume_error"][wanted] = self._local_errors
         self._last = (cycle, report, rate)
 
     def _cubic(

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from studyrunner.evaluate import CONVERGED
 from studyrunner.progress import count
+from studyrunner.sharing import Index
 from studyrunner.study import Study
-from studyrunner.tasks import Index
 from studyrunner.variables import CERTIFICATE, COORDINATES
 
 _NOT_OF_A_SWEEP = ("wear_coefficient", "step", "scheme")
@@ -40,7 +40,7 @@ class _Noted:
 
 
 class CertificateTable:
-    """Collects the table from the records of marches, some at a time; their order does not matter.
+    """Collects the table from the records of histories, some at a time; their order does not matter.
 
     It keeps the worst of each kind and counts: little, however many points there are.
     """
@@ -67,10 +67,10 @@ class CertificateTable:
         for row in _rows(~np.isnan(records["jump_cycle"])):
             jump = (float(records["jump_cycle"][row]), first[row])
             self._first_jump = jump if self._first_jump is None else min(self._first_jump, jump)
-            self._n_jumps += 1
+            self._n_jumps += len(points[row])
         self._add_too_long(points, records["step_limit"])
-        self._note("oscillating", first, records["oscillates"] != 0)
-        self._note("unstable", first, converged & ~np.all(records["stable"] != 0, axis=1))
+        self._note("oscillating", points, records["oscillates"] != 0)
+        self._note("unstable", points, converged & ~np.all(records["stable"] != 0, axis=1))
 
     def format(self) -> str:
         """Table in lines: the largest value of each certificate over all converged points, with its place, then how
@@ -123,9 +123,10 @@ class CertificateTable:
                 if study.axes.scheme[point[scheme]] == "explicit" and longest > limits[row]:
                     self._noted["too long"].add(point)
 
-    def _note(self, what: str, first: Sequence[Index], where: NDArray[np.bool_]) -> None:
+    def _note(self, what: str, points: Sequence[tuple[Index, ...]], where: NDArray[np.bool_]) -> None:
         for row in _rows(where):
-            self._noted[what].add(first[row])
+            for point in points[row]:
+                self._noted[what].add(point)
 
     def _format_worst(self, name: str) -> str:
         if name not in self._worst:
@@ -142,7 +143,7 @@ class CertificateTable:
         return f"{len(self._folds)}, at {', '.join(f'{value:.6g} Hz' for value in frequencies[:_FOLDS_NAMED])}{more}"
 
     def _format_jumps(self) -> str:
-        """Histories that lost their branch, and the earliest of them."""
+        """Points that lost their branch, and the earliest of them."""
         if self._first_jump is None:
             return "none"
         cycle, point = self._first_jump

@@ -6,6 +6,8 @@ slips takes no step at all.
 
 from __future__ import annotations
 
+import math
+
 ITERATIONS_AT_FIRST = 100
 """For the first state of a branch, found from nothing: nearly 300 iterations, most of them without harmonics."""
 
@@ -14,6 +16,12 @@ ITERATIONS_A_STATE = 20
 
 ITERATIONS_A_STEP = 3
 """For one step on the slow time scale, explicit or implicit (measured: 2 to 4 where the joint slips)."""
+
+ADAPTIVE_STEPS = 40
+"""Of a march by the adaptive scheme, whatever `step` says."""
+
+ITERATIONS_AN_ADAPTIVE_STEP = 4
+"""For one of them, steps that are refused included."""
 
 AUTOMATIC_HARMONICS = 5
 """That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -31,6 +39,13 @@ def seconds_an_iteration(n_unknowns: int) -> float:
     Fits 2, 9, 23, 45 and 108 ms measured at 336, 1008, 1584, 2016 and 3024 unknowns within 20 %.
     """
     return 7e-4 + 5e-6 * n_unknowns + 3.3e-12 * float(n_unknowns) ** 3
+
+
+def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
+    """Newton iterations of a march over so many cycles where the joint wears."""
+    if cycles > 0.0 and scheme == "adaptive":
+        return ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
+    return ITERATIONS_A_STEP * max(1, math.ceil(cycles / step))
 
 
 def memory_a_rank(n_unknowns: int, result_values: int) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
@@ -45,7 +46,7 @@ def build_evaluator(
         if isinstance(task, BranchTask):
             yield from follow(model, friction_coefficient, task)
         else:
-            yield march(model, friction_coefficient, task)
+            yield from march(model, friction_coefficient, task)
 
     return evaluate
 
@@ -70,58 +71,89 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -
         yield StartResult(position, start, _moves(start), n_unknowns)
 
 
-def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> MarchResult:
-    """Wear history from the start state of the task."""
+def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> Iterator[MarchResult]:
+    """The histories of a task, one for each of its shares.
+
+    One march gives all of them. Where it fails, or its wear rate oscillates, that may have been after the end of
+    another history, which then takes a march of its own.
+    """
+    history = _solve(model, friction_coefficient, task)
+    yield build_result(task, history)
+    tells_all = history.outcome is Outcome.CONVERGED and not history.oscillates
+    for place, share in enumerate(task.shares[1:], start=1):
+        if tells_all:
+            yield build_result(task, history, place)
+        else:
+            alone = replace(task, shares=(share,))
+            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
+
+
+def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> WearHistory:
+    """The march of a task from its start state, at all counts at which one of its shares is read."""
     from solver.march import march_wear
 
     if not isinstance(task.start, StartState):
         raise TypeError(f"task without a start state: {task}")
-    wanted = (0.0,) if task.held else task.cycles
     # The march begins at cycle 0, whether that count is kept or not.
-    counts = wanted if wanted[0] == 0.0 else (0.0, *wanted)
-    history = march_wear(
+    counts = np.unique(np.concatenate([[0.0], *(task.counts(share) for share in task.shares)]))
+    return march_wear(
         model,
         friction_coefficient,
         task.start,
         task.wear_coefficient,
         task.step,
-        cast("Literal['explicit', 'implicit']", task.scheme),
-        np.array(counts),
+        cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
+        counts,
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
     )
-    return build_result(task, history)
 
 
-def build_result(task: MarchTask, history: WearHistory) -> MarchResult:
-    """What the result file holds of a history: the output counts and variables that the task asks for."""
-    if task.held:
-        rows = np.zeros(len(task.cycles), dtype=np.int64)
-    else:
-        rows = np.arange(len(history.cycles) - len(task.cycles), len(history.cycles))
+def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:
+    """What the result file holds of one share of a march: the output counts and variables that the task asks for.
+
+    What is per cycle is per cycle of the share. A share that ends before the march knows nothing of later jumps and
+    errors. Effort is that of the march.
+    """
+    share, own = task.shares[place], task.shares[0]
+    slower = share.wear_coefficient / own.wear_coefficient if place else 1.0
+    counts = np.array(task.counts(share))
+    rows = np.searchsorted(history.cycles, counts)
     failed = history.outcome is not Outcome.CONVERGED
+    values = {name: _variable(history, name, slower, failed)[rows] for name in task.variables}
+    jump, error = history.jump_cycle, history.error_estimate
+    if place:
+        jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
+        worn = float(history.worn_volume[rows[-1]])
+        error = float(history.volume_error[rows[-1]]) / worn if worn > 0.0 else 0.0
     return MarchResult(
-        points=task.points,
+        points=share.points,
         outcome=int(history.outcome),
-        values={name: _variable(history, name, failed)[rows] for name in task.variables},
-        jump_cycle=history.jump_cycle,
-        error_estimate=history.error_estimate,
+        values=values,
+        jump_cycle=jump,
+        error_estimate=error,
         newton_iterations=history.newton_iterations,
         run_time=history.run_time,
         branch=history.branch,
         fold_frequency=history.fold_frequency,
-        step_limit=history.step_limit,
+        step_limit=history.step_limit / slower,
         oscillates=history.oscillates,
+        share=place,
     )
 
 
-def _variable(history: WearHistory, name: str, failed: bool) -> NDArray[np.generic]:
-    """A variable of the result, its first dimension the output counts of the history; empty of all where it failed."""
+def _variable(history: WearHistory, name: str, slower: float, failed: bool) -> NDArray[np.generic]:
+    """A variable of the result, its first dimension the output counts of the history; empty of all where it failed.
+
+    slower: wear coefficient over that of the history.
+    """
     values: NDArray[np.generic]
     if name == "response_amplitude":
         values = np.abs(history.response)
     elif name == "response_phase":
         values = np.angle(history.response)
+    elif name == "wear_rate":
+        values = slower * history.wear_rate
     else:
         values = getattr(history, name)
     if failed:

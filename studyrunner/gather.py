@@ -1,4 +1,4 @@
-"""Records of marches -> one labelled NetCDF file, written under a temporary name and renamed.
+"""Records of histories -> one labelled NetCDF file, written under a temporary name and renamed.
 
 The file is written slab by slab from the files of a run: only a slab is ever in memory, however many points there are.
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from studyrunner.certificates import CertificateTable
 from studyrunner.evaluate import endings
 from studyrunner.output import partial_path
-from studyrunner.parts import Parts, march_numbers, variable_sizes
+from studyrunner.parts import Parts, histories_of, variable_sizes
 from studyrunner.scene import SceneFacts
 from studyrunner.study import Study
 from studyrunner.study_file import format_study
@@ -81,7 +81,7 @@ def _read_through(study: Study, plan: TaskPlan, parts: Parts) -> tuple[_Index, G
     outcomes: Counter[int] = Counter()
     for number in range(len(parts.files)):
         records = parts.read(number)
-        points = [marches[march].points for march in march_numbers(records)]
+        points = [marches[march].shares[share].points for march, share in histories_of(records)]
         for row, (of_one, outcome) in enumerate(zip(points, records["outcome"].tolist(), strict=True)):
             places = [int(np.ravel_multi_index(point, shape)) for point in of_one]
             index.file[places], index.row[places] = number, row

@@ -1,8 +1,8 @@
 """Results on their way into the result file: small files in a folder beside it, written while the run goes on.
 
-A file holds the records of the marches that ended in the last moment, as a plain array of numpy (no pickle), one
-element a march. It is written under a temporary name, flushed to the disk and renamed: it is whole or not there. Rank 0
-writes all of them, as no other rank need see the folder.
+A file holds the records of the histories that came in the last moment, as a plain array of numpy (no pickle), one
+element a history. It is written under a temporary name, flushed to the disk and renamed: it is whole or not there. Rank
+0 writes all of them, as no other rank need see the folder.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SECONDS_A_FILE = 0.25
 """Results wait at most so long for others that go into the same file: 10 000 short tasks do not make as many files."""
 
 _BYTES_A_FILE = 8e6
-_MARCH = "march"
+_MARCH, _SHARE = "march", "share"
 
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
@@ -36,9 +36,9 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 
 
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
-    """Type of the record of a march: its number in the study, then all that its result says."""
+    """Type of the record of a history: number of its march, its share of that, then all that its result says."""
     sizes = variable_sizes(study, facts)
-    fields: list[tuple[str, str, tuple[int, ...]]] = [(_MARCH, "int64", ())]
+    fields: list[tuple[str, str, tuple[int, ...]]] = [(_MARCH, "int64", ()), (_SHARE, "int64", ())]
     fields.extend((name, entry.dtype, ()) for name, entry in KEPT.items())
     for name in march_variables(study):
         entry = ASKED[name]
@@ -51,7 +51,7 @@ def pack(kind: np.dtype[np.void], results: Iterable[tuple[MarchTask, MarchResult
     pairs = list(results)
     records = np.zeros(len(pairs), dtype=kind)
     for record, (task, result) in zip(records, pairs, strict=True):
-        record[_MARCH] = task.number
+        record[_MARCH], record[_SHARE] = task.number, result.share
         for name in KEPT:
             record[name] = getattr(result, name)
         for name in task.variables:
@@ -59,10 +59,9 @@ def pack(kind: np.dtype[np.void], results: Iterable[tuple[MarchTask, MarchResult
     return records
 
 
-def march_numbers(records: NDArray[np.void]) -> list[int]:
-    """Which marches the records are of."""
-    numbers: list[int] = records[_MARCH].tolist()
-    return numbers
+def histories_of(records: NDArray[np.void]) -> list[tuple[int, int]]:
+    """Which histories the records are of: number of the march, place among its shares."""
+    return list(zip(records[_MARCH].tolist(), records[_SHARE].tolist(), strict=True))
 
 
 class Parts:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 from studyrunner.estimate import (
+    ADAPTIVE_STEPS,
     AUTOMATIC_HARMONICS,
     COMPILE_SECONDS,
     ITERATIONS_A_STEP,
+    ITERATIONS_AN_ADAPTIVE_STEP,
     memory_a_rank,
     seconds_an_iteration,
 )
@@ -26,14 +28,11 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
     branches = f"{count(len(plan.branches), 'branch', 'branches')} along the frequency"
-    left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or ["nothing"]
+    left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or [
+        "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
+    ]
     size = n_values * 8 / 1e6
     memory = memory_a_rank(plan.n_unknowns, n_values) / 1e9
-    milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
-    assumed = (
-        f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step, none where nothing slips;"
-        f" a first run compiles for {COMPILE_SECONDS} s more"
-    )
     rows = [
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
@@ -50,16 +49,25 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
             "time",
             f"about {format_seconds(plan.cost)} on one rank, {_on_two(plan)} on two, if every point wears (rough)",
         ),
-        ("assumed", assumed),
+        ("assumed", _assumed(study, plan)),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {text}" for label, text in rows)
 
 
+def _assumed(study: Study, plan: TaskPlan) -> str:
+    """What the time is estimated from."""
+    milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
+    said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
+    if "adaptive" in study.axes.scheme:
+        said += f", adaptive {ADAPTIVE_STEPS} steps of {ITERATIONS_AN_ADAPTIVE_STEP}"
+    return f"{said}, none where nothing slips; a first run compiles for {COMPILE_SECONDS} s more"
+
+
 def _solver(study: Study, facts: SceneFacts) -> str:
     """How finely and how exactly, and how far automatic harmonics can go in this scene."""
     values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
-    if AUTO in (*study.harmonics, *study.samples):
+    if AUTO in (*study.harmonics, *study.samples) or "adaptive" in study.axes.scheme:
         values["rtol"] = study.rtol
     shown = [f"{key} {' or '.join(map(_setting, items))}" for key, items in values.items()]
     if AUTO in study.harmonics and facts.largest_harmonics is not None:

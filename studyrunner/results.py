@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.tasks import Index
+from studyrunner.sharing import Index
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,11 @@ class StartResult:
 
 @dataclass(frozen=True)
 class MarchResult:
-    """History of the points of one task.
+    """One history of a task, and the points that have it.
 
     values: variable -> array with the dimensions of that variable after the axes; NaN, or 0 where the variable is a
         whole number, where there is no result.
+    share: its place among the shares of the task.
     The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
     """
 
@@ -46,3 +47,4 @@ class MarchResult:
     fold_frequency: float
     step_limit: float
     oscillates: bool
+    share: int = 0

@@ -18,7 +18,7 @@ from studyrunner.values import (
     read_not_negative,
     read_number,
     read_positive,
-    refuse_later,
+    read_switch,
     whole_number,
 )
 from studyrunner.variables import ASKED, KEPT
@@ -32,16 +32,14 @@ AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme
 
 _read_harmonics = number_or(AUTO, whole_number(1))
 _read_samples = number_or(AUTO, whole_number(4))
-_read_scheme = refuse_later(
-    "adaptive", 'give "implicit" or "explicit": "adaptive" is not part of this version', one_of("explicit", "implicit")
-)
+_read_scheme = one_of("implicit", "explicit", "adaptive")
 
 PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
 NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
 HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_harmonics))]
 SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
 FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
-Scheme = Literal["explicit", "implicit"]
+Scheme = Literal["implicit", "explicit", "adaptive"]
 Sweep = Literal["up", "down"]
 
 
@@ -105,7 +103,7 @@ class AxesSection(Section):
     frequency: PositiveAxis = Field(description="Hz; a number, a list or {start, stop, num}")
     wear_coefficient: NotNegativeAxis = Field((1.1e-11,), description="1/Pa")
     excitation_amplitude: PositiveAxis = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
-    step: PositiveAxis = Field((1000.0,), description="h, cycles")
+    step: PositiveAxis = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
     scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
         ("implicit",), description="of the wear steps"
     )
@@ -115,7 +113,9 @@ class AxesSection(Section):
     harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
     samples: SamplesAxis | None = Field(None, description="time samples in a period")
     tolerance: FractionAxis | None = Field(None, description="of the scaled residual")
-    rtol: FractionAxis | None = Field(None, description="relative error that automatic settings aim at")
+    rtol: FractionAxis | None = Field(
+        None, description="relative error that automatic settings and adaptive steps aim at"
+    )
 
 
 class SlowTimeSection(Section):
@@ -143,7 +143,10 @@ class SolverSection(Section):
     )
     tolerance: Annotated[float, BeforeValidator(read_fraction)] = Field(1e-8, description="of the scaled residual")
     rtol: Annotated[float, BeforeValidator(read_fraction)] = Field(
-        1e-2, description="relative error that automatic settings aim at"
+        1e-2, description="relative error that automatic settings and adaptive steps aim at"
+    )
+    shortcuts: Annotated[bool, BeforeValidator(read_switch)] = Field(
+        True, description="whether points with the same history share one; false: every point is computed on its own"
     )
 
 

@@ -12,14 +12,23 @@ from studyrunner.costs import Kin
 from studyrunner.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
-    ITERATIONS_A_STEP,
     ITERATIONS_AT_FIRST,
+    iterations_of_march,
     seconds_an_iteration,
+)
+from studyrunner.sharing import (
+    Alike,
+    Choice,
+    Index,
+    LeftOut,
+    Share,
+    Sharing,
+    march_counts,
+    rtol_is_idle,
+    share_histories,
 )
 from studyrunner.study import AUTO, SOLVER_AXES, Automatic, Study
 from studyrunner.variables import ASKED, CERTIFICATE
-
-Index = tuple[int, ...]
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """First keys of the kin of tasks, see LearnedCosts."""
@@ -75,13 +84,13 @@ class BranchTask:
 
 @dataclass(frozen=True)
 class MarchTask:
-    """One wear history from a start state on a branch.
+    """One wear history from a start state on a branch, and those of other points that are read from it.
 
-    branch, position: number of the branch and place of the frequency in it. held: nothing wears, so the state at
+    branch, position: number of the branch and place of the frequency in it. shares: its histories, the one that goes
+    farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
-    cycles: output counts. points: indices, along the dimensions of the study, of all points that have this history.
-    variables: what is handed back. cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult.
-        Until it is there, n_unknowns are those planned for and something moves.
+    cycles: output counts of every history. variables: what is handed back. cost: estimated seconds. n_unknowns, moves:
+        of the start state, see StartResult. Until it is there, n_unknowns are those planned for and something moves.
     start: start state, None until its branch has reached it.
     number: of the march in the study.
     """
@@ -90,13 +99,11 @@ class MarchTask:
     branch: int
     position: int
     settings: Settings
-    wear_coefficient: float
-    step: float
     scheme: str
     largest_depth: float | None
+    shares: tuple[Share, ...]
     held: bool
     cycles: tuple[float, ...]
-    points: tuple[Index, ...]
     variables: tuple[str, ...]
     cost: float
     n_unknowns: int
@@ -104,9 +111,30 @@ class MarchTask:
     start: object = field(default=None, compare=False)
 
     @property
+    def wear_coefficient(self) -> float:
+        """Of the march itself, 1/Pa."""
+        return self.shares[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Of the march itself, cycles."""
+        return self.shares[0].step
+
+    @property
+    def points(self) -> tuple[Index, ...]:
+        """All points that it gives a history for."""
+        return tuple(itertools.chain.from_iterable(share.points for share in self.shares))
+
+    @property
     def n_results(self) -> int:
-        """One history."""
-        return 1
+        """Histories that it gives."""
+        return len(self.shares)
+
+    def counts(self, share: Share) -> tuple[float, ...]:
+        """Cycle counts of the march that a history is read at, one for each of `cycles`."""
+        if self.held:
+            return (0.0,) * len(self.cycles)
+        return march_counts(self.cycles, share, self.shares[0], self.scheme != "adaptive")
 
     @property
     def opens_others(self) -> bool:
@@ -125,14 +153,6 @@ class MarchTask:
         near, here = (kind, self.branch, "near", self.position // _NEIGHBOURS), (kind, self.branch, self.position)
         wear = (kind, self.wear_coefficient, self.step, self.scheme)
         return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Points that are not computed on their own, and why."""
-
-    n_points: int
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -162,26 +182,20 @@ class TaskPlan:
         return line[first:last]
 
 
-_HELD_FOR = {
-    "cycles": "slow_time.cycles = 0 asks for the unworn states, the same for every step and scheme",
-    "wear_coefficient": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
-    "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
-}
-
-
 def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
     """Tasks of a study whose scene has `n_displacements` relative displacements.
 
-    Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
-    their own never do. The order and the numbers of the tasks depend on the study alone.
+    Points whose history is the same for a reason that the study itself shows share a task, see `sharing`. Points with a
+    solution of their own never do. The order and the numbers of the tasks depend on the study alone.
     """
     sizes = [len(values) for values in study.dimensions.values()]
     ascending = sorted(range(sizes[0]), key=lambda place: study.axes.frequency[place])
     branches: list[BranchTask] = []
     marches: list[tuple[MarchTask, ...]] = []
-    counts = dict.fromkeys(_HELD_FOR, 0)
+    sharing = share_histories(study)
     numbers = itertools.count()
-    for line in _lines(study):
+    for lines in _lines(study):
+        line = lines[0]
         settings = _settings(study, line)
         n_unknowns = _unknowns(n_displacements, settings.harmonics)
         seconds = seconds_an_iteration(n_unknowns)
@@ -199,13 +213,13 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
             tuple(
                 task
                 for position, place in enumerate(ascending)
-                for task in _marches(study, (len(marches), position), place, line, n_unknowns, counts, numbers)
+                for task in _marches(study, sharing, (len(marches), position), place, lines, n_unknowns, numbers)
             )
         )
     return TaskPlan(
         branches=tuple(branches),
         marches=tuple(marches),
-        left_out=tuple(LeftOut(count, _HELD_FOR[cause]) for cause, count in counts.items() if count),
+        left_out=sharing.left_out(len(branches) * len(ascending), math.prod(sizes)),
         n_points=math.prod(sizes),
         n_unknowns=max(_unknowns(n_displacements, harmonics) for harmonics in study.harmonics),
     )
@@ -216,11 +230,19 @@ def march_variables(study: Study) -> tuple[str, ...]:
     return tuple(name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
 
 
-def _lines(study: Study) -> Iterator[Index]:
-    """Indices of excitation amplitude, sweep and solver keys: what a branch along the frequency is followed for."""
-    solver = [len(values) for values in (study.harmonics, study.samples, study.tolerance, study.rtol)]
+def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
+    """Indices of excitation amplitude, sweep and solver keys: what a branch along the frequency is followed for.
+
+    The indices of one branch differ in `rtol` only, where nothing uses that.
+    """
+    solver = [len(values) for values in (study.harmonics, study.samples, study.tolerance)]
     sizes = (len(study.axes.excitation_amplitude), len(study.axes.sweep), *solver)
-    return itertools.product(*(range(size) for size in sizes))
+    for line in itertools.product(*(range(size) for size in sizes)):
+        lines = [(*line, rtol) for rtol in range(len(study.rtol))]
+        if rtol_is_idle(study, study.harmonics[line[2]], study.samples[line[3]]):
+            yield tuple(lines)
+        else:
+            yield from ((one,) for one in lines)
 
 
 def _settings(study: Study, line: Index) -> Settings:
@@ -235,60 +257,50 @@ def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
 
 def _marches(
     study: Study,
+    sharing: Sharing,
     branch: tuple[int, int],
     frequency: int,
-    line: Index,
+    lines: tuple[Index, ...],
     n_unknowns: int,
-    counts: dict[str, int],
     numbers: Iterator[int],
-) -> list[MarchTask]:
-    """Tasks of all points at one frequency of one branch; adds the points that share one to `counts`, by cause."""
-    axes, slow_time = study.axes, study.slow_time
-    shared: dict[tuple[object, ...], list[Index]] = {}
-    for wear, step, scheme in itertools.product(
-        range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme))
-    ):
-        cause: str | None = None
-        key: tuple[object, ...] = (wear, step, scheme)
-        if slow_time.cycles == 0.0:
-            cause, key = "cycles", ("held", wear)
-        elif axes.wear_coefficient[wear] == 0.0:
-            cause, key = "wear_coefficient", ("held", wear)
-        elif slow_time.largest_depth is not None and axes.scheme[scheme] == "explicit":
-            cause, key = "largest_depth", (wear, "explicit")
-        if key in shared and cause is not None:
-            counts[cause] += 1
-        shared.setdefault(key, []).append((wear, step, scheme))
-    variables = march_variables(study)
-    tasks = []
-    for key, members in shared.items():
-        wear, step, scheme = members[0]
-        held = key[0] == "held"
-        n_steps = 1 if held else math.ceil(study.cycles_kept[-1] / axes.step[step])
-        tasks.append(
-            MarchTask(
-                number=next(numbers),
-                branch=branch[0],
-                position=branch[1],
-                settings=_settings(study, line),
-                wear_coefficient=axes.wear_coefficient[wear],
-                step=axes.step[step],
-                scheme=axes.scheme[scheme],
-                largest_depth=slow_time.largest_depth if axes.scheme[scheme] == "explicit" else None,
-                held=held,
-                cycles=study.cycles_kept,
-                points=tuple(_point(study, frequency, line, member) for member in members),
-                variables=variables,
-                cost=seconds_an_iteration(n_unknowns) * ITERATIONS_A_STEP * n_steps,
-                n_unknowns=n_unknowns,
-            )
+) -> Iterator[MarchTask]:
+    """Tasks of all points at one frequency of one branch."""
+    axes = study.axes
+    for alike in sharing.marches:
+        shares = _shares(study, alike, frequency, lines)
+        scheme = axes.scheme[alike.shares[0][0][2]]
+        cycles = 0.0 if alike.held else study.cycles_kept[-1]
+        yield MarchTask(
+            number=next(numbers),
+            branch=branch[0],
+            position=branch[1],
+            settings=_settings(study, lines[0]),
+            scheme=scheme,
+            largest_depth=study.slow_time.largest_depth if scheme == "explicit" else None,
+            shares=shares,
+            held=alike.held,
+            cycles=study.cycles_kept,
+            variables=march_variables(study),
+            cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, shares[0].step),
+            n_unknowns=n_unknowns,
         )
-    return tasks
 
 
-def _point(study: Study, frequency: int, line: Index, member: Index) -> Index:
+def _shares(study: Study, alike: Alike, frequency: int, lines: tuple[Index, ...]) -> tuple[Share, ...]:
+    """The shares of a march with their points."""
+    return tuple(
+        Share(
+            study.axes.wear_coefficient[choices[0][0]],
+            study.axes.step[choices[0][1]],
+            tuple(_point(study, frequency, line, choice) for line in lines for choice in choices),
+        )
+        for choices in alike.shares
+    )
+
+
+def _point(study: Study, frequency: int, line: Index, choice: Choice) -> Index:
     """Index of a point along the dimensions of the study."""
     places = dict(zip(("excitation_amplitude", "sweep", *SOLVER_AXES), line, strict=True))
-    places.update(zip(("wear_coefficient", "step", "scheme"), member, strict=True))
+    places.update(zip(("wear_coefficient", "step", "scheme"), choice, strict=True))
     places["frequency"] = frequency
     return tuple(places[name] for name in study.dimensions)

@@ -43,6 +43,13 @@ def read_not_negative(value: object) -> float:
     return number
 
 
+def read_switch(value: object) -> bool:
+    """Only true or false; numbers and text are refused."""
+    if not isinstance(value, bool):
+        raise WrongValueError(value, "give true or false")
+    return value
+
+
 def read_fraction(value: object) -> float:
     """A number between 0 and 1, both left out."""
     number = read_number(value)
@@ -73,17 +80,6 @@ def one_of(*words: str) -> Callable[[object], str]:
         return value
 
     return read
-
-
-def refuse_later(word: str, remedy: str, read: Callable[[object], T]) -> Callable[[object], T]:
-    """`read`, but with its own sentence for a word of the study file that this version does not know yet."""
-
-    def read_or_refuse(value: object) -> T:
-        if value == word:
-            raise WrongValueError(value, remedy)
-        return read(value)
-
-    return read_or_refuse
 
 
 def number_or(word: str, read: Callable[[object], T]) -> Callable[[object], T | str]:

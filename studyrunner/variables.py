@@ -87,7 +87,7 @@ COORDINATES = {
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
-    "rtol": Variable((), "1", "relative error that automatic settings aim at"),
+    "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
     "cycle": Variable((), "1", "number of vibration cycles"),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),

@@ -24,7 +24,7 @@ from studyrunner.ranks import launcher_rank
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.tasks import BranchTask, MarchTask
-from tests.studyrunner.fakes import fake_branch, fake_march
+from tests.studyrunner.fakes import fake_branch, fake_evaluate
 
 BULK = np.zeros(100_000)
 """Goes with every start state: larger than what MPI sends off at once."""
@@ -42,18 +42,19 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
                 if "FAKE_PATIENCE" in os.environ:
                     wait_for(Path(f"branch{task.number}.txt"), float(os.environ["FAKE_PATIENCE"]))
         else:
-            yield march(task)
+            yield from march(task)
 
-    def march(task: MarchTask) -> MarchResult:
+    def march(task: MarchTask) -> Iterator[MarchResult]:
         if launcher_rank() == failing:
             raise ZeroDivisionError("a task that fails")
         assert isinstance(task.start, tuple)
-        result = fake_march(replace(task, start=task.start[0]), facts, seconds)
-        if "FAKE_SECONDS" in os.environ:
-            for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
-                with Path(name).open("a", encoding="utf-8") as file:
-                    file.write(f"{result.run_time}\n")
-        return result
+        for result in fake_evaluate(replace(task, start=task.start[0]), facts, seconds):
+            assert isinstance(result, MarchResult)
+            if "FAKE_SECONDS" in os.environ:
+                for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
+                    with Path(name).open("a", encoding="utf-8") as file:
+                        file.write(f"{result.run_time}\n")
+            yield result
 
     return evaluate
 

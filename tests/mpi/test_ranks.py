@@ -18,7 +18,8 @@ GRID = [
     *("--set", "axes.frequency={start = 100, stop = 160, num = 13}"),
     *("--set", "axes.sweep=['up', 'down']"),
     *("--set", "axes.step=[500, 1000]"),
-    *("--set", "axes.wear_coefficient=[0, 1e-11]"),
+    *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
+    *("--set", "axes.scheme=['implicit', 'adaptive']"),
 ]
 
 
@@ -52,7 +53,7 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         summary, *table = done.stdout.splitlines()
         tables.add("\n".join(table))
-        assert summary.startswith(f"{n_ranks}.nc: 208 points, 208 computed to tolerance, 0 failed")
+        assert summary.startswith(f"{n_ranks}.nc: 312 points, 312 computed to tolerance, 0 failed")
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results[n_ranks] = result.load().drop_vars("run_time")
     for n_ranks in (1, 2, 4):

@@ -13,6 +13,7 @@ from studyrunner.parts import Parts, record_type
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
+from studyrunner.sharing import Index
 from studyrunner.study import Study
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.variables import ASKED
@@ -34,7 +35,8 @@ def fake_evaluate(
     if isinstance(task, BranchTask):
         yield from fake_branch(task)
     else:
-        yield fake_march(task, facts, seconds)
+        for place in range(task.n_results):
+            yield fake_march(task, facts, 0.0 if place else seconds, place)
 
 
 def fake_branch(task: BranchTask) -> Iterator[StartResult]:
@@ -47,11 +49,12 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
         yield StartResult(position, start, moves=position % 2 == 0, n_unknowns=18)
 
 
-def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0) -> MarchResult:
-    """A history whose values tell the task."""
+def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
+    """A history whose values tell the share of the task."""
     assert isinstance(task.start, tuple)
+    share = task.shares[place]
     fingerprint = float(np.dot(task.start, [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
-    fingerprint += task.wear_coefficient * 1e9 + task.step * 1e-4 + 0.5 * (task.scheme == "implicit")
+    fingerprint += share.wear_coefficient * 1e9 + share.step * 1e-4 + 0.5 * (task.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
@@ -63,7 +66,7 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0)
             values[name] = values[name] >= 0.0
         values[name] = values[name].astype(ASKED[name].dtype)
     return MarchResult(
-        points=task.points,
+        points=share.points,
         outcome=0,
         values=values,
         jump_cycle=np.nan,
@@ -74,7 +77,16 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0)
         fold_frequency=np.nan,
         step_limit=np.inf,
         oscillates=False,
+        share=place,
     )
+
+
+def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
+    """The results of all marches of a study."""
+    for branch in plan.branches:
+        for task in fake_starts(plan, branch.number):
+            for place in range(task.n_results):
+                yield task, fake_march(task, place=place)
 
 
 def without_values(result: MarchResult, outcome: int) -> MarchResult:
@@ -87,7 +99,7 @@ def without_values(result: MarchResult, outcome: int) -> MarchResult:
 
 def fake_parts(study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path) -> Parts:
     """The files of a run that had these results, some in a file."""
-    marches = {task.points: task for line in plan.marches for task in line}
+    marches = march_of_points(plan)
     parts = Parts(folder, record_type(study, FACTS))
     for place, result in enumerate(results):
         parts.add(marches[result.points], result)
@@ -95,6 +107,11 @@ def fake_parts(study: Study, plan: TaskPlan, results: Iterable[MarchResult], fol
             parts.flush()
     parts.flush()
     return parts
+
+
+def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:
+    """The march of each history, which is known by its points."""
+    return {share.points: task for line in plan.marches for task in line for share in task.shares}
 
 
 def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:

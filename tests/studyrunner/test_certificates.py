@@ -16,7 +16,7 @@ from studyrunner.study import Study
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
 from studyrunner.variables import CERTIFICATE
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_histories, march_of_points, without_values
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -35,21 +35,19 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
     plan = build_tasks(study, FACTS.n_displacements)
     rng = np.random.default_rng(7)
     results = []
-    for branch in plan.branches:
-        for task in fake_starts(plan, branch.number):
-            result = fake_march(task)
-            drawn = {name: rng.random(len(study.cycles_kept)).round(1) for name in CERTIFICATE}
-            for values in drawn.values():
-                values[rng.random(values.size) < 0.3] = np.nan
-            stable = np.ones(len(study.cycles_kept), dtype=np.int8)
-            results.append(replace(result, values={**result.values, **drawn, "stable": stable}))
+    for _, result in fake_histories(plan):
+        drawn = {name: rng.random(len(study.cycles_kept)).round(1) for name in CERTIFICATE}
+        for values in drawn.values():
+            values[rng.random(values.size) < 0.3] = np.nan
+        stable = np.ones(len(study.cycles_kept), dtype=np.int8)
+        results.append(replace(result, values={**result.values, **drawn, "stable": stable}))
     return study, results
 
 
 def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
     """The table of results that come in some at a time."""
     plan = build_tasks(study, FACTS.n_displacements)
-    marches = {task.points: task for line in plan.marches for task in line}
+    marches = march_of_points(plan)
     table = CertificateTable(study)
     for some in (results[:1], results[1:6], results[6:]):
         records = pack(record_type(study, FACTS), [(marches[result.points], result) for result in some])

@@ -21,7 +21,7 @@ from studyrunner.results import MarchResult
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_march, fake_parts, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_histories, fake_march, fake_parts, fake_starts, without_values
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -30,13 +30,14 @@ OVERRIDES = (
     "slow_time.outputs=[0, 100, 1000]",
 )
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep", "harmonics")
+SHARED = ("axes.wear_coefficient=[1e-12, 1e-11, 0]", "axes.step=[10, 100]", "axes.scheme=['adaptive', 'implicit']")
 WEAR_RATE = "outputs.variables=['wear_rate', 'outcome']"
 SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 
 def fake_results(*overrides: str) -> list[MarchResult]:
     plan = build_tasks(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
-    return [fake_march(task) for branch in plan.branches for task in fake_starts(plan, branch.number)]
+    return [result for _, result in fake_histories(plan)]
 
 
 def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gathered:
@@ -211,7 +212,7 @@ def test_only_the_variables_asked_for(tmp_path: Path) -> None:
         assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
 
 
-@pytest.mark.parametrize("overrides", [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",)])
+@pytest.mark.parametrize("overrides", [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",), SHARED])
 @pytest.mark.parametrize("bytes_a_slab", [1.0, 3000.0, 1e9], ids=["a point", "some points", "all"])
 def test_the_file_is_the_one_of_the_plain_twin(
     overrides: tuple[str, ...], bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

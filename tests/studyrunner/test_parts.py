@@ -8,19 +8,27 @@ import numpy as np
 import pytest
 
 from studyrunner import parts as parts_module
-from studyrunner.parts import SECONDS_A_FILE, Parts, march_numbers, pack, record_type
+from studyrunner.parts import SECONDS_A_FILE, Parts, histories_of, pack, record_type
 from studyrunner.results import MarchResult
 from studyrunner.study_file import read_study
 from studyrunner.tasks import MarchTask, build_tasks
 from studyrunner.variables import KEPT
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts
+from tests.studyrunner.fakes import FACTS, fake_histories
 
-STUDY = read_study("sdof_slider", ("axes.frequency=[160, 150]", "slow_time.outputs=3", "axes.sweep=['up', 'down']"))
+STUDY = read_study(
+    "sdof_slider",
+    (
+        "axes.frequency=[160, 150]",
+        "slow_time.outputs=3",
+        "axes.sweep=['up', 'down']",
+        "axes.scheme=adaptive",
+        "axes.wear_coefficient=[1e-12, 1e-11]",
+    ),
+)
 
 
 def results() -> list[tuple[MarchTask, MarchResult]]:
-    plan = build_tasks(STUDY, FACTS.n_displacements)
-    return [(task, fake_march(task)) for branch in plan.branches for task in fake_starts(plan, branch.number)]
+    return list(fake_histories(build_tasks(STUDY, FACTS.n_displacements)))
 
 
 def new_parts(folder: Path) -> Parts:
@@ -30,7 +38,7 @@ def new_parts(folder: Path) -> Parts:
 def test_a_record_says_all_that_its_result_does() -> None:
     pairs = results()
     records = pack(record_type(STUDY, FACTS), pairs)
-    assert march_numbers(records) == [task.number for task, _ in pairs]
+    assert histories_of(records) == [(march, share) for march in (0, 1, 3, 2) for share in range(2)]
     for record, (task, result) in zip(records, pairs, strict=True):
         for name in KEPT:
             np.testing.assert_equal(record[name], getattr(result, name))

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.history import WearHistory
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studyrunner import run
@@ -22,6 +21,7 @@ from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.variables import ASKED
 from tests.studyrunner.fakes import fake_evaluate, without_values
+from tests.studyrunner.histories import history
 
 SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axes.scheme=implicit", "-o", "out.nc"]
 
@@ -99,41 +99,6 @@ def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.M
     with xr.open_dataset("out.nc") as bundled, xr.open_dataset("file.nc") as from_file:
         xr.testing.assert_equal(bundled.drop_vars("run_time"), from_file.drop_vars("run_time"))
         assert bundled.attrs["scene_sha256"] == from_file.attrs["scene_sha256"]
-
-
-def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED) -> WearHistory:
-    n = len(cycles)
-    line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
-    return WearHistory(
-        outcome=outcome,
-        cycles=np.array(cycles),
-        worn_volume=line,
-        wear_rate=line,
-        wear_depth=pair,
-        mean_pressure=pair,
-        slip_range=pair,
-        open_fraction=pair,
-        response=(1.0 + pair) * 1j,
-        response_peak=pair,
-        jump_cycle=np.nan,
-        error_estimate=0.0,
-        newton_iterations=7,
-        run_time=0.5,
-        residual=1e-9 * line,
-        penetration=line,
-        tension=line,
-        cone_violation=line,
-        energy_error=line,
-        response_error=line,
-        wear_rate_error=np.full(n, np.nan),
-        harmonics_used=np.arange(n) + 3,
-        samples_used=np.full(n, 64),
-        stable=np.arange(n) < 2,
-        branch=2,
-        fold_frequency=101.5,
-        step_limit=250.0,
-        oscillates=True,
-    )
 
 
 def march_task(*overrides: str) -> MarchTask:

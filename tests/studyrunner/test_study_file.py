@@ -29,7 +29,13 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
         "scheme": ("implicit",),
         "sweep": ("up",),
     }
-    assert study.solver.model_dump() == {"harmonics": "auto", "samples": "auto", "tolerance": 1e-8, "rtol": 1e-2}
+    assert study.solver.model_dump() == {
+        "harmonics": "auto",
+        "samples": "auto",
+        "tolerance": 1e-8,
+        "rtol": 1e-2,
+        "shortcuts": True,
+    }
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables

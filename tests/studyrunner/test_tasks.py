@@ -17,6 +17,7 @@ from studyrunner.study_file import read_study
 from studyrunner.tasks import Settings, TaskPlan, build_tasks
 from studyrunner.variables import CERTIFICATE
 
+SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
     "axes.frequency=[160, 150, 155]",
     "axes.wear_coefficient=[1e-11, 0]",
@@ -51,7 +52,8 @@ def test_one_branch_a_line_of_frequencies() -> None:
 
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
-    study, plan = plan_of(*GRID)
+    study, plan = plan_of(*GRID, *SHARED)
+    assert any(len(task.shares) > 1 for task in plan.marches[0])
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         for task in line:
             assert task.branch == branch.number
@@ -63,9 +65,11 @@ def test_points_know_their_task() -> None:
                 assert values["excitation_amplitude"] == branch.excitation_amplitude
                 assert values["sweep"] == branch.sweep
                 assert values["harmonics"] == task.settings.harmonics == branch.settings.harmonics
-                assert values["wear_coefficient"] == task.wear_coefficient
+                (share,) = (share for share in task.shares if point in share.points)
+                assert values["wear_coefficient"] == share.wear_coefficient
                 if not task.held:
-                    assert (values["step"], values["scheme"]) == (task.step, task.scheme)
+                    assert values["scheme"] == task.scheme
+                    assert values["step"] == share.step or task.scheme == "adaptive"
 
 
 def test_nothing_wears_without_a_wear_coefficient() -> None:

@@ -1,0 +1,45 @@
+"""A wear history with numbers that are easy to follow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.history import WearHistory
+from solver.outcome import Outcome
+
+
+def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED) -> WearHistory:
+    """At these cycle counts: variables count from 0, or from what is theirs."""
+    n = len(cycles)
+    line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
+    return WearHistory(
+        outcome=outcome,
+        cycles=np.array(cycles),
+        worn_volume=line,
+        wear_rate=line,
+        wear_depth=pair,
+        mean_pressure=pair,
+        slip_range=pair,
+        open_fraction=pair,
+        response=(1.0 + pair) * 1j,
+        response_peak=pair,
+        jump_cycle=np.nan,
+        error_estimate=0.0,
+        newton_iterations=7,
+        run_time=0.5,
+        residual=1e-9 * line,
+        penetration=line,
+        tension=line,
+        cone_violation=line,
+        energy_error=line,
+        response_error=line,
+        wear_rate_error=np.full(n, np.nan),
+        harmonics_used=np.arange(n) + 3,
+        samples_used=np.full(n, 64),
+        stable=np.arange(n) < 2,
+        volume_error=0.3 * line,
+        branch=2,
+        fold_frequency=101.5,
+        step_limit=250.0,
+        oscillates=True,
+    )

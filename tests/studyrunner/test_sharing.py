@@ -1,0 +1,261 @@
+"""Which points share a march, and what each of them is given of it."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver.history import StartState, WearHistory
+from solver.outcome import Outcome
+from solver.settings import Resolution
+from studyrunner.evaluate import build_result, march
+from studyrunner.results import MarchResult
+from studyrunner.sharing import Share, march_counts, share_histories
+from studyrunner.study import Study
+from studyrunner.study_file import read_study
+from studyrunner.tasks import MarchTask, build_tasks
+from tests.studyrunner.histories import history
+
+WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
+STEPS = ["100", "150", "200", "300", "700", "1000", "2e4", "3e4"]
+SCHEMES = ["implicit", "explicit", "adaptive"]
+
+
+def study_of(*overrides: str) -> Study:
+    return read_study("sdof_slider", ["axes.frequency=150", "slow_time.cycles=20000", *overrides])
+
+
+def study_with(wears: list[str], steps: list[str], schemes: list[str], *overrides: str) -> Study:
+    axes = {"wear_coefficient": wears, "step": steps}
+    texts = [f"axes.{name}=[{', '.join(values)}]" for name, values in axes.items()]
+    return study_of(*texts, f"axes.scheme={schemes}", *overrides)
+
+
+def some(values: list[str]) -> st.SearchStrategy[list[str]]:
+    return st.lists(st.sampled_from(values), min_size=1, unique=True)
+
+
+def alike(study: Study, wears: list[Fraction], steps: list[Fraction], one: tuple, other: tuple) -> bool:
+    """Whether two choices have the same history by one march, in exact arithmetic."""
+    (wear, step, scheme), (wear2, step2, scheme2) = one, other
+    if wears[wear] == 0 or wears[wear2] == 0:
+        return wears[wear] == wears[wear2]
+    if scheme != scheme2:
+        return False
+    word = study.axes.scheme[scheme]
+    if word == "adaptive":
+        return True
+    if word == "explicit" and study.slow_time.largest_depth is not None:
+        return wear == wear2
+    if wears[wear] * steps[step] != wears[wear2] * steps[step2]:
+        return False
+    farthest = max(w for w, h in itertools.product(wears, steps) if w * h == wears[wear] * steps[step])
+    ends = [Fraction(20000) / steps[h] for w, h in ((wear, step), (wear2, step2)) if wears[w] != farthest]
+    return all(end.denominator == 1 for end in ends)
+
+
+@given(some(WEARS), some(STEPS), some(SCHEMES), st.booleans())
+def test_histories_are_shared_where_they_are_the_same(
+    wears: list[str], steps: list[str], schemes: list[str], by_depth: bool
+) -> None:
+    overrides = ["slow_time.largest_depth=1e-6"] if by_depth else []
+    study = study_with(wears, steps, schemes, *overrides)
+    sharing = share_histories(study)
+    march_of = {
+        choice: number
+        for number, found in enumerate(sharing.marches)
+        for choice in itertools.chain.from_iterable(found.shares)
+    }
+    choices = list(itertools.product(*(range(len(axis)) for axis in (wears, steps, schemes))))
+    assert sorted(march_of) == choices
+    exact = [[Fraction(text) for text in axis] for axis in (wears, steps)]
+    for one, other in itertools.combinations(choices, 2):
+        assert (march_of[one] == march_of[other]) == alike(study, *exact, one, other)
+    assert sum(item.n_points for item in sharing.left_out(1, len(choices))) == len(choices) - len(sharing.marches)
+    for found in sharing.marches:
+        by_share = [{study.axes.wear_coefficient[wear] for wear, _, _ in share} for share in found.shares]
+        assert all(len(of_one) == 1 for of_one in by_share)
+        descending = [min(of_one) for of_one in by_share]
+        assert descending == sorted(descending, reverse=True)
+        assert found.held == (descending[0] == 0.0)
+
+
+@given(some(WEARS), some(STEPS), some(SCHEMES), st.sampled_from(["0", "20000"]))
+def test_without_shortcuts_every_point_has_its_own_march(
+    wears: list[str], steps: list[str], schemes: list[str], cycles: str
+) -> None:
+    overrides = ("solver.shortcuts=false", f"slow_time.cycles={cycles}", "slow_time.largest_depth=1e-6")
+    plan = build_tasks(study_with(wears, steps, schemes, *overrides), 2)
+    (line,) = plan.marches
+    assert plan.left_out == ()
+    assert len(line) == plan.n_points == len(wears) * len(steps) * len(schemes)
+    assert {len(task.points) for task in line} == {1}
+    assert not any(task.held for task in line)
+    assert all(task.cost > 0.0 for task in line)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (("axes.wear_coefficient=[0, 1e-11]", "axes.step=[1, 2, 3]"), {"wear_coefficient = 0": 5}),
+        (("axes.step=[1, 2, 3]", "axes.scheme=['adaptive', 'implicit']"), {"the adaptive scheme chooses": 2}),
+        (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.scheme=adaptive"), {"the adaptive scheme takes the same": 1}),
+        (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.step=[100, 200]"), {"wear_coefficient times step": 2}),
+        (("axes.step=[1, 2]", "axes.scheme=adaptive", "slow_time.cycles=0"), {"only the unworn states": 1}),
+        (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.step=[100, 201]"), {}),
+    ],
+)
+def test_what_is_left_out_has_a_reason(overrides: tuple[str, ...], expected: dict[str, int]) -> None:
+    study = study_of("axes.frequency=[150, 160]", "axes.scheme=['implicit', 'explicit']", *overrides)
+    found = {item.reason: item.n_points for item in build_tasks(study, 2).left_out}
+    assert len(found) == len(expected)
+    for (reason, n_points), (begins, n_a_frequency) in zip(found.items(), expected.items(), strict=True):
+        assert reason.startswith(begins)
+        assert n_points == 2 * n_a_frequency
+
+
+@given(st.integers(1, 1000), st.integers(1, 1000), st.floats(1e-3, 1e6), st.lists(st.integers(1, 10**6), min_size=1))
+def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
+    faster: int, slower: int, step: float, whole: list[int]
+) -> None:
+    """For the march, whose counts are sums of its steps, and for its shares, whose cycle counts have round-off."""
+    own, other = Share(1e-12 * faster, step, ((0,),)), Share(1e-12 * slower, step * faster / slower, ((1,),))
+    cycles = tuple(n * other.step for n in sorted(set(whole)))
+    counts = march_counts(cycles, other, own, steps_of_given_length=True)
+    for n, count in zip(sorted(set(whole)), counts, strict=True):
+        assert n - 1 < count / step <= n * (1.0 - 5e-13)
+        assert count / step == pytest.approx(n, rel=2e-12)
+    assert march_counts(cycles, own, own, steps_of_given_length=True) == cycles
+
+
+def test_counts_of_other_wear_coefficients_are_as_many_times_larger() -> None:
+    own, other = Share(1e-11, 100.0, ((0,),)), Share(2.5e-12, 400.0, ((1,),))
+    for steps_of_given_length in (False, True):
+        counts = march_counts((0.0, 10.0, 130.0), other, own, steps_of_given_length)
+        assert counts == pytest.approx((0.0, 2.5, 32.5), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "n_branches"),
+    [
+        ((), 1),
+        (("solver.harmonics=auto",), 3),
+        (("solver.samples=auto",), 3),
+        (("axes.scheme=['implicit', 'adaptive']",), 3),
+        (("solver.shortcuts=false",), 3),
+        (("axes.harmonics=[1, 'auto', 5]",), 5),
+    ],
+)
+def test_rtol_shares_branches_where_nothing_uses_it(overrides: tuple[str, ...], n_branches: int) -> None:
+    fixed = ("axes.rtol=[1e-3, 1e-2, 1e-1]", "axes.frequency=[150, 160]", "solver.harmonics=3", "solver.samples=64")
+    plan = build_tasks(study_of(*fixed, "axes.wear_coefficient=[0, 1e-12, 1e-11]", *overrides), 2)
+    assert len(plan.branches) == n_branches
+    points = Counter(point for line in plan.marches for task in line for point in task.points)
+    assert len(points) == points.total() == plan.n_points
+    n_marches = sum(len(line) for line in plan.marches)
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - n_marches
+    assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_branches in (1, 5))
+
+
+ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")
+COUNTS = [0.0, 2.0, 4.0, 5.0, 10.0]
+
+
+def shared_task() -> MarchTask:
+    """A march of three histories at cycles 0 and 10, which are read at 0, 10; 0, 4; 0, 2 cycles of the first."""
+    study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2")
+    ((task,),) = build_tasks(study, 2).marches
+    start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
+    return replace(task, start=start)
+
+
+def test_each_share_has_its_own_counts_and_rates_back() -> None:
+    task = shared_task()
+    found = [build_result(task, history(COUNTS), place) for place in range(3)]
+    assert [result.share for result in found] == [0, 1, 2]
+    assert [result.points for result in found] == [share.points for share in task.shares]
+    assert [{point[1] for point in result.points} for result in found] == [{1}, {2}, {0}]
+    assert all(len(result.points) == 2 for result in found)
+    assert [result.values["worn_volume"].tolist() for result in found] == [[0.0, 4.0], [0.0, 2.0], [0.0, 1.0]]
+    assert [result.values["harmonics_used"].tolist() for result in found] == [[3, 7], [3, 5], [3, 4]]
+    np.testing.assert_allclose([result.values["wear_rate"][-1] for result in found], [4.0, 0.4 * 2.0, 0.2 * 1.0])
+    np.testing.assert_allclose([result.step_limit for result in found], [250.0, 250.0 / 0.4, 250.0 / 0.2])
+    assert all((result.newton_iterations, result.run_time, result.branch) == (7, 0.5, 2) for result in found)
+
+
+@pytest.mark.parametrize(("jump", "expected"), [(1.0, [1, 2.5, 5]), (2.0, [2, 5, np.nan]), (9.0, [9, np.nan, np.nan])])
+def test_a_share_does_not_know_of_jumps_after_its_last_count(jump: float, expected: list[float]) -> None:
+    jumped = replace(history(COUNTS), jump_cycle=jump)
+    found = [build_result(shared_task(), jumped, place).jump_cycle for place in range(3)]
+    np.testing.assert_allclose(found, expected)
+
+
+def test_the_error_of_a_share_is_that_at_its_own_end() -> None:
+    found = [build_result(shared_task(), history(COUNTS), place).error_estimate for place in range(3)]
+    np.testing.assert_allclose(found, [0.0, 0.3 * 2.0 / 2.0, 0.3 * 1.0 / 1.0])
+    at_rest = replace(history(COUNTS), worn_volume=np.array([0.0, 0.0, 0.0, 0.0, 1.0]))
+    assert build_result(shared_task(), at_rest, 2).error_estimate == 0.0
+
+
+def marched(
+    monkeypatch: pytest.MonkeyPatch, change: Callable[[WearHistory, float], WearHistory]
+) -> tuple[list[MarchResult], list[tuple[float, list[float]]]]:
+    """Results of the shared task with a stand-in for the march; and wear coefficient and counts of all marches."""
+    calls = []
+
+    def fake(*arguments: object, largest_depth: float | None) -> WearHistory:
+        wear, cycles = arguments[3], arguments[6]
+        assert isinstance(wear, float)
+        assert isinstance(cycles, np.ndarray)
+        calls.append((wear, cycles.tolist()))
+        return change(history(cycles.tolist()), wear)
+
+    monkeypatch.setattr("solver.march.march_wear", fake)
+    task = shared_task()
+    return list(march(None, 0.5, task)), calls  # type: ignore[arg-type]
+
+
+def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, calls = marched(monkeypatch, lambda at, _: replace(at, oscillates=False))
+    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
+    assert [result.values["worn_volume"][-1] for result in found] == [3.0, 2.0, 1.0]
+
+
+def fail_late(at: WearHistory, wear: float) -> WearHistory:
+    outcome = Outcome.CONVERGED if wear < 1e-11 else Outcome.MARCH_FAILED
+    return replace(at, outcome=outcome, oscillates=False)
+
+
+def oscillate_late(at: WearHistory, wear: float) -> WearHistory:
+    return replace(at, oscillates=wear >= 1e-11)
+
+
+@pytest.mark.parametrize("change", [fail_late, oscillate_late])
+def test_what_happens_late_does_not_happen_to_those_that_end_before(
+    change: Callable[[WearHistory, float], WearHistory], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, calls = marched(monkeypatch, change)
+    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0]), (4e-12, [0.0, 10.0]), (2e-12, [0.0, 10.0])]
+    last = change(history([0.0]), 1e-11)
+    assert [result.outcome for result in found] == [int(last.outcome), 0, 0]
+    assert [result.oscillates for result in found] == [last.oscillates, False, False]
+    assert [result.share for result in found] == [0, 1, 2]
+    for result in found[1:]:
+        assert result.values["worn_volume"].tolist() == result.values["wear_rate"].tolist() == [0.0, 1.0]
+        assert result.step_limit == 250.0
+
+
+def test_only_what_is_asked_for_and_the_certificates_are_sent() -> None:
+    study = study_of("outputs.variables=['worn_volume']", "slow_time.outputs=2", "axes.scheme=implicit")
+    ((task,),) = build_tasks(study, 2).marches
+    sent = build_result(task, history([0.0, 20000.0])).values
+    assert tuple(sent) == task.variables
+    assert not {"wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_amplitude"} & set(sent)

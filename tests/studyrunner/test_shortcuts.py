@@ -1,0 +1,93 @@
+"""What is left out because it is the same is the same: a study with shortcuts against one without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.cli import main
+from studyrunner.study_file import read_study
+from studyrunner.variables import ASKED, CERTIFICATE, KEPT
+
+STUDY = [
+    "axes.frequency=[100.0, 160.0]",
+    "axes.wear_coefficient=[1e-12, 0, 1e-11, 4e-12]",
+    "axes.step=[100, 250, 1000]",
+    "axes.scheme=['implicit', 'explicit', 'adaptive']",
+    "slow_time.cycles=4000",
+    "slow_time.outputs=[0, 130, 1000, 4000]",
+]
+BY_DEPTH = ["axes.wear_coefficient=1e-11", "slow_time.largest_depth=2e-8"]
+NO_CYCLES = ["slow_time.cycles=0", "slow_time.outputs=1"]
+EFFORT = ("newton_iterations", "run_time")
+FIXED = ["implicit", "explicit"]
+
+
+def run(folder: Path, *overrides: str) -> xr.Dataset:
+    path = folder / "out.nc"
+    changes = [word for change in (*STUDY, *overrides) for word in ("--set", change)]
+    assert main(["sdof_slider", *changes, "-o", str(path)]) == 0
+    with xr.open_dataset(path) as result:
+        return result.load()
+
+
+def both_ways(folder: Path, *overrides: str) -> tuple[xr.Dataset, xr.Dataset]:
+    """The results with and without shortcuts."""
+    return run(folder, *overrides), run(folder, *overrides, "solver.shortcuts=false")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, xr.Dataset]:
+    return both_ways(tmp_path_factory.mktemp("shortcuts"))
+
+
+def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
+    """To round-off; violations are relative themselves, and what is left of them where they vanish is round-off."""
+    round_off = 1e-9 if name in CERTIFICATE else 0.0
+    found, expected = short[name].astype(float), long[name].astype(float)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=round_off, err_msg=name)
+
+
+COMPARED = [name for name in (*ASKED, *KEPT) if name not in EFFORT]
+
+
+@pytest.mark.parametrize("name", COMPARED)
+def test_steps_of_given_length(name: str, results: tuple[xr.Dataset, xr.Dataset]) -> None:
+    short, long = (result.sel(scheme=FIXED) for result in results)
+    assert_same(name, short, long)
+
+
+def test_adaptive_steps_for_another_wear_coefficient(results: tuple[xr.Dataset, xr.Dataset]) -> None:
+    short, long = (result.sel(scheme="adaptive") for result in results)
+    for name in COMPARED:
+        assert_same(name, short, long)
+
+
+@pytest.mark.parametrize("name", COMPARED)
+def test_adaptive_steps_whatever_the_step_axis_says(name: str, results: tuple[xr.Dataset, xr.Dataset]) -> None:
+    short, long = (result.sel(scheme="adaptive", wear_coefficient=[0, 1e-11]) for result in results)
+    assert_same(name, short, long)
+
+
+@pytest.mark.parametrize("overrides", [BY_DEPTH, NO_CYCLES], ids=["largest depth", "no cycles"])
+def test_other_reasons(overrides: list[str], tmp_path: Path) -> None:
+    short, long = both_ways(tmp_path, *overrides, "axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")
+    for name in COMPARED:
+        assert_same(name, short, long)
+
+
+def test_the_result_says_whether_there_were_shortcuts(results: tuple[xr.Dataset, xr.Dataset], tmp_path: Path) -> None:
+    for result, shortcuts in zip(results, (True, False), strict=True):
+        (tmp_path / "again.toml").write_text(result.attrs["study"], encoding="utf-8")
+        assert read_study(str(tmp_path / "again.toml")).solver.shortcuts is shortcuts
+
+
+def test_points_wear_at_all(results: tuple[xr.Dataset, xr.Dataset]) -> None:
+    """What is compared is no row of zeros."""
+    for result in results:
+        worn = result.worn_volume.isel(cycle=-1)
+        assert (worn.sel(frequency=160.0).where(result.wear_coefficient > 0.0, drop=True) > 0.0).all()
+        assert (worn.sel(wear_coefficient=0.0) == 0.0).all()
