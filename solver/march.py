@@ -87,7 +87,8 @@ def march_wear(
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         step_limit=march.step_limit if march.step_limit > 0.0 else float("inf"),
-        oscillates=wear_oscillates(march.rates) or march.pairs_oscillate(),
+        # what alternates with the other schemes are small corners of the wear rate, not the steps
+        oscillates=scheme == "explicit" and (wear_oscillates(march.rates) or march.pairs_oscillate()),
     )
 
 
