@@ -3,17 +3,20 @@
 The error of a state is estimated by solving it again with more harmonics and with more samples, each warm started: what
 changes is the error, up to the rest of the series (`SAFETY`). Automatic settings go up, one or the other, until the
 estimate is below `rtol`; a state that carries no even harmonics goes on without them, and one in which nothing slips
-or opens keeps the first harmonic alone, which is then exact.
+or opens keeps the first harmonic alone, which is then exact. Masses that creep are brought to rest first (`creep`), and
+where a warm start with more harmonics is thrown off the state is led to them (`enrich`), as far as that is cheap.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
+from solver.creep import creeps, rest_masses
+from solver.enrich import lead_to, start_with_tail
 from solver.factor import FEW_ROWS
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
@@ -25,6 +28,8 @@ from solver.settings import Resolution, all_orders, samples_for
 
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
 MOST_SAMPLES = 8192
+MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
+MOST_LEADS = 5  # ways to more harmonics in one refinement
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
 MOST_REFINEMENT = 200  # iterations of one refinement in all
 FEW_ITERATIONS = 20  # where they are dear
@@ -36,6 +41,7 @@ HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 t
 NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
 SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
+CREEP = 0.1  # of rtol: share of the slip work that may be creep
 SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
 SYMMETRIC = 1e-9
 AIM = 0.8  # of rtol: an estimate is one within a factor
@@ -88,7 +94,9 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
     """
     settings = case.settings
     here = _Level(case, case.joint(omega, excitation_amplitude), point)
-    most = effort.iterations + MOST_REFINEMENT
+    here = here.at_rest(effort)
+    begun = effort.iterations
+    leads = MOST_LEADS
     while True:
         if _nothing_happens(here.point.evaluation):
             if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
@@ -100,6 +108,13 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         resolution = here.case.resolution
         by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort)
+        above = _on_ladder(resolution, 1)
+        cheap = here.unknowns(above) <= DEAR and _allowed(here, above)
+        if richer is None and settings.harmonics == "auto" and leads and cheap:
+            # impacts: a warm start with more harmonics is thrown off, though they have the state
+            leads -= 1
+            richer = here.led_to(above, effort)
+            by_harmonics = by_harmonics if richer is None else here.difference(richer).times(NEAR_SAFETY)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
             known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
@@ -112,13 +127,19 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         more_harmonics = settings.harmonics == "auto" and (not holds or by_harmonics.largest > by_samples.largest / 3.0)
         wanted = resolution
         if more_harmonics:
-            higher = _on_ladder(resolution, 1)
+            higher = above
             wanted = higher if settings.samples == "auto" else Resolution(higher.orders, resolution.samples)
         if more_samples:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
+        most = begun + (MOST_CHEAP if here.unknowns(_on_ladder(resolution, 2)) <= DEAR else MOST_REFINEMENT)
         if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
-            next_level = finer if finer is not None and not more_harmonics else here.solve_at(wanted, effort)
+            if finer is not None and not more_harmonics:
+                next_level = finer
+            elif richer is not None and richer.case.resolution == wanted:
+                next_level = richer
+            else:
+                next_level = here.solve_at(wanted, effort)
             if next_level is None and settings.harmonics == settings.samples and richer is not None:
                 next_level = richer if _allowed(here, richer.case.resolution) else None
         if next_level is None:
@@ -160,15 +181,55 @@ class _Level:
 
     def solve_at(self, resolution: Resolution, effort: Effort) -> _Level | None:
         """The same state with other harmonics and samples; None where it is not found."""
+        return self._transferred(self.case, self.point.evaluation, resolution, effort)
+
+    def unknowns(self, resolution: Resolution) -> int:
+        """Unknowns of the balance with other harmonics."""
+        return self.joint.slots.size * (2 * len(resolution.orders) + 1)
+
+    def led_to(self, resolution: Resolution, effort: Effort) -> _Level | None:
+        """The same state with more harmonics, these raised from nothing; None where that way ends."""
+        if 2 * resolution.highest < self.case.resolution.samples:
+            case = self.case.at(resolution)
+            joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+            level = self._solved(
+                case, joint, *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders), effort
+            )
+            if level is not None:
+                return level
+        led = lead_to(self.case, self.joint, self.point.evaluation, resolution, effort)
+        if led is None:
+            return None
+        return self._transferred(replace(self.case, resolution=resolution), led, resolution, effort)
+
+    def _transferred(self, old: Case, evaluation: Evaluation, resolution: Resolution, effort: Effort) -> _Level | None:
+        """State found from one with other harmonics or with the penalty of another case."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = transfer(case, joint, self.point.evaluation, self.case.resolution.orders)
+        return self._solved(case, joint, *transfer(case, joint, evaluation, old.resolution.orders), effort)
+
+    def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, effort: Effort) -> _Level | None:
         most = MOST_ITERATIONS if start.size <= DEAR else FEW_ITERATIONS
         result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, most)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
-        return _Level(case, joint, point)
+        # the mean position of a mass depends a little on the harmonics
+        return _Level(case, joint, point).at_rest(effort)
+
+    def at_rest(self, effort: Effort) -> _Level:
+        """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
+        settings = self.case.settings
+        share = CREEP * settings.rtol
+        if not creeps(self.joint, self.point.evaluation, share):
+            return self
+        rested = rest_masses(self.joint, self.point, share, settings.tolerance, effort)
+        return _Level(self.case, self.joint, rested)
+
+    def least_work(self) -> float:
+        """Slip work, N m, below which a relative error of it says nothing: a share of what the excitation does."""
+        motion = self.joint.to_relative(self.point.evaluation.displacement_h)
+        return SMALL_WORK * abs(self.joint.structure.input_work(motion))
 
     def without_even(self, effort: Effort) -> _Level | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
@@ -199,7 +260,7 @@ class _Level:
         """
         for steps, safety in ((2, HARMONICS_SAFETY), (1, NEAR_SAFETY), (-1, HARMONICS_SAFETY)):
             other = _on_ladder(self.case.resolution, steps)
-            affordable = self.joint.slots.size * (2 * len(other.orders) + 1) <= MOST_COMPARED
+            affordable = self.unknowns(other) <= MOST_COMPARED
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = self.solve_at(other, effort)
                 if level is not None:
@@ -247,9 +308,7 @@ class _Level:
         mine, its = self.response(), better.response()
         response = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), better.least_response())
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
-        # where friction takes next to nothing, a relative error of it says nothing
-        input_work = better.joint.structure.input_work(better.joint.to_relative(better.point.evaluation.displacement_h))
-        least = SMALL_WORK * abs(input_work)
+        least = better.least_work()
         if max(its_slip, mine_slip) <= 1e-3 * least:
             return Estimate(response, 0.0)
         # no wear rate is surer than the motion that it comes from
@@ -296,8 +355,7 @@ def _fewer(case: Case) -> Resolution:
 
 
 def _allowed(here: _Level, resolution: Resolution) -> bool:
-    unknowns = here.joint.slots.size * (2 * len(resolution.orders) + 1)
     if not here.case.model.holds(resolution.highest):
         return False
     most = MOST_OF_FEW if here.joint.slots.size <= FEW_ROWS else MOST_UNKNOWNS
-    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and unknowns <= most
+    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and here.unknowns(resolution) <= most

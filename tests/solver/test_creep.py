@@ -1,0 +1,86 @@
+"""Marched masses that creep come to rest, and what a state without creep is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import adapt
+from solver.balance import Balance
+from solver.certificate import certify
+from solver.continuation import follow_branch
+from solver.creep import creep_work, creeps, rest_masses
+from solver.history import StartState
+from solver.joint import Joint, build_case
+from solver.outcome import Outcome
+from solver.path import Effort, PathPoint
+from solver.settings import SolverSettings
+from tests.random_scenes import random_scene
+
+SHAKEN_DOWN = 160  # seed: the vibration lets the mass slip until it sticks
+SLIDING_ON = 178  # seed: it goes on slipping to and fro
+TOLERANCE = SolverSettings().tolerance
+
+
+def started(seed: int) -> StartState:
+    scene = random_scene(seed)
+    frequencies = np.array([scene.frequency_hz])
+    return next(follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings()))[1]
+
+
+def creeping(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoint]:
+    """The first state that is refined, before anything is done about its creep."""
+    seen: list[tuple[Joint, PathPoint]] = []
+
+    def note(level: adapt._Level, _: Effort) -> adapt._Level:
+        seen.append((level.joint, level.point))
+        return level
+
+    with monkeypatch.context() as patched:
+        patched.setattr(adapt._Level, "at_rest", note)
+        started(seed)
+    return seen[0]
+
+
+def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.MonkeyPatch) -> None:
+    joint, point = creeping(SHAKEN_DOWN, monkeypatch)
+    assert creep_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
+    assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
+    rested = rest_masses(joint, point, 1e-3, TOLERANCE, Effort())
+    assert rested.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
+    assert rested.evaluation.scaled_residual() <= TOLERANCE
+    assert certify(joint, rested.evaluation).holds(TOLERANCE)
+
+
+def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    joint, point = creeping(SLIDING_ON, monkeypatch)
+    rested = rest_masses(joint, point, 1e-3, TOLERANCE, Effort())
+    assert not creeps(joint, rested.evaluation, 1e-3)
+    assert rested.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
+    # the next state starts from where this one stays
+    again = rest_masses(joint, rested, 1e-3, TOLERANCE, Effort())
+    assert again is rested
+    middle = rested.evaluation.displacement_h[:, 1:, 0] - rested.evaluation.history
+    moved = np.abs(rested.evaluation.displacement_h[:, 1:, 1:]).max()
+    assert np.abs(middle[joint.penalty.inertial]).max() < 0.1 * moved
+
+
+@pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
+def test_states_whose_slip_was_creep_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert started(seed).outcome is Outcome.CONVERGED
+    monkeypatch.setattr(adapt._Level, "at_rest", lambda level, _: level)
+    assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
+
+
+def test_wear_of_other_harmonics_is_not_that_of_creep_to_where_they_rest() -> None:
+    # at rest with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
+    start = started(710)
+    assert start.outcome is Outcome.CONVERGED
+    assert start.state is not None
+    scene = random_scene(710)
+    case = build_case(scene.model, scene.friction, start.penalty_omega, SolverSettings(), start.resolution)
+    joint = case.joint(start.state.omega, scene.amplitude)
+    state = start.state
+    balance = Balance(joint, state.start_history, state.wear_depth, np.zeros_like(state.wear_depth))
+    evaluation = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    assert evaluation.slip_work.sum() < 1e-13

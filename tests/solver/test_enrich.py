@@ -1,0 +1,81 @@
+"""States led to more harmonics: the ends of the way, and what is found along it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import adapt
+from solver.continuation import follow_branch
+from solver.enrich import _compliances, _Way, lead_to, start_with_tail
+from solver.harmonics import change_orders
+from solver.joint import Case
+from solver.outcome import Outcome
+from solver.path import Effort, PathPoint
+from solver.settings import Resolution, SolverSettings, all_orders
+from tests.random_scenes import random_scene
+from tests.solver.models import OMEGA, random_model
+from tests.solver.test_adapt import FRICTION, SLIDER_OMEGA, SLIPPING, response, slider, solved_at, started
+
+RICH = Resolution(all_orders(9), 256)
+THROWN_OFF = 53  # seed: a warm start with more harmonics fails
+
+
+def states() -> list[tuple[Case, float, float, PathPoint]]:
+    """A marched mass, and an elastic joint with pairs of every kind."""
+    fixed = SolverSettings(5, 256)
+    case, point = slider(fixed)
+    elastic, other = started(random_model(2), FRICTION, OMEGA, SLIPPING, fixed)
+    return [(case, SLIDER_OMEGA, 10.0, point), (elastic, OMEGA, SLIPPING, other)]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_way_begins_at_the_state_and_ends_at_the_balance(which: int) -> None:
+    case, omega, amplitude, point = states()[which]
+    joint = replace(case, resolution=RICH).joint(omega, amplitude)
+    new = np.arange(5, 9)
+    way = _Way(joint, point.evaluation.history, point.evaluation.wear_depth, new, *_compliances(joint, new))
+    start = change_orders(point.evaluation.predicted_h, case.resolution.orders, RICH.orders)
+    assert way.at(0.0, point.history).evaluate(start).scaled_residual() <= 2e-8
+    assert way.at(1.0, point.history).joint.structure is joint.structure
+    nearly = way.at(1.0 - 1e-9, point.history).evaluate(start).residual
+    whole = way.at(1.0, point.history).evaluate(start).residual
+    assert nearly == pytest.approx(whole, rel=1e-5, abs=1e-6 * np.abs(whole).max())
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_state_is_led_to_the_one_that_a_warm_start_finds(which: int) -> None:
+    case, omega, amplitude, point = states()[which]
+    case = replace(case, settings=SolverSettings())
+    led = adapt._Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
+    assert led is not None
+    best = solved_at(case, omega, amplitude, point, RICH)
+    ours = response(led.case, omega, amplitude, led.point)
+    assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
+    along = lead_to(case, case.joint(omega, amplitude), point.evaluation, RICH, Effort())
+    assert along is not None
+    assert along.scaled_residual() <= case.settings.tolerance
+
+
+def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
+    case, omega, amplitude, point = states()[0]
+    other = case.at(RICH)
+    joint = other.joint(omega, amplitude)
+    balance, tailed = start_with_tail(joint, point.evaluation, case.resolution.orders)
+    plain, padded = adapt.transfer(other, joint, point.evaluation, case.resolution.orders)
+    assert balance.evaluate(tailed).scaled_residual() < plain.evaluate(padded).scaled_residual()
+
+
+def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = random_scene(THROWN_OFF)
+
+    def outcome() -> Outcome:
+        frequencies = np.array([scene.frequency_hz])
+        states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
+        return next(states)[1].outcome
+
+    assert outcome() is Outcome.CONVERGED
+    monkeypatch.setattr(adapt, "MOST_LEADS", 0)
+    assert outcome() is Outcome.INACCURATE
