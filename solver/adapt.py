@@ -21,12 +21,12 @@ from solver.factor import FEW_ROWS
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
 from solver.kernels import SEPARATED, STICK
+from solver.ladder import LADDER, fewer, on_ladder
 from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, final_history, solve_balance
-from solver.settings import Resolution, all_orders, samples_for
+from solver.settings import Resolution
 
-LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
 MOST_SAMPLES = 8192
 MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
 MOST_LEADS = 5  # ways to more harmonics in one refinement
@@ -108,7 +108,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         resolution = here.case.resolution
         by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort)
-        above = _on_ladder(resolution, 1)
+        above = on_ladder(resolution, 1)
         cheap = here.unknowns(above) <= DEAR and _allowed(here, above)
         if richer is None and settings.harmonics == "auto" and leads and cheap:
             # impacts: a warm start with more harmonics is thrown off, though they have the state
@@ -132,7 +132,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if more_samples:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
-        most = begun + (MOST_CHEAP if here.unknowns(_on_ladder(resolution, 2)) <= DEAR else MOST_REFINEMENT)
+        most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= DEAR else MOST_REFINEMENT)
         if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
             if finer is not None and not more_harmonics:
                 next_level = finer
@@ -151,7 +151,7 @@ def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: i
     """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
     here = _Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
     while here.joint.slots.size * (2 * len(here.case.resolution.orders) + 1) > most:
-        lower = _fewer(here.case)
+        lower = fewer(here.case.resolution, here.case.settings)
         level = here.solve_at(lower, effort) if lower != here.case.resolution else None
         if level is None:
             return None
@@ -259,7 +259,7 @@ class _Level:
         down, which is larger.
         """
         for steps, safety in ((2, HARMONICS_SAFETY), (1, NEAR_SAFETY), (-1, HARMONICS_SAFETY)):
-            other = _on_ladder(self.case.resolution, steps)
+            other = on_ladder(self.case.resolution, steps)
             affordable = self.unknowns(other) <= MOST_COMPARED
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = self.solve_at(other, effort)
@@ -274,7 +274,7 @@ class _Level:
         """
         here, enough = self, 0.5 * self.case.settings.rtol
         while estimate.largest <= SPARE * enough:
-            lower = _fewer(here.case)
+            lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, effort) if lower != here.case.resolution else None
             if level is None:
                 break
@@ -329,29 +329,6 @@ def _half_wave_symmetric(evaluation: Evaluation) -> bool:
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
     return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
-
-
-def _on_ladder(resolution: Resolution, steps: int) -> Resolution:
-    """Up (or with -1 down) the ladder, with samples enough for it; odd harmonics stay odd."""
-    if steps > 0:
-        above = [step for step in LADDER if step > resolution.highest]
-        highest = above[steps - 1] if len(above) >= steps else (steps + 1) * resolution.highest
-    else:
-        highest = max((step for step in LADDER if step < resolution.highest), default=resolution.highest)
-    orders = all_orders(highest)
-    if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
-        orders = orders[::2]
-    return Resolution(orders, max(resolution.samples, samples_for(highest)))
-
-
-def _fewer(case: Case) -> Resolution:
-    """One step down: harmonics and samples, whichever are automatic."""
-    resolution = case.resolution
-    orders = _on_ladder(resolution, -1).orders if case.settings.harmonics == "auto" else resolution.orders
-    samples = resolution.samples
-    if case.settings.samples == "auto":
-        samples = max(samples // 2, samples_for(orders[-1]))
-    return Resolution(orders, samples)
 
 
 def _allowed(here: _Level, resolution: Resolution) -> bool:

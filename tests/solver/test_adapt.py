@@ -12,6 +12,7 @@ from solver.adapt import Estimate, Refined, refine, transfer
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
 from solver.kernels import SLIP, STICK
+from solver.ladder import LADDER
 from solver.linear import JacobianSolver
 from solver.model import ReducedModel
 from solver.path import Effort, PathPoint, final_history, solve_balance
@@ -182,7 +183,7 @@ def test_a_state_that_is_not_allowed_what_it_needs_says_so(
         assert resolution.samples <= 64
     else:
         assert refined.point.evaluation.predicted_h.size <= 7  # what it began with
-    assert adapt.LADDER[-1] >= resolution.highest
+    assert LADDER[-1] >= resolution.highest
 
 
 def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:

@@ -1,0 +1,29 @@
+"""The resolutions between which automatic settings choose."""
+
+from __future__ import annotations
+
+from solver.settings import Resolution, SolverSettings, all_orders, samples_for
+
+LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
+
+
+def on_ladder(resolution: Resolution, steps: int) -> Resolution:
+    """Up (or with -1 down) the ladder, with samples enough for it; odd harmonics stay odd."""
+    if steps > 0:
+        above = [step for step in LADDER if step > resolution.highest]
+        highest = above[steps - 1] if len(above) >= steps else (steps + 1) * resolution.highest
+    else:
+        highest = max((step for step in LADDER if step < resolution.highest), default=resolution.highest)
+    orders = all_orders(highest)
+    if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
+        orders = orders[::2]
+    return Resolution(orders, max(resolution.samples, samples_for(highest)))
+
+
+def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
+    """One step down: harmonics and samples, whichever are automatic."""
+    orders = on_ladder(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
+    samples = resolution.samples
+    if settings.samples == "auto":
+        samples = max(samples // 2, samples_for(orders[-1]))
+    return Resolution(orders, samples)
