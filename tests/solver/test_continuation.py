@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver import continuation
 from solver.continuation import follow_branch
 from solver.history import PeriodicState
 from solver.outcome import Outcome
@@ -229,3 +230,36 @@ def test_a_sweep_is_the_same_twice() -> None:
         assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
         assert np.array_equal(one.state.contact_force_h, other.state.contact_force_h)
         assert one.newton_iterations == other.newton_iterations
+
+
+@pytest.mark.parametrize(("sweep", "fewest"), [("up", 3), ("down", 1)])
+def test_a_branch_of_costly_states_may_be_followed_with_fewer_harmonics(
+    sweep: str, fewest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # up over the fold at 1.557 rad/s, where the jump is made with all harmonics; on the way down, without impacts, one
+    # harmonic is enough, which costs little
+    omegas = [0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
+    model = scene("vibro_impact")
+    usual = branch_states(model, 0.0, 0.02, omegas, SolverSettings(), sweep)
+    monkeypatch.setattr(continuation, "COSTLY", 10)
+    monkeypatch.setattr(continuation, "LIGHT", 14)
+    lightly = []
+
+    def noted(self: continuation._Line, omega: float) -> object:
+        found = by_light(self, omega)
+        lightly.append(found is not None)
+        return found
+
+    by_light = continuation._Line._lightly
+    monkeypatch.setattr(continuation._Line, "_lightly", noted)
+    light = branch_states(model, 0.0, 0.02, omegas, SolverSettings(), sweep)
+    assert sum(lightly) >= fewest
+    assert not all(lightly)
+    for one, other in zip(usual, light, strict=True):
+        assert one.outcome is other.outcome is Outcome.CONVERGED
+        assert one.branch == other.branch
+        assert other.fold_frequency == pytest.approx(one.fold_frequency, rel=1e-2, nan_ok=True)
+        assert one.state is not None
+        assert other.state is not None
+        first, second = (np.hypot(*state.displacement_h[0, 0, 1:3]) for state in (one.state, other.state))
+        assert second == pytest.approx(first, rel=2e-2)
