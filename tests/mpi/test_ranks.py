@@ -123,11 +123,16 @@ def test_an_interrupted_run_ends_at_once(n_ranks: int, number: signal.Signals, t
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # tests that run in the background ignore the interrupt, and what they start would, too
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        assert process.stderr is not None
-        assert "following 2 branches" in process.stderr.readline()
-        process.send_signal(number)
-        _, said = process.communicate(timeout=20)
+        try:
+            assert process.stderr is not None
+            assert "following 2 branches" in process.stderr.readline()
+            process.send_signal(number)
+            _, said = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert said.count("run-study: interrupted, nothing was written") == 1
     assert "Traceback" not in said
