@@ -36,6 +36,7 @@ RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is foun
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
+JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 
@@ -173,6 +174,13 @@ class Trajectory:
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
         self.last_change = None
+        self.effort.limit = self.effort.iterations + JUMP_ITERATIONS
+        landed = self._land(beyond, worn)
+        self.effort.limit = float("inf")
+        return landed
+
+    def _land(self, beyond: float, worn: FloatArray) -> bool:
+        """Take up a stable state at the depths `worn`, so many cycles ahead; False where there is none."""
         for landed in landings(self.case, self.joint, self.point, worn, self.solver, self.effort):
             if isinstance(landed, Outcome):
                 self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
