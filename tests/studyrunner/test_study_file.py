@@ -50,7 +50,9 @@ def test_bundled_studies_are_called_like_their_files(name: str) -> None:
 @pytest.mark.parametrize("name", bundled_studies())
 def test_bundled_studies_are_automatic(name: str) -> None:
     solver = read_study(name).solver
-    assert (solver.harmonics, solver.samples, solver.rtol) == ("auto", "auto", 1e-2)
+    assert (solver.harmonics, solver.samples) == ("auto", "auto")
+    # how extreme points end is asked for, not the last digit
+    assert solver.rtol == (5e-2 if name == "extremes" else 1e-2)
 
 
 def test_range_axis_is_that_of_numpy(tmp_path: Path) -> None:
