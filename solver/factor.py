@@ -17,7 +17,7 @@ import scipy.linalg
 
 from solver.balance import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.slip_space import NEUTRAL, SlipFactor, build_slip_factor, find_slip_space
+from solver.slip_space import NEUTRAL, SlipFactor, build_slip_factor, find_slip_space, sign_of
 
 EXACT = 600  # directions of the slip space that are all kept: 48 pairs with five harmonics near a resonance
 FEW_ROWS = 40  # relative displacements up to which impacts couple most harmonics and directions
@@ -46,9 +46,7 @@ class HarmonicFactor:
     @property
     def sign(self) -> float:
         """Sign of the determinant, 0 where it is singular; a complex factor has the square of a modulus."""
-        factor, pivots = self.low
-        swaps = np.count_nonzero(pivots != np.arange(pivots.size))
-        return float(np.prod(np.sign(np.diag(factor))) * (-1.0) ** swaps)
+        return sign_of(self.low)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate solution (n_rows, 2H+1) for a right-hand side (n_rows, 2H+1)."""

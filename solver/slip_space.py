@@ -104,9 +104,7 @@ class SlipFactor:
     @property
     def sign(self) -> float:
         """Sign of the determinant, 0 where it is singular."""
-        factor, pivots = self.factor
-        swaps = np.count_nonzero(pivots != np.arange(pivots.size))
-        return float(np.prod(np.sign(np.diag(factor))) * (-1.0) ** swaps)
+        return sign_of(self.factor)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate (where `exact`: the) solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
@@ -160,6 +158,13 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
     return SlipFactor(joint, space, there, kept, back, cast("tuple[FloatArray, IntArray]", factor), *every)
 
 
+def sign_of(factor: tuple[FloatArray, IntArray]) -> float:
+    """Sign of the determinant of a matrix from its LU factors and pivots, 0 where it is singular."""
+    triangle, pivots = factor
+    swaps = np.count_nonzero(pivots != np.arange(pivots.size))
+    return float(np.prod(np.sign(np.diag(triangle))) * (-1.0) ** swaps)
+
+
 def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> FloatArray:
     """`Z_r D V` (n_rel, m, size) of the motion of all pairs of a slip space."""
     m = joint.basis.synthesis.shape[0]
@@ -181,6 +186,6 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
     return pushed
 
 
-def _rows(joint: Joint, pair: int) -> IntArray | BoolArray:
+def _rows(joint: Joint, pair: int) -> IntArray:
     """Places of a pair's relative displacements, in the order of its components."""
     return np.flatnonzero(joint.slots // 3 == pair)
