@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.inertia import march_masses, mass_tangent
+from solver.inertia import march_masses
 from solver.joint import Joint
 from solver.kernels import march_period, mean_normal_force, wear_integral
 from solver.model import FloatArray, IntArray
-from solver.tangents import march_tangent, mean_normal_tangent
+from solver.tangents import march_tangent, mass_tangent, mean_normal_tangent
 
 CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
 MOST_PASSES = 400

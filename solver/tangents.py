@@ -1,10 +1,11 @@
-"""Derivatives of the contact law through one period, for `kernels`. Floats and arrays only."""
+"""Derivatives of the contact law through one period, for `kernels` and `inertia`. Floats and arrays only."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
+from solver.inertia import step_mass
 from solver.kernels import PLAIN_PASSES, SLIP, STICK, close, closed_share, contact_sample
 from solver.model import BoolArray, FloatArray, IntArray
 
@@ -236,3 +237,92 @@ def start_tangent(
             if status != STICK:
                 state_tangent(moved, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal, dforce)
     dstart[:, :] = moved[:, :width]
+
+
+@njit(cache=True)
+def mass_tangent(
+    predicted_t: FloatArray,
+    friction: float,
+    mass: FloatArray,
+    drag: FloatArray,
+    line: IntArray,
+    step: float,
+    start: FloatArray,
+    synthesis: FloatArray,
+    step_synthesis: FloatArray,
+    step_analysis: FloatArray,
+    has_normal: BoolArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Exact derivative of the periodic motion of `march_masses` with respect to the harmonics of the predicted force.
+
+    start (n_contact, 2): velocity at the start of the period, m/s. synthesis (m, N) gives the normal force at the
+    samples, step_synthesis (m, N) the tangential ones as means over the steps, step_analysis (N, m) their harmonics
+    back from such means. Returns
+
+    - force_tangent (n_contact, 3m, 3m): as `march_tangent`, without its normal rows, dimensionless;
+    - wear_tangent (n_contact, 3m): of slip_work, m.
+    """
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
+    wear_tangent = np.zeros((n_contact, 3 * m))
+    point_t = np.ascontiguousarray(synthesis.T)
+    mean_t = np.ascontiguousarray(step_synthesis.T)
+    out = np.empty(7)
+    local = np.empty((5, 5))
+    entry = np.empty((2, 3 * m + 2))
+    leave = np.empty((5, 3 * m + 2))
+    analysis_t = np.ascontiguousarray(step_analysis.T)
+    dforce_t = np.empty((n_samples, 2, 3 * m + 2))
+    work = np.empty(3 * m + 2)
+    for pair in range(n_contact):
+        gain = mass[pair] / step + 0.5 * drag[pair]
+        loss = mass[pair] / step - 0.5 * drag[pair]
+        velocity = start[pair].copy()
+        # columns: the harmonics of the predicted force, then the velocity at the start
+        entry[:, :] = 0.0
+        entry[0, 3 * m] = 1.0
+        entry[1, 3 * m + 1] = 1.0
+        work[:] = 0.0
+        for n in range(n_samples):
+            normal = max(predicted_t[pair, 0, n], 0.0)
+            step_mass(predicted_t[pair, 1:, n], velocity, friction * normal, gain, loss, line[pair], out, local)
+            # entry holds the velocities; both forces and the friction limit have columns of their own
+            for row in range(5):
+                first, second = local[row, 2], local[row, 3]
+                for column in range(3 * m + 2):
+                    leave[row, column] = first * entry[0, column] + second * entry[1, column]
+                for k in range(m):
+                    leave[row, m + k] += local[row, 0] * mean_t[n, k]
+                    leave[row, 2 * m + k] += local[row, 1] * mean_t[n, k]
+                if normal > 0.0 and has_normal[pair]:
+                    limit = friction * local[row, 4]
+                    for k in range(m):
+                        leave[row, k] += limit * point_t[n, k]
+            dforce_t[n] = leave[:2]
+            for column in range(3 * m + 2):
+                work[column] += normal * step * leave[4, column]
+            if normal > 0.0 and has_normal[pair]:
+                for k in range(m):
+                    work[k] += out[6] * step * point_t[n, k]
+            velocity[0] = out[2]
+            velocity[1] = out[3]
+            entry[0, :] = leave[2]
+            entry[1, :] = leave[3]
+        # the start of the period is its end: v0 = v(x, v0)
+        determinant = (1.0 - entry[0, 3 * m]) * (1.0 - entry[1, 3 * m + 1]) - entry[0, 3 * m + 1] * entry[1, 3 * m]
+        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, 3 * m + 2)
+        for column in range(3 * m):
+            first = (
+                (1.0 - entry[1, 3 * m + 1]) * entry[0, column] + entry[0, 3 * m + 1] * entry[1, column]
+            ) / determinant
+            second = ((1.0 - entry[0, 3 * m]) * entry[1, column] + entry[1, 3 * m] * entry[0, column]) / determinant
+            for component in range(2):
+                for k in range(m):
+                    force_tangent[pair, (1 + component) * m + k, column] = (
+                        dforce_h[k, component, column]
+                        + dforce_h[k, component, 3 * m] * first
+                        + dforce_h[k, component, 3 * m + 1] * second
+                    )
+            wear_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
+    return force_tangent, wear_tangent

@@ -8,10 +8,10 @@ import numba
 import numpy as np
 
 from solver.harmonics import FourierBasis, build_basis
-from solver.inertia import march_masses, mass_tangent
+from solver.inertia import march_masses
 from solver.kernels import march_period, mean_normal_force, wear_integral
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.tangents import march_tangent, mean_normal_tangent
+from solver.tangents import march_tangent, mass_tangent, mean_normal_tangent
 
 FRICTION = 0.4
 PERIODS = 3
