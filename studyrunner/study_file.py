@@ -71,7 +71,13 @@ def check_study(table: Mapping[str, object], source: str, folder: Path) -> Study
         value = _section(table, "solver")[twice[0]]
         raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
     sections["scene"] = _check_scene(_section(table, "scene"), source, folder)
-    return _check(Study, {**sections, "source": source, "folder": folder}, source, "")
+    moved = _move_solver_axes(sections)
+    try:
+        return _check(Study, {**sections, "source": source, "folder": folder}, source, "")
+    except UserError as error:
+        if error.key in moved:
+            raise UserError(error.place, moved[error.key], error.value, error.remedy) from None
+        raise
 
 
 def format_study(study: Study) -> str:
@@ -139,6 +145,24 @@ def _override_value(key: str, text: str) -> object:
 def _section(table: Mapping[str, object], name: str) -> Table:
     section = table.get(name, {})
     return section if isinstance(section, dict) else {}
+
+
+def _move_solver_axes(sections: Table) -> dict[str, str]:
+    """Makes axes of the solver keys that hold several values; a list of one value is that value.
+
+    Returns for each of these axes the key that it was given as.
+    """
+    solver, axes, moved = dict(_section(sections, "solver")), dict(_section(sections, "axes")), {}
+    for key in SOLVER_AXES:
+        value = solver.get(key)
+        if isinstance(value, list) and len(value) == 1:
+            solver[key] = value[0]
+        elif isinstance(value, list | dict):
+            axes[key] = solver.pop(key)
+            moved[f"axes.{key}"] = f"solver.{key}"
+    if "solver" in sections:
+        sections["solver"], sections["axes"] = solver, axes
+    return moved
 
 
 def _check_scene(table: Table, source: str, folder: Path) -> SceneSection:

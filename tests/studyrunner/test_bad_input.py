@@ -58,6 +58,12 @@ WRONG_KEYS = {
     "too few samples": ("solver.samples=10", "solver.samples", "10", "at least 11"),
     "too few samples on an axis": ("axes.samples=[8, 64]", "axes.samples", "8", "at least 11"),
     "too few samples beside automatic ones": ("axes.samples=['auto', 10]", "axes.samples", "10", "at least 11"),
+    "half a harmonic in a list": ("solver.harmonics=[1, 1.5]", "solver.harmonics", "1.5", "whole"),
+    "half a harmonic in a list of one": ("solver.harmonics=[1.5]", "solver.harmonics", "1.5", "whole"),
+    "no harmonics": ("solver.harmonics=[]", "solver.harmonics", "[]", "at least one"),
+    "harmonics twice in a list": ("solver.harmonics=[3, 5, 3]", "solver.harmonics", "3", "once"),
+    "too few samples in a list": ("solver.samples=[8, 64]", "solver.samples", "8", "at least 11"),
+    "list of shortcuts": ("solver.shortcuts=[true, false]", "solver.shortcuts", "[True, False]", "true or false"),
     "tolerance 0": ("solver.tolerance=0", "solver.tolerance", "0", "between 0 and 1"),
     "rtol": ("solver.rtol=2", "solver.rtol", "2", "between 0 and 1"),
     "rtol 0": ("axes.rtol=[0, 0.1]", "axes.rtol", "0", "between 0 and 1"),
@@ -126,12 +132,14 @@ def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.Captur
     assert key in line
 
 
-def test_solver_key_given_twice(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("value", ["5", "[5]", "[5, 7]"])
+def test_solver_key_given_twice(value: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[slow_time]")
+    text = text.replace("harmonics = 5", f"harmonics = {value}")
     (folder / "s.toml").write_text(text, encoding="utf-8")
     line = line_of(["s.toml"], capsys)
-    assert "solver.harmonics = 5" in line
-    assert "axes.harmonics" in line
+    assert f"solver.harmonics = {value}" in line
+    assert "give it once, here or as axes.harmonics" in line
 
 
 @pytest.mark.parametrize(

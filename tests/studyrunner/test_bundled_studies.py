@@ -32,6 +32,21 @@ SMALL = {
     "sdof_slider": ["axes.frequency=160.0", "slow_time.cycles=4000", "slow_time.outputs=5"],
     "two_masses": ["axes.frequency=0.0954929658551372"],
     "vibro_impact": ["axes.frequency=[0.17, 0.19, 0.21, 0.22]"],
+    "work_precision": [
+        "scene.mesh=1",
+        "axes.frequency=212.86",
+        "axes.step=[1000, 2000]",
+        "axes.harmonics=[3, 5]",
+        "axes.samples=64",
+        "slow_time.cycles=4000",
+        "slow_time.outputs=3",
+    ],
+    "work_precision_slider": [
+        "axes.frequency=160.0",
+        "axes.step=[2500, 10000]",
+        "axes.harmonics=[1, 5]",
+        "axes.samples=64",
+    ],
 }
 
 
@@ -82,3 +97,12 @@ def test_the_dovetail_wears_near_its_resonance_only(tmp_path):
 def test_the_two_branches_of_the_vibro_impact_differ(tmp_path):
     response = run_small("vibro_impact", tmp_path).response_amplitude.squeeze()
     assert (response.sel(sweep="up") > 1.3 * response.sel(sweep="down")).any()
+
+
+@pytest.mark.parametrize("name", ["work_precision", "work_precision_slider"])
+def test_schemes_agree_better_with_smaller_steps(name, tmp_path):
+    worn = run_small(name, tmp_path).worn_volume.isel(cycle=-1).sel(harmonics=5).squeeze()
+    assert (worn.sel(scheme="adaptive") == worn.sel(scheme="adaptive").isel(step=0)).all()
+    for scheme in ("implicit", "explicit"):
+        fine, coarse = abs(worn.sel(scheme=scheme) - worn.sel(scheme="adaptive"))
+        assert fine < 0.7 * coarse

@@ -1,0 +1,135 @@
+"""The command `study-report`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import traceback
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from studyrunner.user_error import UserError
+
+if TYPE_CHECKING:
+    from rich.status import Status
+
+    from studyrunner.report.drawing import Drawing, Missing, Table
+
+WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses."""
+
+_DESCRIPTION = """\
+Draws a result file of run-study: figures as SVG and PNG, and one HTML page that holds all of them and an interactive
+part, and that opens without a network."""
+
+_EPILOG = """\
+examples:
+  study-report dovetail.nc                    -> dovetail-report/index.html and the figures beside it
+  study-report results/worn.nc -o figures     the same into the folder figures
+
+exit status:
+  0  the report was written
+  1  unexpected failure
+  2  bad input, nothing was written: one line says what is wrong"""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The command line. folder: where the report goes."""
+
+    result: Path
+    folder: Path
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports mistakes as UserError."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UserError("command line", "options", None, f"{message}; study-report --help lists them")
+
+
+def parse_options(arguments: Sequence[str]) -> Options:
+    """The command line. Raises UserError; SystemExit after --help."""
+    parser = _Parser(
+        prog="study-report",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("result", metavar="OUT.nc", help="result file of run-study")
+    parser.add_argument("-o", dest="folder", metavar="FOLDER", help="where to write (default: OUT-report, here)")
+    found = parser.parse_args(list(arguments))
+    result = Path(found.result)
+    return Options(result, Path(f"{result.stem}-report" if found.folder is None else found.folder))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command and returns its exit status."""
+    try:
+        return _report(parse_options(sys.argv[1:] if arguments is None else arguments))
+    except UserError as error:
+        print(f"study-report: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except SystemExit:
+        return WRITTEN
+    except KeyboardInterrupt:
+        print("study-report: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except Exception:
+        print("study-report: unexpected failure", file=sys.stderr)
+        traceback.print_exc()
+        return UNEXPECTED
+
+
+def _report(options: Options) -> int:
+    # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
+    began = time.monotonic()
+    from rich.console import Console
+    from rich.markup import escape
+
+    with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
+        from studyrunner.progress import count, format_seconds
+        from studyrunner.report.gallery import draw_report
+        from studyrunner.report.page import write_page
+        from studyrunner.report.result import open_result
+
+        result = open_result(options.result)
+        with result.dataset:
+            _make_folder(options.folder)
+            page = options.folder / "index.html"
+            summary = write_page(result, _say(draw_report(result), status), page)
+    shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
+    seconds = format_seconds(time.monotonic() - began)
+    print(f"{page}: {shown}, {summary.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
+    return WRITTEN
+
+
+def _say(items: Iterable[Drawing | Missing | Table], status: Status) -> Iterator[Drawing | Missing | Table]:
+    """The items; tells on the terminal which of them is done."""
+    from rich.markup import escape
+
+    for item in items:
+        status.update(f"drawing: {escape(item.title)}")
+        yield item
+    status.update("writing the page")
+
+
+def _make_folder(folder: Path) -> None:
+    """The folder, after a try whether files can be written into it. Raises UserError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        trial = folder / f".index.html.{os.getpid()}.partial"
+        trial.touch()
+        trial.unlink()
+    except OSError as error:
+        remedy = f"give a folder that can be written: {error.strerror}"
+        raise UserError("command line", "-o", str(folder), remedy) from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,164 @@
+"""What the report is made of: drawings, tables, and sentences about what is missing; and how drawings look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+WIDTH = 7.5
+"""Inches of a figure across the page: 900 pixels at `DPI`."""
+
+DPI = 120
+
+MAP = "cividis"
+"""Colour map of values from low to high: its lightness grows evenly, and it looks the same to the colour blind."""
+
+# Okabe & Ito (2008), "Color universal design", without its yellow, which vanishes on white. Lightness differs as well.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9")
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+_STYLE: Any = {
+    "font.size": 9.5,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.5,
+    "legend.fontsize": 8.5,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    # Formulas as tick labels take most of the time of a figure.
+    "axes.formatter.use_mathtext": False,
+    "grid.color": "#d9d9d9",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.6,
+    "lines.markersize": 4.0,
+    "legend.frameon": False,
+    "image.cmap": MAP,
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fretwear",
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One figure. name: of its file, without suffix. caption: plain sentences that say what is seen."""
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+    def save(self, folder: Path) -> tuple[Path, Path]:
+        """Write `<name>.svg` and `<name>.png` into a folder that exists; both paths."""
+        paths = folder / f"{self.name}.svg", folder / f"{self.name}.png"
+        with style():
+            self.figure.savefig(paths[0], format="svg", metadata={"Date": None})
+            # What stands where is the same for both: it is found once.
+            self.figure.set_layout_engine("none")
+            self.figure.savefig(paths[1], format="png")
+        return paths
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A figure that is left out. sentence: what the file does not hold, and what to ask for."""
+
+    name: str
+    title: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text, each as long as `columns`. note: what is seen; may be empty."""
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Inside, figures are built and saved in the one style of the report."""
+    with mpl.rc_context(_STYLE):
+        yield
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure, of a size in inches, that lays itself out. It is none of pyplot: nothing has to close it."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def new_panels(n_rows: int, n_columns: int, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
+    """A figure and its axes (n_rows, n_columns)."""
+    figure = new_figure(height)
+    panels: NDArray[Any] = figure.subplots(n_rows, n_columns, squeeze=False, **options)
+    return figure, panels
+
+
+def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
+    """Colour, dashes and marker of the line of this number: each tells it from the others.
+
+    n_points: on the line; where there are many, markers stand on some of them only.
+    """
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "linestyle": _DASHES[number % len(_DASHES)],
+        "marker": _MARKERS[number % len(_MARKERS)],
+        "markevery": max(1, n_points // 12),
+        # Lines are drawn over those before them, which stay visible around the smaller markers.
+        "markersize": 5.4 - 0.6 * min(number, 4),
+    }
+
+
+def set_from_zero(panel: Axes, largest: float) -> None:
+    """Let the vertical axis begin at zero, and end at something where all values are zero."""
+    panel.set_ylim(0.0, 1.06 * largest if largest > 0.0 else 1.0)
+
+
+def hatch_empty(panel: Axes, anything_empty: bool) -> None:
+    """Hatch what a map leaves empty, so that it is not taken for a value."""
+    if anything_empty:
+        panel.set_facecolor("white")
+        panel.patch.set(hatch="xxx", edgecolor="0.55", linewidth=0.0)
+
+
+def mark_failed(panel: Axes, positions: NDArray[np.float64], failed: NDArray[np.bool_]) -> int:
+    """Crosses on the horizontal axis where points have no result; how many these are.
+
+    positions (n,): along the axis. failed (n_lines, n).
+    """
+    n_failed = int(np.count_nonzero(failed))
+    if n_failed:
+        at = positions[failed.any(axis=0)]
+        panel.plot(
+            at,
+            np.zeros(at.size),
+            linestyle="none",
+            marker="x",
+            color="black",
+            markersize=5,
+            clip_on=False,
+            label="no result",
+            transform=panel.get_xaxis_transform(),
+            zorder=5,
+        )
+    return n_failed

@@ -1,0 +1,93 @@
+"""Numbers with units as a reader wants them: a prefix that fits the largest value, few digits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How values in SI are shown: times `factor`, in `unit`. The unit is empty for plain numbers."""
+
+    factor: float
+    unit: str
+
+    def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Values as shown."""
+        return np.asarray(values, dtype=float) * self.factor
+
+    def label(self, text: str) -> str:
+        """Label of an axis."""
+        return f"{text} ({self.unit})" if self.unit else text
+
+    def show(self, value: float, digits: int = 3) -> str:
+        """One value in SI, as text with its unit."""
+        text = show_number(value * self.factor, digits)
+        return f"{text} {self.unit}" if self.unit else text
+
+
+# Of each unit in SI: smallest value that is shown so, factor, unit; from large to small, the last for all below.
+_SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((1.0, 1.0, "m"), (0.5e-3, 1e3, "mm"), (0.1e-6, 1e6, "µm"), (0.0, 1e9, "nm")),
+    "m2": ((0.1, 1.0, "m²"), (0.0, 1e6, "mm²")),
+    "m3": ((0.1, 1.0, "m³"), (1e-13, 1e9, "mm³"), (0.0, 1e18, "µm³")),
+    "m3 per cycle": (
+        (1e-4, 1.0, "m³ per cycle"),
+        (1e-10, 1e9, "mm³ per cycle"),
+        (1e-17, 1e12, "mm³ per kcycle"),
+        (0.0, 1e18, "µm³ per cycle"),
+    ),
+    "Pa": ((2e9, 1e-9, "GPa"), (0.1e6, 1e-6, "MPa"), (100.0, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+    "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
+    "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
+    "Hz": ((0.0, 1.0, "Hz"),),
+    "rad": ((0.0, 180.0 / np.pi, "°"),),
+}
+
+
+def scale_for(units: str, *values: ArrayLike) -> Scale:
+    """Scale for values in these units of SI, by the largest magnitude among them; NaN and infinities do not count.
+
+    Units without prefixes stay as they are; where there is nothing but zero, the usual unit of an engineer.
+    """
+    largest = max((_largest(array) for array in values), default=0.0)
+    steps = _SCALES.get(units)
+    if steps is None:
+        return Scale(1.0, "" if units == "1" else units)
+    if largest == 0.0:
+        usual = {"m": "mm", "m3": "mm³", "m3 per cycle": "mm³ per kcycle", "Pa": "MPa", "N": "N"}.get(units)
+        return next((Scale(factor, unit) for _, factor, unit in steps if unit == usual), Scale(*steps[-1][1:]))
+    return next(Scale(factor, unit) for smallest, factor, unit in steps if largest >= smallest)
+
+
+def _largest(values: ArrayLike) -> float:
+    array = np.abs(np.asarray(values, dtype=float))
+    return float(array.max(initial=0.0, where=np.isfinite(array)))
+
+
+def show_number(value: float, digits: int = 6) -> str:
+    """A number in few digits; thousands set apart."""
+    if float(value).is_integer() and 1e4 <= abs(value) < 1e15:
+        return f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+    return f"{value:.{digits}g}"
+
+
+def show_cycles(value: float) -> str:
+    """A cycle count in words."""
+    return f"{show_number(value, 8)} cycle" + ("" if value == 1 else "s")
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def show_power(value: float, _position: object = None) -> str:
+    """A tick of a logarithmic axis: powers of ten as such. Plain text, which is drawn much faster than a formula."""
+    if value <= 0.0:
+        return ""
+    exponent = round(float(np.log10(value)))
+    if not np.isclose(value, 10.0**exponent):
+        return show_number(value, 2)
+    return "1" if exponent == 0 else "10" + str(exponent).translate(_RAISED)

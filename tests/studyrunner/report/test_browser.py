@@ -1,0 +1,375 @@
+"""The page in a real headless browser without a network: slider, clicks and lists show the numbers of the file."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import studyrunner.report.page
+from studyrunner.report.page import write_page
+from tests.studyrunner.report.page_cases import AXES, SENTENCES, as_result, build_file
+
+CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
+
+pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver")
+
+EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
+FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ per kcycle": 1e12, "kPa": 1e-3, "Pa": 1.0}
+FACTORS |= {"mPa": 1e3, "mN": 1e3, "m": 1.0, "N": 1.0, "mm³ per cycle": 1e9, "µm³ per cycle": 1e18, "": 1.0}
+FAILED = 5
+DESKTOP, PHONE = (1400, 1000), (400, 800)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        f"--window-size={DESKTOP[0]},{DESKTOP[1]}",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def dataset() -> xr.Dataset:
+    """16 points, one of them failed; loops of two pairs; two responses; a hostile title and a hostile surface."""
+    surfaces = [EVIL] * 12 + ["extrados"] * 12
+    found = build_file(failed=[FAILED], loops=[2, 5], responses=("tip", EVIL), surfaces=surfaces)
+    found.attrs["title"] = EVIL
+    return found
+
+
+@pytest.fixture(scope="module")
+def address(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> str:
+    return write(dataset, tmp_path_factory.mktemp("page"))
+
+
+@pytest.fixture
+def page(browser: Any, address: str, dataset: xr.Dataset) -> Iterator[Any]:
+    """The page as it looks at first, without errors to the end; loaded only where another one was: that takes time."""
+    from selenium.webdriver.common.keys import Keys
+
+    if browser.current_url != address:
+        load(browser, address)
+    index = np.unravel_index(shown_point(dataset), dataset["outcome"].shape)
+    for name, place in zip(dataset["outcome"].dims, index, strict=True):
+        if dataset.sizes[name] > 1:
+            choose(browser, f"axis {str(name).replace('_', ' ')}", int(place))
+    for name in ("map", "response"):
+        choose(browser, name, 0)
+    press(browser, Keys.END)
+    yield browser
+    assert browser.get_log("browser") == []
+
+
+def write(dataset: xr.Dataset, folder: Path) -> str:
+    write_page(as_result(dataset, folder / "some.nc"), [], folder / "index.html")
+    return (folder / "index.html").as_uri()
+
+
+def load(browser: Any, address: str) -> None:
+    browser.get(address)
+    assert browser.get_log("browser") == []
+    assert browser.execute_script("return document.getElementById('explore-failed').hidden")
+    assert not browser.execute_script("return document.getElementById('explore').hidden")
+
+
+def map_values(page: Any) -> list[list[list[float]]]:
+    script = "return document.getElementById('map-plot').data.map(trace => trace.z)"
+    found: list[list[list[float]]] = page.execute_script(script)
+    return found
+
+
+def map_pairs(page: Any) -> list[list[list[int]]]:
+    script = "return document.getElementById('map-plot').data.map(trace => trace.customdata)"
+    found: list[list[list[int]]] = page.execute_script(script)
+    return found
+
+
+def numbers(page: Any) -> dict[str, float]:
+    """The list beside the plots, back in the units of the file."""
+    rows = "[...document.querySelectorAll('#readout div')]"
+    found = {}
+    for name, text in page.execute_script(f"return {rows}.map(row => [row.dataset.name, row.children[1].innerText])"):
+        number, unit = re.fullmatch(r"(\S+?)(?:\s(.*))?", re.sub(r"(?<=\d)\s(?=\d{3}\b)", "", text)).groups()  # type: ignore[union-attr]
+        try:
+            found[name] = float(number) / FACTORS.get(unit or "", 1.0)
+        except ValueError:
+            found[name] = np.nan
+    return found
+
+
+def choose(page: Any, name: str, index: int) -> None:
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.select import Select
+
+    Select(page.find_element(By.CSS_SELECTOR, f"select[name='{name}']")).select_by_index(index)
+
+
+def press(page: Any, *keys: str) -> None:
+    from selenium.webdriver.common.by import By
+
+    page.find_element(By.ID, "cycle").send_keys(*keys)
+    wait_for_frame(page)
+
+
+def wait_for_frame(page: Any) -> None:
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]()))")
+
+
+def click_at(page: Any, point: int) -> None:
+    """A press of the mouse on the pixel at which the plot of the response shows a point."""
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+
+    script = """
+    const plot = document.getElementById("response-plot");
+    plot.scrollIntoView({block: "center", behavior: "instant"});
+    const box = plot.getBoundingClientRect();
+    for (const trace of plot.data) {
+      const at = (trace.customdata || []).indexOf(arguments[0]);
+      if (at < 0 || !Number.isFinite(trace.y[at])) continue;
+      const { xaxis, yaxis } = plot._fullLayout;
+      const x = xaxis._offset + xaxis.d2p(trace.x[at]), y = yaxis._offset + yaxis.d2p(trace.y[at]);
+      return [x - box.width / 2, y - box.height / 2];
+    }"""
+    x, y = page.execute_script(script, point)
+    plot = page.find_element(By.ID, "response-plot")
+    actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
+    actions.move_by_offset(3, -2).pause(0.1).click().perform()
+    wait_for_frame(page)
+
+
+def selected(page: Any) -> str:
+    text: str = page.execute_script("return document.getElementById('selected').textContent")
+    return text
+
+
+def assert_maps_are(page: Any, dataset: xr.Dataset, name: str, point: int, cycle: int) -> None:
+    """The maps show a variable of the file at a point and a cycle, in whatever unit fits."""
+    values = dataset[name].values.reshape(-1, 5, 24)[point, cycle].astype("f4")
+    shown = np.concatenate([np.ravel(panel) for panel in map_values(page)])
+    pairs = np.concatenate([np.ravel(panel) for panel in map_pairs(page)]).astype(int)
+    assert sorted(pairs) == list(range(24))
+    unit = page.execute_script("return document.getElementById('map-plot').layout.coloraxis.colorbar.title.text")
+    np.testing.assert_allclose(shown, values[pairs] * FACTORS[unit], rtol=1e-6)
+
+
+def shown_point(dataset: xr.Dataset) -> int:
+    return int(np.nanargmax(dataset["worn_volume"].values.reshape(16, 5)[:, -1]))
+
+
+def test_the_page_begins_with_the_shown_point_and_the_last_cycle(
+    browser: Any, address: str, dataset: xr.Dataset
+) -> None:
+    load(browser, address)
+    assert_maps_are(browser, dataset, "mean_pressure", shown_point(dataset), 4)
+    expected = dataset["worn_volume"].values.reshape(16, 5)[shown_point(dataset), 4]
+    assert numbers(browser)["worn_volume"] == pytest.approx(expected, rel=2e-6)
+
+
+def test_texts_of_the_file_do_nothing(page: Any, dataset: xr.Dataset) -> None:
+    assert page.title == " ".join(EVIL.split())
+    assert page.execute_script("return window.hurt === undefined")
+    assert page.execute_script("return document.querySelectorAll('img').length") == 0
+    shown = page.execute_script("return document.getElementById('map-plot').textContent")
+    assert "<img" in shown
+
+
+def test_the_slider_turns_the_maps_to_another_cycle(page: Any, dataset: xr.Dataset) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    point = shown_point(dataset)
+    assert_maps_are(page, dataset, "mean_pressure", point, 4)
+    before = map_values(page)
+    press(page, Keys.ARROW_LEFT)
+    assert map_values(page) != before
+    assert_maps_are(page, dataset, "mean_pressure", point, 3)
+    press(page, Keys.HOME)
+    assert_maps_are(page, dataset, "mean_pressure", point, 0)
+    assert "cycle 0" in page.execute_script("return document.getElementById('map-title').textContent")
+    assert page.execute_script("return document.getElementById('cycle-count').textContent") == "0 of 400"
+
+
+def test_the_response_is_that_of_the_cycle_with_the_first_as_ghost(page: Any, dataset: xr.Dataset) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    press(page, Keys.HOME, Keys.ARROW_RIGHT)
+    data = "document.getElementById('response-plot').data"
+    traces = page.execute_script(f"return {data}.map(({{meta, x, y, customdata}}) => [meta, x, [...y], customdata])")
+    amplitude = dataset["response_amplitude"].values.reshape(16, 5, 2)[..., 0]
+    lines = [each for each in traces if each[0] == "response"]
+    assert len(lines) == 2
+    assert shown_point(dataset) in lines[1][3]
+    for cycle, kind in ((1, "response"), (0, "first")):
+        for (_, x, y, _), (*_, points) in zip([each for each in traces if each[0] == kind], lines, strict=True):
+            assert x == dataset["frequency"].values.tolist()
+            expected = np.where(np.isnan(amplitude[points, cycle]), np.nan, amplitude[points, cycle])
+            np.testing.assert_allclose(np.array(y, dtype=float), expected * 1e6, rtol=1e-6)
+
+
+@pytest.mark.parametrize("place", [0, 3])
+def test_a_click_on_the_response_picks_the_point(page: Any, dataset: xr.Dataset, place: int) -> None:
+    coefficient = np.unravel_index(shown_point(dataset), (4, 2, 1, 1, 2, 1))[1]
+    points = np.arange(16).reshape(4, 2, 1, 1, 2, 1)[:, coefficient].ravel()
+    point = int([each for each in points if each not in (FAILED, shown_point(dataset))][place])
+    click_at(page, point)
+    found = numbers(page)
+    index = np.unravel_index(point, (4, 2, 1, 1, 2, 1))
+    assert found["axis frequency"] == dataset["frequency"].values[index[0]]
+    for name in ("response_amplitude", "response_peak", "worn_volume", "wear_rate"):
+        values = dataset[name].values.reshape(16, 5, -1)[point, 4, 0]
+        assert found[name] == pytest.approx(values, rel=2e-6)
+    for name in ("run_time", "error_estimate", "newton_iterations"):
+        assert found[name] == pytest.approx(dataset[name].values.ravel()[point], rel=2e-6)
+    assert found["energy_error"] == pytest.approx(dataset["energy_error"].values.reshape(16, 5)[point].max(), rel=2e-6)
+    assert_maps_are(page, dataset, "mean_pressure", point, 4)
+    scheme = dataset["scheme"].values[index[4]]
+    assert f"frequency {dataset['frequency'].values[index[0]]:g}\u00a0Hz" in selected(page)
+    assert f"scheme {scheme}: {SENTENCES[0]}" in selected(page)
+    assert page.execute_script("return document.querySelector(\"select[name='axis scheme']\").value") == str(index[4])
+
+
+def test_a_failed_point_is_picked_and_says_why(page: Any, dataset: xr.Dataset) -> None:
+    index = np.unravel_index(FAILED, (4, 2, 1, 1, 2, 1))
+    choose(page, "axis wear coefficient", int(index[1]))
+    click_at(page, FAILED)
+    assert selected(page).endswith(SENTENCES[4])
+    assert np.isnan(numbers(page)["worn_volume"])
+    assert map_values(page) == []
+    click_at(page, int(FAILED + 4))
+    assert selected(page).endswith(SENTENCES[0])
+    assert_maps_are(page, dataset, "mean_pressure", FAILED + 4, 4)
+
+
+def test_the_lists_pick_points_variables_and_responses(page: Any, dataset: xr.Dataset) -> None:
+    index = (2, 1, 0, 0, 1, 0)
+    for name, place in zip(("frequency", "wear coefficient", "scheme"), (2, 1, 1), strict=True):
+        choose(page, f"axis {name}", place)
+    point = int(np.ravel_multi_index(index, (4, 2, 1, 1, 2, 1)))
+    for place, name in enumerate(("mean_pressure", "wear_depth", "open_fraction")):
+        choose(page, "map", place)
+        assert_maps_are(page, dataset, name, point, 4)
+    choose(page, "response", 1)
+    expected = dataset["response_amplitude"].values.reshape(16, 5, 2)[point, 4, 1]
+    assert numbers(page)["response_amplitude"] == pytest.approx(expected, rel=2e-6)
+
+
+def test_histories_and_loops_are_those_of_the_point(page: Any, dataset: xr.Dataset) -> None:
+    choose(page, "axis frequency", 0)
+    choose(page, "axis wear coefficient", 0)
+    choose(page, "axis scheme", 1)
+    course = page.execute_script(
+        "return document.getElementById('course-plot').data.map(({meta, x, y}) => [meta, x, y])"
+    )
+    for name, factor in (("worn_volume", 1e9), ("wear_rate", 1e12)):
+        (line,) = [each for each in course if each[0] == name]
+        assert line[1] == dataset["cycle"].values.tolist()
+        values = np.array(line[2]) / dataset[name].values.reshape(16, 5)[1]
+        np.testing.assert_allclose(values, values[0], rtol=1e-6)
+        assert np.log10(values[0] / factor) == pytest.approx(round(np.log10(values[0] / factor)), abs=1e-6)
+    choose(page, "pair", 1)
+    choose(page, "component", 2)
+    (loop,) = page.execute_script(
+        "return document.getElementById('loop-plot').data.filter(({meta}) => meta === 'loop').map(({x, y}) => [x, y])"
+    )
+    for name, shown in zip(("loop_displacement", "loop_force"), loop, strict=True):
+        values = dataset[name].values.reshape(16, 5, 24, 16, 3)[1, 4, 5, :, 2]
+        np.testing.assert_allclose(shown, np.append(values, values[0]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_nothing_sticks_out(browser: Any, address: str, size: tuple[int, int]) -> None:
+    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size is PHONE}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        load(browser, address)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= size[0]
+        plots = "[...document.querySelectorAll('.plot')]"
+        widths = browser.execute_script(f"return {plots}.map(plot => plot.getBoundingClientRect().width)")
+        assert min(widths) > 0.4 * size[0]
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+ONE = {"frequency": (190.0,), "wear_coefficient": (1e-11,), "scheme": ("implicit",), "sweep": ("up",)}
+SCATTERED = np.random.default_rng(0).normal(size=(7, 3))
+
+UNUSUAL: dict[str, dict[str, Any]] = {
+    "one point, no place": {"axes": ONE, "positions": np.full((1, 3), np.nan), "surfaces": ["support"]},
+    "one cycle, scattered pairs": {"cycles": (0.0,), "positions": SCATTERED, "surfaces": ["one"] * 7},
+    "words only, most failed": {
+        "axes": {**ONE, "harmonics": ("auto", "5"), "scheme": ("implicit", "explicit")},
+        "failed": (1, 2, 3),
+    },
+    "all failed": {"failed": range(16), "loops": [1]},
+    "few variables": {"variables": ("wear_rate",)},
+    "nothing asked for": {"variables": ()},
+}
+
+
+@pytest.mark.parametrize("case", UNUSUAL)
+def test_unusual_files_load_without_errors(browser: Any, tmp_path: Path, case: str) -> None:
+    dataset = build_file(**UNUSUAL[case])
+    load(browser, write(dataset, tmp_path))
+    assert "frequency" in selected(browser) or "harmonics" in selected(browser)
+    good = bool((dataset["outcome"] == 0).any())
+    shown = browser.execute_script("return document.getElementById('map-plot').offsetParent !== null")
+    assert shown == (good and "mean_pressure" in dataset)
+    assert browser.get_log("browser") == []
+
+
+def test_a_page_of_a_single_numeric_axis_other_than_frequency(browser: Any, tmp_path: Path) -> None:
+    axes = {**AXES, "frequency": (190.0,), "scheme": ("implicit",)}
+    dataset = build_file(axes)
+    load(browser, write(dataset, tmp_path))
+    click_at(browser, 1)
+    assert numbers(browser)["worn_volume"] == pytest.approx(float(dataset["worn_volume"].values.ravel()[9]), rel=2e-6)
+    click_at(browser, 0)
+    assert numbers(browser)["worn_volume"] == pytest.approx(float(dataset["worn_volume"].values.ravel()[4]), rel=2e-6)
+
+
+def test_a_thinned_page_says_what_it_shows(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    cycles = np.linspace(0.0, 2000.0, 21)
+    dataset = build_file(cycles=cycles.tolist())
+    monkeypatch.setattr(studyrunner.report.page, "DATA_LIMIT", 6e4)
+    load(browser, write(dataset, tmp_path))
+    notes = browser.execute_script("return document.querySelector('#explore .notes').innerText")
+    assert "Maps are on this page at 11 of the 21 cycle counts" in notes
+    press(browser, Keys.ARROW_LEFT)
+    assert browser.execute_script("return document.getElementById('response-title').textContent").endswith("1\u00a0900")
+    title = browser.execute_script("return document.getElementById('map-title').textContent")
+    named = float(re.sub(r".*cycle ", "", title).replace("\u00a0", ""))
+    assert named in (1800.0, 2000.0)
+    point = int(np.nanargmax(dataset["worn_volume"].values.reshape(16, 21)[:, -1]))
+    values = dataset["mean_pressure"].values.reshape(16, 21, 24)[point, int(named / 100.0)]
+    pairs = np.ravel(map_pairs(browser)).astype(int)
+    shown = np.ravel(map_values(browser))
+    np.testing.assert_allclose(shown / values[pairs], (shown / values[pairs])[0], rtol=1e-6)
+
+    worn = dataset["worn_volume"].values.reshape(4, 2, 2, 21)[..., -1]
+    for name, place in zip(
+        ("frequency", "wear coefficient", "scheme"), np.argwhere(worn == worn.min())[0], strict=True
+    ):
+        choose(browser, f"axis {name}", int(place))
+    assert "not on this page" in browser.execute_script("return document.getElementById('map-plot').textContent")

@@ -1,0 +1,268 @@
+"""All figures together: which there are in each case, that none is empty, that axes have units."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+
+from studyrunner.report.drawing import COLOURS, Drawing, Missing, Table, line_style
+from studyrunner.report.gallery import draw_report
+from studyrunner.report.result import Result
+from tests.studyrunner.report.figure_cases import (
+    make_result,
+    with_loops,
+    with_sector,
+    with_surfaces,
+    with_two_responses,
+    with_variables,
+)
+
+ALL_DRAWINGS = [
+    "natural_frequencies",
+    "frequency_response",
+    "worn_volume",
+    "worn_volume_map",
+    "wear_rate_map",
+    "final_worn_volume",
+    "wear_depth",
+    "mean_pressure",
+    "worn_profile",
+    "fretting_loops",
+    "normal_load",
+    "pair_motion",
+    "estimated_errors",
+]
+WITHOUT_UNITS = {"contact pair", "nodal diameter", "estimated relative error", ""}
+
+
+def _complete() -> Result:
+    return with_sector(with_loops(make_result()))
+
+
+def _names(items: list[Drawing | Missing | Table], kind: type) -> list[str]:
+    return [item.name for item in items if isinstance(item, kind)]
+
+
+CASES = {
+    "complete": _complete,
+    "one point": lambda: make_result(frequency=[200.0], scheme=["implicit"]),
+    "one point without cycles": lambda: make_result(frequency=[200.0], scheme=["implicit"], cycles=[0.0]),
+    "two schemes at one frequency": lambda: make_result(frequency=[200.0]),
+    "no cycles": lambda: make_result(cycles=[0.0]),
+    "one cycle count after wear": lambda: make_result(cycles=[1000.0]),
+    "all failed": lambda: make_result(failed=range(8)),
+    "one failed": lambda: make_result(failed=[2]),
+    "interrupted": lambda: make_result(failed=range(1, 8), failing=-1),
+    "nothing wears": lambda: make_result(wears=False),
+    "scattered pairs": lambda: make_result(pairs="scattered"),
+    "pairs nowhere": lambda: make_result(pairs="nowhere"),
+    "wear coefficients at one frequency": lambda: make_result(
+        frequency=[200.0], wear_coefficient=[1e-12, 1e-11, 1e-10]
+    ),
+    "many combinations": lambda: make_result(
+        wear_coefficient=np.geomspace(1e-12, 1e-10, 7),
+        sweep=["up", "down"],
+        scheme=["implicit", "explicit", "adaptive"],
+    ),
+    "unsorted frequencies": lambda: make_result(frequency=[204.0, 200.0, 202.0, 201.0]),
+    "both sweeps": lambda: make_result(sweep=["up", "down"], scheme=["implicit"]),
+    "loops where some failed": lambda: with_loops(make_result(failed=[0, 5])),
+    "six surfaces": lambda: with_surfaces(make_result(), 6),
+    "two responses": lambda: with_two_responses(make_result()),
+    "mesh alone": lambda: with_sector(make_result(), frequencies=False),
+    "frequencies alone": lambda: with_sector(make_result(), mesh=False),
+    "nothing asked for": lambda: make_result(
+        without=[
+            *("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase"),
+            *("response_error", "wear_rate_error", "energy_error", "stable"),
+        ]
+    ),
+}
+
+
+# Laying out takes most of the time: done where the panels are others than elsewhere.
+LAID_OUT = {
+    "complete",
+    "all failed",
+    "six surfaces",
+    "scattered pairs",
+    "pairs nowhere",
+    "many combinations",
+    "two responses",
+    "wear coefficients at one frequency",
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_figure_is_empty_and_all_axes_have_units(case: str) -> None:
+    items = list(draw_report(CASES[case]()))
+    names = [item.name for item in items]
+    assert len(set(names)) == len(names)
+    for item in items:
+        assert item.title
+        if isinstance(item, Drawing):
+            assert item.caption.endswith(".")
+            assert "nan" not in item.caption
+            if case in LAID_OUT:
+                item.figure.draw_without_rendering()
+            if not item.name.startswith("precision"):
+                _check_panels(item)
+        elif isinstance(item, Missing):
+            assert item.sentence.endswith(".")
+        else:
+            assert item.rows
+            assert all(len(row) == len(item.columns) for row in item.rows)
+
+
+def _check_panels(drawing: Drawing) -> None:
+    assert drawing.figure.axes
+    for panel in drawing.figure.axes:
+        values = [np.ma.masked_invalid(line.get_ydata()).compressed() for line in panel.get_lines()]
+        values += [
+            np.ma.masked_invalid(collection.get_array()).compressed()
+            for collection in panel.collections
+            if collection.get_array() is not None
+        ]
+        assert any(array.size for array in values), f"{drawing.name}: an empty panel"
+        for axis in (panel.xaxis, panel.yaxis):
+            label = axis.get_label_text()
+            assert label.endswith(")") or label in WITHOUT_UNITS, label
+
+
+def test_a_complete_file_gives_every_figure_of_the_paper_in_its_order() -> None:
+    items = list(draw_report(_complete()))
+    assert _names(items, Drawing) == ALL_DRAWINGS
+    assert _names(items, Missing) == []
+    captions = " ".join(item.caption for item in items if isinstance(item, Drawing))
+    for number in (2, 4, 5, 6, 7, 8, 9, 12, 13, 14, 15):
+        assert f"Fig. {number} of the paper" in captions
+    assert "Figs. 10 and 11 of the paper" in captions
+
+
+def test_what_is_missing_says_which_output_to_ask_for() -> None:
+    items = list(draw_report(CASES["nothing asked for"]()))
+    sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
+    assert sentences["worn_volume"] == "Add worn_volume to [outputs] variables."
+    assert sentences["frequency_response"] == "Add response_amplitude to [outputs] variables."
+    assert sentences["mean_pressure"] == "Add mean_pressure to [outputs] variables."
+    assert sentences["wear_depth"] == "Add wear_depth to [outputs] variables."
+    assert "loops = [0]" in sentences["fretting_loops"]
+    assert sentences["natural_frequencies"].startswith("Add natural_frequency and mesh to [outputs] variables.")
+
+
+def test_the_wear_rate_alone_may_be_missing() -> None:
+    items = list(draw_report(make_result(without=["wear_rate"])))
+    assert "worn_volume_map" in _names(items, Drawing)
+    assert "wear_rate_map" in _names(items, Missing)
+
+
+@pytest.mark.parametrize(
+    ("case", "absent"),
+    [
+        (
+            "one point",
+            {"frequency_response", "worn_volume_map", "final_worn_volume", "outcome_map", "estimated_errors"},
+        ),
+        ("no cycles", {"worn_volume", "worn_volume_map", "wear_depth", "worn_profile"}),
+        ("nothing wears", {"worn_volume_map", "final_worn_volume", "wear_depth", "worn_profile"}),
+        ("pairs nowhere", {"worn_profile"}),
+        ("all failed", set(ALL_DRAWINGS)),
+    ],
+)
+def test_nothing_is_drawn_where_there_is_nothing_to_see(case: str, absent: set[str]) -> None:
+    assert not absent & set(_names(list(draw_report(CASES[case]())), Drawing))
+
+
+def test_all_points_failed() -> None:
+    items = list(draw_report(CASES["all failed"]()))
+    assert _names(items, Drawing) == ["outcome_map"]
+    assert "results" in _names(items, Missing)
+    table = next(item for item in items if item.name == "outcomes")
+    assert isinstance(table, Table)
+    assert table.rows == (("3", "branch lost", "8", "The branch was lost.", "200 Hz, implicit scheme"),)
+
+
+def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
+    before = dict(mpl.rcParams)
+    for item in draw_report(_complete()):
+        if isinstance(item, Drawing):
+            svg, png = item.save(tmp_path)
+            assert svg.name == f"{item.name}.svg"
+            assert svg.read_text(encoding="utf-8").rstrip().endswith("</svg>")
+            assert svg.stat().st_size < 200_000
+            header = png.read_bytes()[:24]
+            assert header.startswith(b"\x89PNG")
+            assert int.from_bytes(header[16:20]) == 900
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_saved_figure_is_the_same_each_time(tmp_path) -> None:
+    texts = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        folder.mkdir()
+        drawing = next(item for item in draw_report(make_result()) if item.name == "worn_volume")
+        assert isinstance(drawing, Drawing)
+        texts.append(drawing.save(folder)[0].read_bytes())
+    assert texts[0] == texts[1]
+
+
+def test_the_style_is_not_left_on_between_two_items() -> None:
+    before = dict(mpl.rcParams)
+    items = draw_report(make_result())
+    next(items)
+    assert dict(mpl.rcParams) == before
+
+
+def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
+    path = tmp_path / "made.nc"
+    make_result().dataset.to_netcdf(path)
+    with xr.open_dataset(path) as dataset:
+        list(draw_report(Result(path, dataset)))
+        # Values of the pairs are read for the points shown; what is small is kept.
+        assert not dataset["wear_depth"].variable._in_memory
+        assert not dataset["mean_pressure"].variable._in_memory
+        assert dataset["worn_volume"].variable._in_memory
+
+
+def test_neither_pyplot_nor_the_solver_is_imported() -> None:
+    code = (
+        "import sys, studyrunner.report.gallery;"
+        "print([name for name in ('matplotlib.pyplot', 'solver', 'studies', 'numba', 'mpi4py') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_lines_differ_without_their_colours() -> None:
+    looks = [line_style(number) for number in range(6)]
+    assert len({(str(look["linestyle"]), look["marker"]) for look in looks}) == 6
+    lightness = [np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) for colour in COLOURS[:3]]
+    assert np.min(np.diff(np.sort(lightness))) > 0.02
+
+
+def test_failed_points_that_hold_all_values_of_a_line_leave_no_warning() -> None:
+    result = make_result(failed=[1, 3, 5, 7])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        items = list(draw_report(result))
+    history = next(item for item in items if item.name == "worn_volume")
+    assert isinstance(history, Drawing)
+    assert len(history.figure.axes[0].get_lines()) == 1
+
+
+def test_an_exact_answer_is_drawn_beside_the_computed_one() -> None:
+    result = make_result()
+    exact = 1.02 * result.dataset["worn_volume"]
+    amplitude = 1.01 * result.dataset["response_amplitude"]
+    items = list(draw_report(with_variables(result, exact_worn_volume=exact, exact_response_amplitude=amplitude)))
+    for name in ("worn_volume", "frequency_response"):
+        drawing = next(item for item in items if item.name == name)
+        assert isinstance(drawing, Drawing)
+        assert "exact" in [line.get_label() for line in drawing.figure.axes[0].get_lines()]

@@ -1,0 +1,225 @@
+"""What is drawn are the numbers of the file: data of the artists against the dataset, picked by plain indexing."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+
+from tests.studyrunner.report.figure_cases import make_result, with_sector, with_variables
+from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, find_table, lines_of, values_of
+
+
+def test_worn_volume_over_cycles() -> None:
+    result = make_result()
+    drawing = draw_figure(result, "worn_volume")
+    lines = lines_of(drawing.figure.axes[0])
+    for number, label in enumerate(("implicit scheme", "explicit scheme")):
+        x, y = lines[label]
+        np.testing.assert_allclose(x, [0.0, 1.0, 5.0, 20.0])
+        np.testing.assert_allclose(y, 1e9 * values_of(result, "worn_volume", frequency=2, scheme=number))
+    assert "at 202 Hz" in drawing.caption
+    last = 1e9 * float(values_of(result, "worn_volume", frequency=2, scheme=1)[-1])
+    assert f"{last:.4g} mm³ (explicit scheme)" in drawing.caption
+
+
+def test_a_lost_branch_is_marked_on_the_history() -> None:
+    result = make_result()
+    jumps = result.dataset["jump_cycle"].copy()
+    jumps[2, 0, 0, 0, 0, 0] = 3000.0
+    x, y = lines_of(draw_figure(with_variables(result, jump_cycle=jumps), "worn_volume").figure.axes[0])[
+        "branch lost, jump"
+    ]
+    volume = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)
+    assert x == pytest.approx(3.0)
+    assert volume[1] < y[0] < volume[2]
+
+
+@pytest.mark.parametrize(("name", "factor"), [("worn_volume", 1e9), ("wear_rate", 1e12)])
+def test_maps_over_frequency_and_cycles(name: str, factor: float) -> None:
+    result = make_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
+    drawing = draw_figure(result, f"{name}_map")
+    for number in (0, 1):
+        expected = factor * values_of(result, name, scheme=number)[[1, 3, 2, 0]].T
+        np.testing.assert_allclose(cells_of(drawing.figure.axes[number]), expected)
+    assert np.isnan(cells_of(drawing.figure.axes[0])).all(axis=0).tolist() == [True, False, False, False]
+    assert drawing.figure.axes[0].patch.get_hatch()
+    largest = factor * float(np.nanmax(result.dataset[name]))
+    assert re.search(rf"The largest is {largest:.4g} mm³", drawing.caption)
+
+
+def test_final_worn_volume_has_gaps_and_crosses_where_points_failed() -> None:
+    result = make_result(failed=[2])
+    panel = draw_figure(result, "final_worn_volume").figure.axes[0]
+    lines = lines_of(panel)
+    for number, label in enumerate(("implicit scheme", "explicit scheme")):
+        np.testing.assert_allclose(lines[label][0], result.dataset["frequency"])
+        np.testing.assert_allclose(lines[label][1], 1e9 * values_of(result, "worn_volume", cycle=-1, scheme=number))
+    assert np.isnan(lines["implicit scheme"][1]).tolist() == [False, True, False, False]
+    assert lines["no result"][0].tolist() == [201.0]
+
+
+def test_oscillating_points_are_ringed() -> None:
+    result = make_result()
+    oscillates = result.dataset["oscillates"].copy()
+    oscillates[2, 0, 0, 0, 1, 0] = 1
+    x, y = lines_of(draw_figure(with_variables(result, oscillates=oscillates), "final_worn_volume").figure.axes[0])[
+        "oscillates"
+    ]
+    assert x.tolist() == [202.0]
+    np.testing.assert_allclose(y, 1e9 * values_of(result, "worn_volume", frequency=2, scheme=1, cycle=-1))
+
+
+def test_frequency_response_of_both_sweeps_is_open_at_the_fold() -> None:
+    result = make_result(sweep=["up", "down"], scheme=["implicit"])
+    branch, fold = result.dataset["branch"].copy(), result.dataset["fold_frequency"].copy()
+    branch[2:, ..., 0] = 1
+    fold[2, ..., 0] = 201.4
+    drawing = draw_figure(with_variables(result, branch=branch, fold_frequency=fold), "frequency_response")
+    lines = lines_of(drawing.figure.axes[0])
+    for number, sweep in enumerate(("up", "down")):
+        for cycle, text in ((0, "0 cycles"), (-1, "20 000 cycles")):
+            x, y = lines[f"sweep {sweep}, {text.replace('20 000', '20' + chr(160) + '000')}"]
+            known = np.isfinite(y)
+            expected = 1e3 * values_of(result, "response_amplitude", sweep=number, cycle=cycle)
+            np.testing.assert_allclose(y[known], expected)
+            np.testing.assert_allclose(x[known], result.dataset["frequency"])
+            gaps = [2] if (number, cycle) == (0, 0) else []
+            assert np.flatnonzero(~known).tolist() == gaps
+    assert lines["fold, sweep up"][0].tolist() == [201.4]
+    assert "201.4 Hz (sweep up)" in drawing.caption
+
+
+def test_unworn_states_of_several_schemes_are_one_line() -> None:
+    result = make_result(failed=[2, 5])
+    lines = lines_of(draw_figure(result, "frequency_response").figure.axes[0])
+    complete = make_result()
+    np.testing.assert_allclose(
+        lines["0 cycles"][1], 1e3 * values_of(complete, "response_amplitude", cycle=0, scheme=0), equal_nan=False
+    )
+
+
+def test_unstable_states_are_ringed() -> None:
+    result = make_result(scheme=["implicit"])
+    stable = result.dataset["stable"].copy()
+    stable[1, ..., -1] = 0
+    x, y = lines_of(draw_figure(with_variables(result, stable=stable), "frequency_response").figure.axes[0])["unstable"]
+    assert x.tolist() == [201.0]
+    np.testing.assert_allclose(y, 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=-1))
+
+
+def test_natural_frequencies_and_mesh() -> None:
+    result = with_sector(make_result())
+    drawing = draw_figure(result, "natural_frequencies")
+    left, right = drawing.figure.axes
+    faces = next(item for item in left.collections if isinstance(item, PolyCollection))
+    assert len(faces.get_paths()) == 6
+    modes = [line for line in right.get_lines() if line.get_label() != "this study"]
+    for line, mode in zip(modes, result.dataset["natural_frequency"].values.T, strict=True):
+        np.testing.assert_allclose(line.get_ydata(), mode)
+        np.testing.assert_allclose(line.get_xdata(), [0, 1, 2])
+    x, y = lines_of(right)["this study"]
+    assert x.tolist() == [0, 0]
+    assert y.tolist() == [200.0, 204.0]
+    assert "The lowest is 200 Hz" in drawing.caption
+
+
+def test_estimated_errors_are_the_worst_over_the_cycles() -> None:
+    result = make_result(failed=[2])
+    lines = lines_of(draw_figure(result, "estimated_errors").figure.axes[0])
+    for name, label in (("response_error", "response, worst cycle"), ("energy_error", "energy balance, worst cycle")):
+        expected = values_of(result, name, scheme=0).max(axis=1)
+        np.testing.assert_allclose(lines[label][1], expected)
+    np.testing.assert_allclose(lines["last worn volume"][1], values_of(result, "error_estimate", scheme=0))
+    assert lines["rtol = 0.01"][1].tolist() == [0.01, 0.01]
+
+
+def test_errors_of_points_that_hardly_wear_are_left_out() -> None:
+    result = make_result()
+    volume = result.dataset["worn_volume"].copy()
+    volume[0] *= 1e-9
+    lines = lines_of(draw_figure(with_variables(result, worn_volume=volume), "estimated_errors").figure.axes[0])
+    assert np.isnan(lines["last worn volume"][1]).tolist() == [True, False, False, False]
+    assert np.isfinite(lines["response, worst cycle"][1]).all()
+
+
+def test_outcome_map_tells_each_number_and_its_sentence() -> None:
+    result = make_result(failed=[2, 5])
+    drawing = draw_figure(result, "outcome_map")
+    panel = drawing.figure.axes[0]
+    found = {(round(text.get_position()[0]), round(text.get_position()[1])): text.get_text() for text in panel.texts}
+    assert found == {(1, 0): "3", (2, 1): "3"}
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["implicit scheme", "explicit scheme"]
+    assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
+    np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
+    assert "3: The branch was lost." in drawing.caption
+
+
+def test_table_of_outcomes() -> None:
+    table = find_table(make_result(failed=[2, 5]), "outcomes")
+    assert table is not None
+    assert [row[:4] for row in table.rows] == [
+        ("0", "converged", "6", "It was computed."),
+        ("3", "branch lost", "2", "The branch was lost."),
+    ]
+    assert table.rows[1][4] == "201 Hz, implicit scheme"
+    assert table.note.startswith("2 of 8 points")
+
+
+def test_table_of_certificates_is_that_of_the_file() -> None:
+    table = find_table(make_result(), "certificates")
+    assert table is not None
+    assert table.rows == (
+        ("worst certificate of", "3 points computed to tolerance"),
+        ("scaled residual", "1.0e-08 at frequency 2 Hz"),
+        ("folds in the sweeps", "none"),
+    )
+
+
+def test_table_of_folds_and_jumps() -> None:
+    result = make_result(sweep=["up", "down"])
+    fold, jumps = result.dataset["fold_frequency"].copy(), result.dataset["jump_cycle"].copy()
+    fold[1, ..., 1] = 201.5
+    jumps[0, 0, 0, 0, 1, 0] = 4000.0
+    table = find_table(with_variables(result, fold_frequency=fold, jump_cycle=jumps), "folds_and_jumps")
+    assert table is not None
+    # Both schemes share one sweep and its fold.
+    assert table.rows == (
+        ("fold", "201.5 Hz", "sweep down jumps to another branch"),
+        ("jump while wearing", "4000 cycles", "branch lost at 200 Hz, explicit scheme, sweep up"),
+    )
+
+
+def test_table_of_stability() -> None:
+    assert find_table(make_result(), "stability") is None
+    result = make_result(failed=[7])
+    limit, oscillates = result.dataset["step_limit"].copy(), result.dataset["oscillates"].copy()
+    limit[:2] = 800.0
+    limit[2] = np.inf
+    oscillates[0, 0, 0, 0, 1, 0] = 1
+    oscillates[2, 0, 0, 0, 0, 0] = 1
+    limit[3] = 900.0  # of a point that failed, perhaps for this
+    table = find_table(with_variables(result, step_limit=limit, oscillates=oscillates), "stability")
+    assert table is not None
+    assert table.rows == (
+        ("200 Hz, explicit scheme", "1000", "800", "yes", "yes", ""),
+        ("201 Hz, explicit scheme", "1000", "800", "yes", "", ""),
+        ("202 Hz, implicit scheme", "1000", "", "", "yes", ""),
+        ("204 Hz, explicit scheme", "1000", "900", "yes", "", ""),
+    )
+    assert table.note.startswith("3 points with an explicit step longer than step_limit, 2 with a wear rate")
+
+
+def test_what_a_figure_leaves_out_is_told() -> None:
+    coefficients = np.geomspace(1e-12, 1e-10, 7).tolist()
+    drawing = draw_figure(make_result(wear_coefficient=coefficients), "final_worn_volume")
+    assert len([label for label in lines_of(drawing.figure.axes[0]) if "scheme" in label]) == 2
+    assert (
+        "Shown for wear coefficient 1e-10 1/Pa; the file also holds 6 other values of wear coefficient."
+        in drawing.caption
+    )
+    few = draw_figure(make_result(wear_coefficient=[1e-12, 1e-11, 1e-10]), "final_worn_volume")
+    assert len([label for label in lines_of(few.figure.axes[0]) if "scheme" in label]) == 6
+    assert "Shown for" not in few.caption

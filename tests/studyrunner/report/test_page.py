@@ -1,0 +1,243 @@
+"""The page as text: complete in itself, texts of the file harmless, every item in its place."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from studyrunner.report import page
+from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
+from studyrunner.report.page import inline_svg, write_page
+from studyrunner.report.page_data import MOST_POINTS
+from tests.studyrunner.report.page_cases import AXES, as_result, build_file
+
+EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'"
+
+
+class Reader(HTMLParser):
+    """Elements with their attributes, and the text of each script."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self._in_script = False
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        self._in_script = tag == "script"
+        if self._in_script:
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in_script = self._in_script and tag != "script"
+
+    def handle_data(self, data: str) -> None:
+        if self._in_script:
+            self.scripts[-1] += data
+        else:
+            self.text += data
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+def drawing(name: str, text: str = "a", n_points: int = 3) -> Drawing:
+    figure = new_figure(2.0)
+    panel = figure.subplots()
+    panel.plot(np.random.default_rng(0).random(n_points))
+    panel.fill_between([0, 1], [1, 1])
+    panel.set_title(text, parse_math=False)
+    return Drawing(name, f"Title of {text}", f"Caption of {text}", figure)
+
+
+def read(path: Path) -> Reader:
+    return Reader(path.read_text(encoding="utf-8"))
+
+
+ITEMS: Sequence[Drawing | Missing | Table] = (
+    Missing("loops", "Fretting loops", "Add pairs to [outputs] loops."),
+    Table("numbers", "Numbers", ("one", "two"), (("1", "2"), ("3", "4")), "A note."),
+)
+
+
+def test_items_stand_in_their_order(tmp_path: Path) -> None:
+    result = as_result(build_file(), tmp_path / "some.nc")
+    items = [drawing("first"), *ITEMS, drawing("second")]
+    summary = write_page(result, items, tmp_path / "index.html")
+    assert (summary.n_drawings, summary.n_tables, summary.n_missing) == (2, 1, 1)
+    assert summary.n_bytes == (tmp_path / "index.html").stat().st_size
+    found = read(tmp_path / "index.html")
+    sections = [attributes.get("id") for attributes in found.all("section")]
+    assert sections == ["study", "explore", "first", "numbers", "second", "missing"]
+    assert "Add pairs to [outputs] loops." in found.text
+    for link in (attributes["href"] for attributes in found.all("a")):
+        assert link is not None
+        assert (tmp_path / link).is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        ["some.nc", "index.html", "first.svg", "first.png", "second.svg", "second.png"]
+    )
+
+
+def test_the_study_is_told(tmp_path: Path) -> None:
+    dataset = build_file(failed=[1, 2], versions="Python 9, fretwear 8")
+    write_page(as_result(dataset, tmp_path / "some.nc"), [], tmp_path / "index.html")
+    text = read(tmp_path / "index.html").text
+    for part in (
+        "16 points, 14 computed to tolerance",
+        "2 points: A step did not converge: <b>use</b> less.",
+        "190, 191, 192.5, 193 Hz",
+        "implicit, explicit",
+        "sdof_slider: 24 contact pairs, response tip",
+        "Python 9, fretwear 8",
+        'model = "sdof_slider"',
+    ):
+        assert part in text
+
+
+def test_nothing_comes_from_elsewhere(tmp_path: Path) -> None:
+    write_page(as_result(build_file(), tmp_path / "some.nc"), [drawing("first")], tmp_path / "index.html")
+    found = read(tmp_path / "index.html")
+    for tag, attributes in found.elements:
+        assert tag not in ("link", "iframe", "object", "embed", "base")
+        for name in ("src", "href", "xlink:href", "srcset", "data"):
+            assert not re.match(r"\s*(//|\w+:)", attributes.get(name) or "")
+    style = (Path(page.__file__).parent / "page.css").read_text(encoding="utf-8")
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_the_policy_allows_the_scripts_of_the_page_only(tmp_path: Path) -> None:
+    write_page(as_result(build_file(), tmp_path / "some.nc"), [], tmp_path / "index.html")
+    found = read(tmp_path / "index.html")
+    (policy,) = [each["content"] for each in found.all("meta") if each.get("http-equiv") == "Content-Security-Policy"]
+    assert policy is not None
+    kinds = [attributes.get("type") for attributes in found.all("script")]
+    assert kinds == ["application/json", None, None]
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in found.scripts[1:]]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    assert f"script-src {allowed};" in policy
+    assert "default-src 'none'" in policy
+
+
+def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
+    axes = {**AXES, "scheme": (EVIL, "explicit")}
+    surfaces = [EVIL] * 12 + ["other"] * 12
+    attributes = {"study": EVIL, "versions": EVIL, "source": EVIL, "scene_sha256": EVIL}
+    dataset = build_file(axes, surfaces=surfaces, responses=(EVIL, "tip"), **attributes)
+    dataset.attrs["title"] = EVIL
+    dataset["worn_volume"].attrs["long_name"] = EVIL
+    dataset["outcome"].attrs["sentences"] = "\n".join([EVIL] * 5)
+    result = as_result(dataset, tmp_path / "some.nc")
+    items = [drawing("first", EVIL), Table("t", EVIL, (EVIL,), ((EVIL,),), EVIL), Missing("m", EVIL, EVIL)]
+    write_page(result, items, tmp_path / "index.html")
+    found = read(tmp_path / "index.html")
+    assert found.all("img") == []
+    assert len(found.all("script")) == 3
+    for _, attributes in found.elements:
+        assert not any(name.startswith("on") for name in attributes)
+    assert found.text.count(EVIL) >= 11
+    content = json.loads(found.scripts[0])
+    assert content["responses"][0] == EVIL
+    assert content["maps"]["panels"][0]["title"] == EVIL
+    assert "<" not in found.scripts[0]
+
+
+def test_ids_are_unique_and_references_find_them(tmp_path: Path) -> None:
+    items = [drawing("first"), drawing("second")]
+    write_page(as_result(build_file(), tmp_path / "some.nc"), items, tmp_path / "index.html")
+    elements = read(tmp_path / "index.html").elements
+    ids = [attributes["id"] for _, attributes in elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    references = []
+    for tag, attributes in elements:
+        for name, value in attributes.items():
+            references += re.findall(r"url\(#(.*?)\)", value or "")
+            if name.endswith("href") and tag != "a":
+                references.append((value or "").removeprefix("#"))
+    assert len(references) > 10
+    assert set(references) <= set(ids)
+
+
+def test_the_style_sheet_of_an_svg_does_not_reach_the_page(tmp_path: Path) -> None:
+    drawing("first").save(tmp_path)
+    text = (tmp_path / "first.svg").read_text(encoding="utf-8")
+    assert "<style" in text
+    element = ElementTree.fromstring(inline_svg(text, "first-", "a < b"))
+    tags = {child.tag.rpartition("}")[2] for child in element.iter()}
+    assert not tags & {"style", "metadata"}
+    assert "path" in tags
+    assert element.get("aria-label") == "a < b"
+
+
+def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = as_result(build_file(), tmp_path / "some.nc")
+    items = [drawing("light"), drawing("heavy", n_points=20_000)]
+    write_page(result, items, tmp_path / "a.html")
+    assert read(tmp_path / "a.html").all("img") == []
+    monkeypatch.setattr(page, "_DRAWINGS_LIMIT", 1e5)
+    items = [drawing("light"), drawing("heavy", n_points=20_000)]
+    write_page(result, items, tmp_path / "index.html")
+    images = read(tmp_path / "index.html").all("img")
+    assert [image["alt"] for image in images] == ["Title of a"]
+    content = (images[0]["src"] or "").removeprefix("data:image/png;base64,")
+    assert base64.b64decode(content) == (tmp_path / "heavy.png").read_bytes()
+    assert (tmp_path / "index.html").stat().st_size < (tmp_path / "a.html").stat().st_size
+
+
+def test_a_page_of_25_points_is_below_10_megabytes(tmp_path: Path) -> None:
+    axes = {
+        **AXES,
+        "frequency": np.linspace(186.0, 198.0, 25).tolist(),
+        "wear_coefficient": (1e-11,),
+        "scheme": ("implicit",),
+    }
+    positions = np.random.default_rng(0).normal(size=(48, 3))
+    result = as_result(build_file(axes, cycles=np.linspace(0, 1e5, 101), positions=positions), tmp_path / "some.nc")
+    summary = write_page(result, [], tmp_path / "index.html")
+    # The drawings of a report may take `_DRAWINGS_LIMIT` more.
+    assert summary.n_bytes < page.PAGE_LIMIT - 1e6
+    assert read(tmp_path / "index.html").all("ul") == []
+
+
+def test_a_page_of_a_large_study_is_below_10_megabytes(tmp_path: Path) -> None:
+    axes = {**AXES, "frequency": np.linspace(1.0, 2.0, 625).tolist()}
+    result = as_result(build_file(axes, cycles=np.arange(21.0)), tmp_path / "some.nc")
+    summary = write_page(result, [], tmp_path / "index.html")
+    assert summary.n_bytes < 1e7
+    assert "most worn of 2500 converged points" in read(tmp_path / "index.html").text
+
+
+def test_too_many_points_leave_a_page_without_scripts(tmp_path: Path) -> None:
+    axes = {**AXES, "frequency": np.linspace(1.0, 2.0, MOST_POINTS).tolist()}
+    dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))
+    summary = write_page(as_result(dataset, tmp_path / "some.nc"), [drawing("first")], tmp_path / "index.html")
+    found = read(tmp_path / "index.html")
+    assert found.all("script") == []
+    assert "more than the" in found.text
+    assert summary.n_bytes < 1e6
+
+
+def test_an_older_page_stays_where_a_new_one_fails(tmp_path: Path) -> None:
+    path = tmp_path / "index.html"
+    path.write_text("old")
+
+    def fail():  # type: ignore[no-untyped-def]
+        yield drawing("first")
+        raise RuntimeError("broken")
+
+    with pytest.raises(RuntimeError, match="broken"):
+        write_page(as_result(build_file(), tmp_path / "some.nc"), fail(), path)
+    assert path.read_text() == "old"

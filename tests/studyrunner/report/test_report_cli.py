@@ -1,0 +1,116 @@
+"""The command `study-report`: what it writes, what it says, how it ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from studyrunner.report import gallery
+from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main, parse_options
+from studyrunner.report.drawing import Missing, Table
+from tests.studyrunner.report.page_cases import build_file
+
+
+def short_report(_result: object) -> Iterator[Missing | Table]:
+    yield Missing("loops", "[bold]Loops", "Ask for them.")
+    yield Table("t", "Table", ("a",), (("b",),))
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A folder to work in, with a result file; a report has no figures."""
+    monkeypatch.setattr(gallery, "draw_report", short_report)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    build_file().to_netcdf(tmp_path / "results" / "worn.x.nc")
+    return tmp_path
+
+
+def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["results/worn.x.nc"]) == WRITTEN
+    said = capsys.readouterr()
+    assert (short / "worn.x-report" / "index.html").is_file()
+    assert said.out.startswith("worn.x-report/index.html: 0 figures, 1 table, 1 left out, ")
+    assert "open it in a browser" in said.out
+    assert said.out.count("\n") == 1
+    assert said.err == ""
+
+
+def test_a_folder_can_be_named(short: Path) -> None:
+    assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
+    assert [path.name for path in (short / "a" / "b").iterdir()] == ["index.html"]
+    # Again: it is replaced.
+    assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
+
+
+def test_failed_points_are_no_failure_of_the_report(short: Path) -> None:
+    build_file(failed=range(16)).to_netcdf(short / "failed.nc")
+    assert main(["failed.nc"]) == WRITTEN
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        ([], "options"),
+        (["results/worn.x.nc", "--folder", "x"], "options"),
+        (["nowhere.nc"], "nowhere.nc"),
+        (["results"], "results"),
+        (["text.nc"], "text.nc"),
+        (["results/worn.x.nc", "-o", "text.nc"], '-o = "text.nc"'),
+        (["results/worn.x.nc", "-o", "text.nc/inside"], '-o = "text.nc/inside"'),
+    ],
+)
+def test_bad_input_is_one_line(short: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], key: str) -> None:
+    (short / "text.nc").write_text("no result")
+    assert main(arguments) == BAD_INPUT
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("study-report: ")
+    assert said.err.count("\n") == 1
+    assert key in said.err
+    assert sorted(path.name for path in short.iterdir()) == ["results", "text.nc"]
+
+
+def test_an_unexpected_failure_has_a_traceback(
+    short: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_result: object) -> Iterator[Missing]:
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr(gallery, "draw_report", fail)
+    assert main(["results/worn.x.nc"]) == UNEXPECTED
+    said = capsys.readouterr().err
+    assert "unexpected failure" in said
+    assert "ZeroDivisionError: broken" in said
+
+
+def test_an_interrupt_is_one_line(
+    short: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(_result: object) -> Iterator[Missing]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(gallery, "draw_report", interrupt)
+    assert main(["results/worn.x.nc"]) == INTERRUPTED
+    assert capsys.readouterr().err == "study-report: interrupted\n"
+
+
+def test_help_has_examples_and_does_not_load_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == WRITTEN
+    text = capsys.readouterr().out
+    assert "study-report dovetail.nc" in text
+    assert "exit status" in text
+    code = (
+        "import sys; from studyrunner.report.cli import main; main(['--help']);"
+        "sys.exit(bool({'matplotlib', 'plotly', 'xarray', 'numpy'} & set(sys.modules)))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_options() -> None:
+    assert parse_options(["some/where/out.nc"]).folder == Path("out-report")
+    assert parse_options(["out.nc", "-o", "f"]).folder == Path("f")

@@ -1,0 +1,302 @@
+"""The accessor of result files: complex responses, flanks as grids, loops, files joined."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from studyrunner.accessor import find_grid, join_results
+
+SURFACES = ("pressure side", "back")
+
+
+def flat(across, along):
+    """Points (n_across * n_along, 3) of a flank at 45 degrees to the radius x, its upper edge outside; along is z."""
+    down, axial = np.meshgrid(across, along, indexing="ij")
+    return np.stack([0.245 - down / np.sqrt(2), 0.0055 + down / np.sqrt(2), axial - 0.02], axis=-1).reshape(-1, 3)
+
+
+def curved(angles, along, radius=0.01):
+    angle, axial = np.meshgrid(angles, along, indexing="ij")
+    return np.stack([0.3 + radius * np.cos(angle), radius * np.sin(angle), axial], axis=-1).reshape(-1, 3)
+
+
+def make_result(positions, surfaces, **axes):
+    """A result of these axes, two cycles and two responses, whose values tell where they belong."""
+    sizes = {**{name: len(values) for name, values in axes.items()}, "cycle": 2, "contact": len(positions)}
+    shape = tuple(sizes.values())
+    depth = np.arange(np.prod(shape), dtype=np.float64).reshape(shape)
+    on = tuple(axes)
+    return xr.Dataset(
+        {
+            "wear_depth": ((*on, "cycle", "contact"), depth, {"units": "m", "long_name": "wear depth"}),
+            "worn_volume": ((*on, "cycle"), depth.sum(axis=-1)),
+            "response_amplitude": ((*on, "cycle", "response"), 1.0 + depth[..., :2]),
+            "response_phase": ((*on, "cycle", "response"), 0.1 * depth[..., :2]),
+            "outcome": (
+                on,
+                np.zeros(shape[:-2], np.int8),
+                {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "converged singular", "sentences": "a\nb"},
+            ),
+            "newton_iterations": (on, np.arange(np.prod(shape[:-2]), dtype=np.int32).reshape(shape[:-2])),
+        },
+        {
+            **axes,
+            "cycle": [0.0, 1000.0],
+            "contact": np.arange(len(positions), dtype=np.int32),
+            "response": ["tip", "root"],
+            **{f"contact_{name}": ("contact", positions[:, column]) for column, name in enumerate("xyz")},
+            "contact_surface": ("contact", list(surfaces)),
+        },
+        {
+            "title": "a study",
+            "scene_sha256": "0",
+            "history": "computed",
+            "study": "[scene]\nfriction_coefficient = 0.5\n",
+        },
+    )
+
+
+@pytest.fixture
+def result():
+    """Two flanks of 3 x 4 pairs, mirrored, the pairs in an order that says nothing."""
+    one = flat([0.0, 0.003, 0.007], np.linspace(0.0, 0.04, 4))
+    order = np.random.default_rng(1).permutation(24)
+    positions = np.concatenate([one, one * [1, -1, 1]])[order]
+    return make_result(positions, np.repeat(SURFACES, 12)[order], frequency=[100.0, 101.0, 102.0], scheme=["b", "a"])
+
+
+def test_response_is_the_complex_amplitude_of_the_first_harmonic(result):
+    response = result.fretwear.response()
+    assert response.dims == result.response_amplitude.dims
+    np.testing.assert_allclose(np.abs(response), result.response_amplitude)
+    quarter = (response * np.exp(0.5j * np.pi)).real
+    np.testing.assert_allclose(quarter, result.response_amplitude * np.cos(0.5 * np.pi + result.response_phase))
+    assert response.attrs["units"] == "m"
+
+
+def test_surfaces_are_in_the_order_of_their_first_pairs(result):
+    first = str(result.contact_surface.values[0])
+    assert result.fretwear.surfaces == (first, *(each for each in SURFACES if each != first))
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_flank_puts_every_value_where_its_pair_is(result, surface):
+    flank = result.fretwear.flank("wear_depth", surface)
+    assert flank.dims == ("frequency", "scheme", "cycle", "across", "along")
+    np.testing.assert_allclose(flank.across, [0.0, 0.003, 0.007], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(flank.along, np.linspace(0.0, 0.04, 4), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(flank.contact_x, (0.245 - flank.across / np.sqrt(2)).broadcast_like(flank[0, 0, 0]))
+    np.testing.assert_allclose(flank.contact_z, (flank.along - 0.02).broadcast_like(flank[0, 0, 0]))
+    for i, j in np.ndindex(3, 4):
+        at = flank[..., i, j]
+        assert np.array_equal(at, result.wear_depth.sel(contact=int(at.contact)))
+    assert set(result.contact_surface.sel(contact=flank.contact).values.ravel()) == {surface}
+    assert flank.across.attrs["units"] == flank.along.attrs["units"] == "m"
+    assert flank.attrs == result.wear_depth.attrs
+
+
+def test_flanks_of_one_shape_can_be_subtracted(result):
+    flanks = [result.fretwear.flank("wear_depth", surface).drop_vars("contact") for surface in SURFACES]
+    assert (flanks[0] - flanks[1]).sizes == flanks[0].sizes
+
+
+def test_flank_of_a_selection_is_the_selection_of_the_flank(result):
+    where = {"frequency": 1, "cycle": 1}
+    of_selection = result.isel(where).fretwear.flank("wear_depth", "back")
+    xr.testing.assert_identical(of_selection, result.fretwear.flank("wear_depth", "back").isel(where))
+
+
+def test_dimensions_after_the_pair_stay_before_the_grid(result):
+    result["loop_force"] = result.wear_depth.expand_dims(component=["normal"], axis=-1)
+    assert result.fretwear.flank("loop_force", "back").dims[-3:] == ("component", "across", "along")
+
+
+def test_flank_says_what_is_wrong(result):
+    with pytest.raises(
+        ValueError, match=r"worn_volume does not belong to contact pairs, but to frequency, scheme, cycle\."
+    ):
+        result.fretwear.flank("worn_volume", "back")
+    with pytest.raises(ValueError, match=r"no surface 'front' in the result; it has .*back"):
+        result.fretwear.flank("wear_depth", "front")
+    with pytest.raises(
+        ValueError, match=r"Surface 'back' is not drawn as a map: its contact pairs do not lie on a grid\."
+    ):
+        result.isel(contact=result.contact_surface.values == "back").isel(contact=slice(1, None)).fretwear.flank(
+            "wear_depth", "back"
+        )
+
+
+GRIDS = {
+    "flank": (flat([0.0, 0.0035, 0.007], np.linspace(0, 0.04, 8)), (3, 8)),
+    "unequal spacings": (flat([0.0, 0.001, 0.007], [0.0, 0.001, 0.003, 0.01, 0.04]), (3, 5)),
+    "two by two": (flat([0.0, 0.007], [0.0, 0.04]), (2, 2)),
+    "one line": (flat([0.0], np.linspace(0, 0.04, 5)), (1, 5)),
+    "more lines than pairs a line": (flat(np.linspace(0, 0.007, 9), [0.0, 0.04]), (9, 2)),
+    "sheared": (flat([0.0, 0.0035, 0.007], np.linspace(0, 0.04, 8)) @ [[1, 0, 0.3], [0, 1, 0.3], [0, 0, 1]], (3, 8)),
+    "curved": (curved(np.linspace(0.1, 2.5, 6), np.linspace(0, 0.01, 4)), (6, 4)),
+}
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", GRIDS)
+def test_grids_are_found_in_any_orientation_and_order(name, seed):
+    points, shape = GRIDS[name]
+    random = np.random.default_rng(seed)
+    rotation = Rotation.random(rng=random)
+    order = random.permutation(len(points))
+    noise = 1e-8 * random.uniform(-1, 1, points.shape)
+    grid = find_grid(rotation.apply(points)[order] + noise)
+    assert grid.pair.shape == shape
+
+    # Pair numbers before rotation and shuffle: lines follow each other, along the axis one way or the other.
+    axis = rotation.apply([0.0, 0.0, 1.0])
+    upwards = axis[np.argmax(np.abs(axis))] > 0
+    expected = np.arange(len(points)).reshape(shape)[:, :: 1 if upwards else -1]
+    assert np.array_equal(order[grid.pair], expected)
+    steps = np.linalg.norm(np.diff(points.reshape(*shape, 3)[:, 0, :2], axis=0), axis=1)
+    np.testing.assert_allclose(np.diff(grid.across), steps, rtol=0, atol=1e-6 if name == "sheared" else 1e-7)
+    z = points.reshape(*shape, 3)[0, :, 2]
+    np.testing.assert_allclose(grid.along, z - z[0] if upwards else (z[-1] - z)[::-1], rtol=0, atol=1e-7)
+    assert grid.across[0] == grid.along[0] == 0.0
+
+
+def test_square_grid_is_found_whatever_the_order():
+    points = flat(np.linspace(0, 0.03, 4), np.linspace(0, 0.03, 4))
+    for seed in range(20):
+        order = np.random.default_rng(seed).permutation(16)
+        assert np.array_equal(order[find_grid(points[order]).pair], np.arange(16).reshape(4, 4))
+
+
+def test_single_pair_is_a_grid():
+    assert find_grid(np.array([[1.0, 2.0, 3.0]])).pair.tolist() == [[0]]
+
+
+def moved(points, shift):
+    return points + np.eye(len(points))[:, 5:6] * shift
+
+
+IRREGULAR = {
+    "random": np.random.default_rng(0).normal(size=(12, 3)),
+    "one missing": flat([0.0, 0.0035, 0.007], np.linspace(0, 0.04, 8))[1:],
+    "one moved along": moved(flat([0.0, 0.0035, 0.007], np.linspace(0, 0.04, 8)), [0, 0, 0.001]),
+    "one lifted": moved(flat([0.0, 0.0035, 0.007], np.linspace(0, 0.04, 8)), [0.001, 0.001, 0]),
+    "around a pin": curved(np.linspace(0, 2 * np.pi, 12, endpoint=False), np.linspace(0, 0.01, 4)),
+    "two in one place": np.repeat(flat([0.0, 0.007], [0.0, 0.04]), 2, axis=0),
+    "all in one place": np.zeros((3, 3)),
+    "not known": np.full((4, 3), np.nan),
+}
+
+
+@pytest.mark.parametrize("name", IRREGULAR)
+def test_what_is_no_grid_is_refused(name):
+    with pytest.raises(ValueError, match=r"^(its contact pairs do not|two of its|the positions of its)[^.]*\.$"):
+        find_grid(IRREGULAR[name])
+
+
+def with_loops(result, contact):
+    phase = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    shape = (*result.wear_depth.shape, 8, 3)
+    force = np.full(shape, np.nan)
+    force[..., contact, :, :] = np.cos(phase)[:, None] * [1.0, 2.0, 3.0]
+    dims = (*result.wear_depth.dims, "phase", "component")
+    loops = {"loop_force": (dims, force), "loop_displacement": (dims, 1e-6 * force)}
+    return result.assign(loops).assign_coords(
+        phase=("phase", phase, {"units": "rad"}), component=["normal", "tangent_1", "tangent_2"]
+    )
+
+
+def test_loop_is_closed(result):
+    loop = with_loops(result, 7).fretwear.loop(7)
+    assert loop.force.dims == ("frequency", "scheme", "cycle", "phase", "component")
+    np.testing.assert_allclose(loop.phase, np.linspace(0, 2 * np.pi, 9), rtol=1e-15)
+    assert loop.phase.attrs == {"units": "rad"}
+    assert np.array_equal(loop.force.isel(phase=0), loop.force.isel(phase=-1))
+    np.testing.assert_allclose(loop.force.sel(component="tangent_1")[0, 0, 0], 2 * np.cos(loop.phase), atol=1e-15)
+    np.testing.assert_allclose(loop.displacement, 1e-6 * loop.force)
+
+
+def test_loop_that_is_not_there_says_what_to_ask_for(result):
+    with pytest.raises(ValueError, match=r"holds no loops; ask for it by \[outputs\] loops = \[7\]\."):
+        result.fretwear.loop(7)
+    with pytest.raises(ValueError, match=r"holds no loop of contact pair 6; ask for it by \[outputs\] loops = \[6\]"):
+        with_loops(result, 7).fretwear.loop(6)
+    with pytest.raises(ValueError, match="no contact pair 99"):
+        with_loops(result, 7).fretwear.loop(99)
+
+
+def test_parts_of_a_result_make_the_result_again(result, tmp_path):
+    whole = with_loops(result, 7).assign_coords(nodal_diameter=[0, 1])
+    whole["natural_frequency"] = (("nodal_diameter", "mode"), np.ones((2, 3)))
+    parts = [whole.isel(frequency=[0, 2], scheme=[0]), whole.isel(frequency=[1], scheme=[0]), whole.isel(scheme=[1])]
+    joined = join_results(parts)
+    xr.testing.assert_identical(joined.drop_attrs(deep=False), whole.drop_attrs(deep=False))
+    assert joined.attrs == {**whole.attrs, "history": "joined of 3 results\ncomputed"}
+    joined.to_netcdf(tmp_path / "joined.nc")
+    with xr.open_dataset(tmp_path / "joined.nc") as again:
+        assert again.equals(joined)
+
+
+def test_later_results_win_point_by_point(result):
+    later = result.isel(frequency=[1]).copy(deep=True)
+    later["worn_volume"][:] = np.nan
+    later["outcome"][:] = 1
+    later = later.drop_vars("wear_depth").assign(jump_cycle=later.outcome.astype(float))
+    joined = join_results([result, later])
+    assert joined.outcome.dtype == np.int8
+    assert joined.outcome.values[:, 0].tolist() == [0, 1, 0]
+    assert joined.worn_volume[1].isnull().all()
+    assert joined.wear_depth[1].isnull().all()
+    assert joined.jump_cycle[1].notnull().all()
+    assert joined.jump_cycle[::2].isnull().all()
+    assert np.array_equal(joined.wear_depth[::2], result.wear_depth[::2])
+    assert join_results([later, result]).drop_vars("jump_cycle").equals(result)
+
+
+def test_points_of_no_result_are_marked(result):
+    joined = join_results([result.isel(frequency=[0], scheme=[0]), result.isel(frequency=[2], scheme=[1])])
+    assert joined.outcome.values.tolist() == [[0, -1], [-1, 0]]
+    assert joined.newton_iterations.values.tolist() == [[0, 0], [0, 5]]
+    assert joined.worn_volume.isnull().sum() == 4
+    assert joined.outcome.attrs["flag_values"].tolist() == [0, 1, -1]
+    assert joined.outcome.attrs["flag_meanings"].split() == ["converged", "singular", "not_computed"]
+    assert len(joined.outcome.attrs["sentences"].splitlines()) == 3
+
+
+def test_axes_that_differ_by_round_off_are_one(result):
+    other = result.assign_coords(frequency=np.nextafter(result.frequency.values, 1e3))
+    assert join_results([result, other]).sizes == result.sizes
+
+
+def test_other_cycles_leave_gaps_and_nothing_of_an_earlier_result(result):
+    later = result.isel(frequency=[0]).assign_coords(cycle=[0.0, 500.0])
+    joined = join_results([result, later])
+    assert joined.cycle.values.tolist() == [0.0, 500.0, 1000.0]
+    assert joined.worn_volume[0, 0].isnull().values.tolist() == [False, False, True]
+    assert joined.worn_volume[1, 0].isnull().values.tolist() == [False, True, False]
+
+
+def test_a_key_of_the_study_becomes_an_axis(result):
+    slippery = result.assign_attrs(study="[scene]\nfriction_coefficient = 0.1\n[solver]\nrtol = 0.1", scene_sha256="1")
+    for key in ("friction_coefficient", "scene.friction_coefficient"):
+        joined = join_results([result, slippery], dim=key)
+        assert joined.worn_volume.dims == ("friction_coefficient", "frequency", "scheme", "cycle")
+        assert joined.friction_coefficient.values.tolist() == [0.1, 0.5]
+        assert joined.contact_x.equals(result.contact_x)
+        assert "study" not in joined.attrs
+        assert np.array_equal(joined.wear_depth.sel(friction_coefficient=0.5), result.wear_depth)
+
+
+def test_what_cannot_be_joined_is_refused(result):
+    with pytest.raises(ValueError, match="no results"):
+        join_results([])
+    with pytest.raises(ValueError, match="different scenes: name the key in which they differ by dim="):
+        join_results([result, result.assign_attrs(scene_sha256="1")])
+    with pytest.raises(ValueError, match="different axes"):
+        join_results([result, result.isel(scheme=0)])
+    with pytest.raises(ValueError, match="different contact pairs: see contact_x"):
+        join_results([result, result.assign_coords(contact_x=2 * result.contact_x)])
+    with pytest.raises(ValueError, match="gravity is not one value in the study of 'a study'"):
+        join_results([result, result], dim="gravity")
