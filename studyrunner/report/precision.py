@@ -325,8 +325,11 @@ def _response_uncertainty(best: Run, volume: float, difference: float) -> float:
     if not before.size:
         return difference
     grown = 1.0 - best.worn[before[-1]] / best.worn[-1]
-    changed = np.linalg.norm(best.response[-1] - best.response[before[-1]]) / np.linalg.norm(best.response[-1])
-    return best.response_error + float(changed / grown) * volume
+    size = float(np.linalg.norm(best.response[-1]))
+    if size == 0.0:
+        return difference
+    changed = float(np.linalg.norm(best.response[-1] - best.response[before[-1]])) / size
+    return best.response_error + changed / grown * volume
 
 
 def _or_inf(value: float) -> float:

@@ -29,7 +29,7 @@ _DASH = "\N{EN DASH}"
 
 def list_precision(precision: Precision, shown: Sequence[Point]) -> Iterator[Table]:
     """All tables; those of orders and of all settings for the points shown only."""
-    yield _table_of_recommendations(precision)
+    yield _table_of_recommendations(precision, shown)
     yield from _table_of_orders(precision, shown)
     yield from _table_of_stable_steps(precision)
     for number, point in enumerate(shown, start=1):
@@ -63,11 +63,13 @@ def _difference(reference: Reference, quantity: str) -> float:
     return reference.volume_difference if quantity == VOLUME else reference.response_difference
 
 
-def _table_of_recommendations(precision: Precision) -> Table:
+def _table_of_recommendations(precision: Precision, shown: Sequence[Point]) -> Table:
+    others = {point.label for point in precision.points} - {point.label for point in shown}
     rows = [
         (label or _DASH, show_percent(item.target), *_recommended(precision, item))
         for label, items in recommendations(precision)
         for item in items
+        if label not in others
     ]
     note = (
         "The cheapest setting whose errors of worn volume and response are both below the target, the uncertainty of"
