@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 from studyrunner import gather
+from studyrunner.accessor import FretwearAccessor
 from studyrunner.evaluate import endings
 from studyrunner.gather import Gathered
 from studyrunner.output import parts_folder
