@@ -171,6 +171,10 @@ class Dispatcher(Generic[Task]):
                 self._free[rank] = None
         return task
 
+    def task(self, number: int) -> Task:
+        """A task that is computed."""
+        return self._held[number].task
+
     def watch(self) -> None:
         """Called many times a second: now and then learns from tasks that take longer than expected.
 

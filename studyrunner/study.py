@@ -148,6 +148,9 @@ class SolverSection(Section):
     shortcuts: Annotated[bool, BeforeValidator(read_switch)] = Field(
         True, description="whether points with the same history share one; false: every point is computed on its own"
     )
+    time_limit: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+        None, description="s, CPU time that a start state or a wear history may take; none unless it is given"
+    )
 
 
 class OutputsSection(Section):

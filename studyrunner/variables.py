@@ -74,6 +74,7 @@ KEPT = {
         "int8",
         ("steady", "oscillating"),
     ),
+    "message": Variable((), "1", "what an unexpected error said, empty where there was none", "U240"),
 }
 """Those that every result holds."""
 
