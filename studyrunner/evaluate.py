@@ -106,6 +106,7 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask) ->
         counts,
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
+        loops=task.loops,
     )
 
 

@@ -25,10 +25,11 @@ from studyrunner.evaluate import endings
 from studyrunner.output import partial_path
 from studyrunner.parts import Parts, histories_of, variable_sizes
 from studyrunner.scene import SceneFacts
+from studyrunner.scene_variables import SceneVariable
 from studyrunner.study import Study
 from studyrunner.study_file import format_study
 from studyrunner.tasks import TaskPlan
-from studyrunner.variables import ASKED, COORDINATES, KEPT, Variable
+from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 _PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
 _BYTES_A_SLAB = 16e6
@@ -53,10 +54,18 @@ class _Index:
     row: NDArray[np.int32]
 
 
-def gather(study: Study, facts: SceneFacts, plan: TaskPlan, parts: Parts, path: Path) -> Gathered:
+def gather(
+    study: Study,
+    facts: SceneFacts,
+    plan: TaskPlan,
+    parts: Parts,
+    path: Path,
+    of_scene: Sequence[SceneVariable] = (),
+) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
-    Every point of the study has exactly one record; anything else is a bug and raises ValueError.
+    of_scene: what no task computes. Every point of the study has exactly one record; anything else is a bug and raises
+    ValueError.
     """
     index, gathered = _read_through(study, plan, parts)
     temporary = partial_path(path)
@@ -64,6 +73,7 @@ def gather(study: Study, facts: SceneFacts, plan: TaskPlan, parts: Parts, path: 
         with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
             _write_values(file, study, facts, parts, index)
+            _write_scene(file, study, parts, of_scene)
             _write_coordinates(file, study, facts)
         os.replace(temporary, path)
     finally:
@@ -97,7 +107,7 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts:
     shape = tuple(len(values) for values in study.dimensions.values())
     sizes = variable_sizes(study, facts)
     asked = [name for name in ASKED if name in study.outputs.variables]
-    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
+    variables = {**{name: ASKED[name] for name in asked}, **(LOOPS if study.outputs.loops else {}), **KEPT}
     for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
         file.createDimension(name, size)
     slab = _slab_shape(shape, parts.kind.itemsize)
@@ -109,7 +119,7 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts:
             compression="zlib",
             complevel=1,
             shuffle=True,
-            chunksizes=(*slab, *(sizes[dimension] for dimension in entry.dimensions)),
+            chunksizes=(*slab, *(1 if _one_pair(name, of) else sizes[of] for of in entry.dimensions)),
             fill_value=math.nan if entry.dtype.startswith("float") else None,
         )
         variable.setncatts(_attributes(name, entry))
@@ -122,7 +132,16 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts:
         lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
         for name, entry in variables.items():
             values = records[name].reshape(*lengths, *records[name].shape[1:])
-            file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+            if name not in LOOPS:
+                file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+                continue
+            for place, pair in enumerate(study.outputs.loops):
+                file[name][(*region, slice(None), pair)] = values[..., place, :, :]
+
+
+def _one_pair(name: str, dimension: str) -> bool:
+    """Whether a chunk holds a single pair: then those whose loops were not asked for take no room."""
+    return name in LOOPS and dimension == "contact"
 
 
 def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
@@ -161,18 +180,53 @@ def _read_slab(parts: Parts, index: _Index, first: int, last: int) -> NDArray[np
     return records
 
 
+def _write_scene(file: netCDF4.Dataset, study: Study, parts: Parts, of_scene: Sequence[SceneVariable]) -> None:
+    shape = tuple(len(values) for values in study.dimensions.values())
+    slab = _slab_shape(shape, parts.kind.itemsize)
+    for scene in of_scene:
+        dimensions = (scene.name,) if scene.coordinate else scene.entry.dimensions
+        for dimension, size in zip(dimensions, scene.values.shape[-len(dimensions) :], strict=True):
+            if dimension not in file.dimensions:
+                file.createDimension(dimension, size)
+        if not scene.axes:
+            _write_whole(file, scene.name, dimensions, scene.values, scene.entry)
+            continue
+        own = scene.values.shape[len(shape) :]
+        variable = file.createVariable(
+            scene.name,
+            scene.entry.dtype,
+            (*study.dimensions, *dimensions),
+            compression="zlib",
+            complevel=1,
+            shuffle=True,
+            chunksizes=(*slab, *own),
+            fill_value=math.nan,
+        )
+        variable.setncatts(_attributes(scene.name, scene.entry))
+        values = np.broadcast_to(scene.values, (*shape, *own))
+        for region, _, _ in _slabs(shape, slab):
+            variable[region] = values[region]
+
+
 def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -> None:
     for name, (dimension, values) in coordinates(study, facts).items():
-        texts = values.dtype.kind == "U"
-        kind: Any = str if texts else values.dtype
-        variable = file.createVariable(name, kind, (dimension,))
-        variable.setncatts(_attributes(name, COORDINATES[name]))
-        variable[:] = values.astype(object) if texts else values
+        _write_whole(file, name, (dimension,), values, COORDINATES[name])
+
+
+def _write_whole(
+    file: netCDF4.Dataset, name: str, dimensions: tuple[str, ...], values: NDArray[np.generic], entry: Variable
+) -> None:
+    """A coordinate or another small array."""
+    texts = values.dtype.kind == "U"
+    kind: Any = str if texts else values.dtype
+    variable = file.createVariable(name, kind, dimensions)
+    variable.setncatts(_attributes(name, entry))
+    variable[:] = values.astype(object) if texts else values
 
 
 def _attributes(name: str, entry: Variable) -> dict[str, object]:
     """Attributes of a variable of the file."""
-    content = "coordinate" if name in COORDINATES else "modelResult"
+    content = "coordinate" if name in COORDINATES else entry.content
     found: dict[str, object] = {
         "units": entry.units,
         "long_name": entry.long_name,
@@ -184,6 +238,7 @@ def _attributes(name: str, entry: Variable) -> dict[str, object]:
     if name == "outcome":
         found["flag_values"] = np.array([flag.number for flag in endings()], dtype=entry.dtype)
         found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
+        found["sentences"] = "\n".join(flag.sentence for flag in endings())
     if name in ASKED and not entry.dtype.startswith("float"):
         found["comment"] = "0 where the point failed, see outcome"
     return found
@@ -197,6 +252,9 @@ def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray
     found["cycle"] = ("cycle", np.array(study.cycles_kept))
     found["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
     found["response"] = ("response", _labels(facts.response_names))
+    if study.outputs.loops:
+        found["phase"] = ("phase", 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES)
+        found["component"] = ("component", _labels(LOOP_COMPONENTS))
     for column, name in enumerate(("contact_x", "contact_y", "contact_z")):
         found[name] = ("contact", np.array(facts.position[:, column]))
     found["contact_area"] = ("contact", np.array(facts.area))

@@ -21,7 +21,7 @@ from studyrunner.results import MarchResult
 from studyrunner.scene import SceneFacts
 from studyrunner.study import Study
 from studyrunner.tasks import MarchTask, march_variables
-from studyrunner.variables import ASKED, KEPT
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 SECONDS_A_FILE = 0.25
 """Results wait at most so long for others that go into the same file: 10 000 short tasks do not make as many files."""
@@ -32,7 +32,12 @@ _MARCH, _SHARE = "march", "share"
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
-    return {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    return {
+        "cycle": len(study.cycles_kept),
+        "contact": len(facts.area),
+        "response": len(facts.response_names),
+        **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),
+    }
 
 
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
@@ -41,8 +46,10 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     fields: list[tuple[str, str, tuple[int, ...]]] = [(_MARCH, "int64", ()), (_SHARE, "int64", ())]
     fields.extend((name, entry.dtype, ()) for name, entry in KEPT.items())
     for name in march_variables(study):
-        entry = ASKED[name]
-        fields.append((name, entry.dtype, tuple(sizes[dimension] for dimension in entry.dimensions)))
+        # of all pairs, only those asked for have a loop
+        lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
+        entry = LOOPS.get(name) or ASKED[name]
+        fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
     return np.dtype(fields)
 
 

@@ -15,6 +15,7 @@ from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
+from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
 from studyrunner.study import Study
 from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask, TaskPlan, build_tasks
@@ -50,6 +51,10 @@ def run_study(ranks: Ranks, study: Study, model: ReducedModel, path: Path, progr
     """Rank 0: computes the study of this model together with the other ranks and writes the file `path`."""
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
+    # Before anything else is computed: what the scene cannot tell is bad input.
+    if "natural_frequency" in study.outputs.variables:
+        progress.say("finding the natural frequencies of the scene")
+    of_scene = build_scene_variables(study, model)
     parts = Parts(parts_folder(path), record_type(study, facts))
     try:
         job = Job(model, study.friction_coefficient)
@@ -60,7 +65,7 @@ def run_study(ranks: Ranks, study: Study, model: ReducedModel, path: Path, progr
         # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
         from studyrunner.gather import gather
 
-        gathered = gather(study, facts, plan, parts, path)
+        gathered = gather(study, facts, plan, parts, path, of_scene)
     finally:
         # Nothing goes on from an interrupted run.
         parts.remove()
