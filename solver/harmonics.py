@@ -39,18 +39,23 @@ def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
     highest = max(orders, default=0)
     if n_samples <= 2 * highest:
         raise ValueError(f"{n_samples} samples cannot tell {highest} harmonics apart")
-    phase = 2.0 * np.pi * np.arange(n_samples) / n_samples
-    angle = np.array(orders, np.float64)[:, None] * phase
-    synthesis = np.empty((2 * len(orders) + 1, n_samples))
-    synthesis[0] = 1.0
-    synthesis[1::2] = np.cos(angle)
-    synthesis[2::2] = np.sin(angle)
+    to_time = synthesis(orders, 2.0 * np.pi * np.arange(n_samples) / n_samples)
     weight = np.full(2 * len(orders) + 1, 2.0 / n_samples)
     weight[0] = 1.0 / n_samples
-    analysis = np.ascontiguousarray((synthesis * weight[:, None]).T)
-    synthesis.flags.writeable = False
+    analysis = np.ascontiguousarray((to_time * weight[:, None]).T)
+    to_time.flags.writeable = False
     analysis.flags.writeable = False
-    return FourierBasis(orders, n_samples, synthesis, analysis)
+    return FourierBasis(orders, n_samples, to_time, analysis)
+
+
+def synthesis(orders: tuple[int, ...], phase: FloatArray) -> FloatArray:
+    """Matrix (2H+1, n) that gives a series of these orders at phases (n,), rad: `x = x_h @ synthesis`."""
+    angle = np.array(orders, np.float64)[:, None] * phase
+    values = np.empty((2 * len(orders) + 1, len(phase)))
+    values[0] = 1.0
+    values[1::2] = np.cos(angle)
+    values[2::2] = np.sin(angle)
+    return values
 
 
 def to_complex(values_h: FloatArray) -> ComplexArray:

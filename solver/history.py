@@ -62,6 +62,8 @@ class WearHistory:
     cycles (n_output,); worn_volume (n_output,) m3; wear_rate (n_output,) m3 per cycle; wear_depth, mean_pressure (Pa),
     slip_range (m), open_fraction (n_output, n_contact); response (n_output, n_response) complex first harmonic, m;
     response_peak (n_output, n_response) m. Output counts that were not reached hold NaN; where the point failed all do.
+    loop_displacement, m, loop_force, N (n_output, n_loops, n_phase, 3): fretting loops of the pairs asked for, as
+        `solver.loops.contact_loops` has them.
     jump_cycle: first cycle count at which the branch was lost, NaN if never.
     error_estimate: estimated relative error of the last worn volume. volume_error (n_output,): m3, estimated error of
         the worn volume at the end of the step that a count lies in.
@@ -90,6 +92,8 @@ class WearHistory:
     open_fraction: FloatArray
     response: ComplexArray
     response_peak: FloatArray
+    loop_displacement: FloatArray
+    loop_force: FloatArray
     jump_cycle: float
     error_estimate: float
     newton_iterations: int

@@ -37,6 +37,7 @@ def march_wear(
     cycles: FloatArray,
     settings: SolverSettings,
     largest_depth: float | None = None,
+    loops: tuple[int, ...] = (),
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> WearHistory:
@@ -45,16 +46,17 @@ def march_wear(
     wear_coefficient: 1/Pa. step: h, cycles; the adaptive scheme chooses its own steps. cycles (n_output,): ascending
     counts to report, the first 0; between two steps they are interpolated, and the last step is shortened to end on the
     last of them. largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
+    loops: pairs whose fretting loops are kept at every count.
     keep: called now and then with the progress of the march. resume: such progress of a march with the same arguments,
         from which this one goes on: its history is the same to the last bit, but for `run_time`.
     """
     started = time.thread_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, smooth=scheme == "adaptive")
+    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-    march = Trajectory(case, start, wear_coefficient, scheme)
+    march = Trajectory(case, start, wear_coefficient, scheme, loops)
     spent_before, message = 0.0, ""
     march.effort.deadline = started + settings.time_limit
     try:

@@ -8,11 +8,21 @@ from typing import Any
 import numpy as np
 
 from solver.history import WearHistory
+from solver.loops import LOOP_PHASES
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.response import StateReport
 
-REPORTED = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response", "response_peak")
+REPORTED = (
+    "wear_depth",
+    "mean_pressure",
+    "slip_range",
+    "open_fraction",
+    "response",
+    "response_peak",
+    "loop_displacement",
+    "loop_force",
+)
 CERTIFIED = (
     "residual",
     "penetration",
@@ -32,7 +42,8 @@ class Recorder:
 
     Between two steps they are interpolated linearly. smooth: the depth by cubics with the wear rates at both ends
     instead, and all else by the share of the step's worn volume, of which the state is a function: long steps of higher
-    order are worth that.
+    order are worth that. Fretting loops (n_loops of them) are interpolated phase by phase like all else, so that they
+    close, stay within the friction cone and have the mean pressure that is reported at the same count.
     """
 
     model: ReducedModel
@@ -40,6 +51,7 @@ class Recorder:
     start_iterations: int
     start_time: float
     smooth: bool = False
+    n_loops: int = 0
     _kept: dict[str, Any] = field(init=False, repr=False)
     _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
     _local_errors: float = field(init=False, default=0.0, repr=False)
@@ -47,10 +59,12 @@ class Recorder:
     def __post_init__(self) -> None:
         n_output, n_contact = self.cycles.size, self.model.contact.n_contact
         n_response = len(self.model.response_names)
-        widths = dict.fromkeys(REPORTED, n_contact) | {"response": n_response, "response_peak": n_response}
+        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(REPORTED, (n_contact,))
+        shapes |= dict.fromkeys(("response", "response_peak"), (n_response,))
+        shapes |= dict.fromkeys(("loop_displacement", "loop_force"), (self.n_loops, LOOP_PHASES, 3))
         self._kept = {
-            name: np.full((n_output, width), np.nan, complex if name == "response" else float)
-            for name, width in widths.items()
+            name: np.full((n_output, *shape), np.nan, complex if name == "response" else float)
+            for name, shape in shapes.items()
         }
         self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "volume_error", *CERTIFIED)}
         self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
@@ -90,7 +104,8 @@ class Recorder:
             share = self._worn_share(depth, before_report.wear_depth, report.wear_depth, share)
         for name in REPORTED:
             old, new = getattr(before_report, name), getattr(report, name)
-            self._kept[name][wanted] = depth if name == "wear_depth" else old + share[:, None] * (new - old)
+            shares = share.reshape(-1, *(1,) * old.ndim)
+            self._kept[name][wanted] = depth if name == "wear_depth" else old + shares * (new - old)
         self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
         for name in CERTIFIED:
             # what holds for both states holds in between

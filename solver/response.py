@@ -15,6 +15,7 @@ from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
 from solver.linear import JacobianSolver
+from solver.loops import contact_loops
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance
@@ -167,12 +168,17 @@ class StateReport:
     open_fraction: FloatArray
     response: ComplexArray
     response_peak: FloatArray
+    loop_displacement: FloatArray
+    loop_force: FloatArray
     certificate: Certificate
     resolution: Resolution
 
 
-def report_state(joint: Joint, evaluation: Evaluation, certificate: Certificate) -> StateReport:
-    """Pressures, slip and responses of a converged state."""
+def report_state(
+    joint: Joint, evaluation: Evaluation, certificate: Certificate, loops: tuple[int, ...] = ()
+) -> StateReport:
+    """Pressures, slip and responses of a converged state. loops: pairs whose fretting loops are reported, too."""
+    loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     response_t = response_h @ build_basis(joint.basis.orders, PEAK_POINTS).synthesis
     return StateReport(
@@ -183,6 +189,8 @@ def report_state(joint: Joint, evaluation: Evaluation, certificate: Certificate)
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
         response_peak=np.abs(response_t).max(axis=1),
+        loop_displacement=loop_displacement,
+        loop_force=loop_force,
         certificate=certificate,
         resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
     )

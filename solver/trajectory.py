@@ -48,12 +48,13 @@ _CARRIED = (
 
 @dataclass
 class Trajectory:
-    """The current state of a joint that wears, and how it goes on."""
+    """The current state of a joint that wears, and how it goes on. loops: pairs whose fretting loops are reported."""
 
     case: Case
     start: StartState
     wear_coefficient: float
     scheme: Scheme
+    loops: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         state = self.start.state
@@ -138,7 +139,7 @@ class Trajectory:
 
     def report(self) -> StateReport:
         """What is reported of the current state."""
-        return report_state(self.joint, self.point.evaluation, self.certificate)
+        return report_state(self.joint, self.point.evaluation, self.certificate, self.loops)
 
     def rate(self) -> FloatArray:
         """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21)."""

@@ -120,6 +120,7 @@ def _solve(
         counts,
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
+        loops=task.loops,
         keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
     )

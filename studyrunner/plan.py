@@ -15,9 +15,10 @@ from studyrunner.estimate import (
 )
 from studyrunner.progress import count, format_seconds
 from studyrunner.scene import SceneFacts
+from studyrunner.scene_variables import loop_numbers
 from studyrunner.study import AUTO, Study
 from studyrunner.tasks import TaskPlan
-from studyrunner.variables import ASKED, KEPT
+from studyrunner.variables import ASKED, KEPT, SCENE
 
 
 def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
@@ -93,6 +94,10 @@ def _on_two(plan: TaskPlan) -> str:
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
+    """Numbers in the result but for its coordinates, natural frequencies and mesh; of loops only those asked for."""
     sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
-    asked = (ASKED[name] for name in study.outputs.variables)
-    return n_points * (len(KEPT) + sum(math.prod(sizes[name] for name in entry.dimensions) for entry in asked))
+    names = study.outputs.variables
+    asked = [ASKED[name] for name in names if name in ASKED]
+    asked.extend(SCENE["exact"].values() if "exact" in names else ())
+    each = sum(math.prod(sizes[name] for name in entry.dimensions) for entry in asked)
+    return n_points * (len(KEPT) + each + loop_numbers(study))

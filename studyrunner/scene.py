@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from studies.scene_error import SceneError
 from studies.scenes import build_scene
+from studyrunner.scene_variables import check_outputs
 from studyrunner.study import AUTO, Study
 from studyrunner.user_error import UserError, Verbatim
 
@@ -48,8 +49,14 @@ def build_study_scene(study: Study) -> ReducedModel:
 
     Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
     may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
-    Raises UserError where the parameters or the scene file are wrong.
+    Raises UserError where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
     """
+    model = _build(study)
+    check_outputs(study, model)
+    return model
+
+
+def _build(study: Study) -> ReducedModel:
     given = max(study.given_harmonics, default=1)
     built = max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
     place, prefix = (str(study.scene_path), "") if study.scene.is_file else (study.source, "scene.")

@@ -9,6 +9,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
+from studies.scenes import scene_has
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
     axis_of,
@@ -21,7 +22,7 @@ from studyrunner.values import (
     read_switch,
     whole_number,
 )
-from studyrunner.variables import ASKED, KEPT
+from studyrunner.variables import ASKED, KEPT, SCENE
 
 Automatic = Literal["auto"]
 AUTO: Final = "auto"
@@ -33,6 +34,8 @@ AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme
 _read_harmonics = number_or(AUTO, whole_number(1))
 _read_samples = number_or(AUTO, whole_number(4))
 _read_scheme = one_of("implicit", "explicit", "adaptive")
+
+_OF_THE_SCENE = {"mesh": "describe_mesh", "exact": "exact_answer"}
 
 PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
 NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
@@ -69,19 +72,23 @@ def _read_outputs(value: object) -> int | tuple[float, ...]:
 def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
-    known = (*ASKED, *KEPT)
+    known = (*ASKED, *SCENE, *KEPT)
     for name in value:
         if name not in known:
             raise WrongValueError(name, f"give names out of {', '.join(known)}")
         if list(value).count(name) > 1:
             raise WrongValueError(name, "give every name once")
-    return tuple(name for name in ASKED if name in value)
+    return tuple(name for name in (*ASKED, *SCENE) if name in value)
 
 
 def _read_loops(value: object) -> tuple[int, ...]:
-    if value not in ([], ()):
-        raise WrongValueError(value, "give [] or leave the key out: fretting loops are not part of this version")
-    return ()
+    if not isinstance(value, list | tuple):
+        raise WrongValueError(value, "give a list of contact indices")
+    pairs = tuple(whole_number(0)(item) for item in value)
+    for pair in pairs:
+        if pairs.count(pair) > 1:
+            raise WrongValueError(pair, "give every contact index once")
+    return tuple(sorted(pairs))
 
 
 class Section(BaseModel):
@@ -159,7 +166,9 @@ class OutputsSection(Section):
     variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
         tuple(ASKED), description="names of result variables"
     )
-    loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field((), description="contact indices")
+    loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field(
+        (), description="indices of the contact pairs whose fretting loops are kept"
+    )
 
 
 class SceneFileParameters(Section):
@@ -184,6 +193,13 @@ class SceneSection(Section):
         """Whether the model is a scene file rather than a bundled scene."""
         return names_file(self.model)
 
+    @property
+    def tells(self) -> tuple[str, ...]:
+        """Names in `outputs.variables` of what a bundled scene tells at little cost."""
+        if self.is_file:
+            return ()
+        return tuple(name for name, function in _OF_THE_SCENE.items() if scene_has(self.model, function))
+
 
 class Study(Section):
     """A whole study.
@@ -199,6 +215,25 @@ class Study(Section):
     outputs: OutputsSection = OutputsSection()
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_variables(cls, table: object) -> object:
+        """All that cost little, unless the study names them: those of every point, and those that its scene has."""
+        if not isinstance(table, dict) or not isinstance(scene := table.get("scene"), SceneSection):
+            return table
+        outputs = table.get("outputs", {})
+        if not isinstance(outputs, dict) or "variables" in outputs:
+            return table
+        return {**table, "outputs": {**outputs, "variables": [*ASKED, *scene.tells]}}
+
+    @model_validator(mode="after")
+    def _check_variables(self) -> Study:
+        for name in _OF_THE_SCENE:
+            if name in self.outputs.variables and name not in self.scene.tells:
+                remedy = f"leave it out: the scene {self.scene.model} has none"
+                raise WrongValueError(name, remedy, "outputs.variables")
+        return self
 
     @model_validator(mode="after")
     def _check_samples(self) -> Study:

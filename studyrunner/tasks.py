@@ -29,7 +29,7 @@ from studyrunner.sharing import (
     share_histories,
 )
 from studyrunner.study import AUTO, SOLVER_AXES, Automatic, Study
-from studyrunner.variables import ASKED, CERTIFICATE
+from studyrunner.variables import ASKED, CERTIFICATE, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """First keys of the kin of tasks, see LearnedCosts."""
@@ -100,8 +100,9 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. shares: its histories, the one that goes
     farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
-    cycles: output counts of every history. variables: what is handed back. cost: estimated seconds. n_unknowns, moves:
-        of the start state, see StartResult. Until it is there, n_unknowns are those planned for and something moves.
+    cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
+    cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
+        those planned for and something moves.
     start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
     number: of the march in the study.
     """
@@ -116,6 +117,7 @@ class MarchTask:
     held: bool
     cycles: tuple[float, ...]
     variables: tuple[str, ...]
+    loops: tuple[int, ...]
     cost: float
     n_unknowns: int
     moves: bool = True
@@ -239,7 +241,8 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
 
 def march_variables(study: Study) -> tuple[str, ...]:
     """Variables that a march hands back: those asked for and those that the table at the end is made of."""
-    return tuple(name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    return (*asked, *(LOOPS if study.outputs.loops else ()))
 
 
 def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
@@ -299,6 +302,7 @@ def _marches(
             held=alike.held,
             cycles=study.cycles_kept,
             variables=march_variables(study),
+            loops=study.outputs.loops,
             cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, shares[0].step),
             n_unknowns=n_unknowns,
         )

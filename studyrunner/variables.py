@@ -10,7 +10,7 @@ class Variable:
     """One variable of the result: its dimensions after the axes, its unit and what it means.
 
     dtype: of numpy. Floating numbers are NaN where a point failed, whole ones 0. flags: what the values 0, 1, ... mean,
-    one word each.
+    one word each. content: what ACDD calls its type.
     """
 
     dimensions: tuple[str, ...]
@@ -18,6 +18,12 @@ class Variable:
     long_name: str
     dtype: str = "float64"
     flags: tuple[str, ...] = ()
+    content: str = "modelResult"
+
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are texts."""
+        return self.dtype.startswith("U")
 
 
 ASKED = {
@@ -46,6 +52,57 @@ ASKED = {
     "stable": Variable(("cycle",), "1", "whether the state is stable", "int8", ("unstable", "stable")),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
+
+SCENE: dict[str, dict[str, Variable]] = {
+    "mesh": {
+        "mesh_x": Variable(("mesh_node",), "m", "position of the node, x", content="auxiliaryInformation"),
+        "mesh_y": Variable(("mesh_node",), "m", "position of the node, y", content="auxiliaryInformation"),
+        "mesh_z": Variable(("mesh_node",), "m", "position of the node, z", content="auxiliaryInformation"),
+        "mesh_quad": Variable(
+            ("mesh_quad_index", "mesh_corner"),
+            "1",
+            "nodes of the outer face, anticlockwise from outside",
+            "int32",
+            content="auxiliaryInformation",
+        ),
+        "mesh_part": Variable(
+            ("mesh_quad_index",), "1", "part that the face belongs to", "str", content="auxiliaryInformation"
+        ),
+    },
+    "natural_frequency": {
+        "natural_frequency": Variable(
+            ("nodal_diameter", "mode"), "Hz", "natural frequency with the joint stuck, without damping"
+        ),
+    },
+    "exact": {
+        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", content="referenceInformation"),
+        "exact_response_amplitude": Variable(
+            ("cycle", "response"),
+            "m",
+            "exact amplitude of the first harmonic of the response",
+            content="referenceInformation",
+        ),
+    },
+}
+"""What `outputs.variables` asks of the scene under one name; the exact answers alone have the axes of the study."""
+
+LOOPS = {
+    "loop_displacement": Variable(
+        ("cycle", "contact", "phase", "component"),
+        "m",
+        "relative displacement through a period, positive where it closes",
+    ),
+    "loop_force": Variable(
+        ("cycle", "contact", "phase", "component"), "N", "contact force through a period, positive in compression"
+    ),
+}
+"""Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
+
+LOOP_PHASES = 128
+"""Phases of a loop, equally spaced over a period from 0: those that the solver has."""
+
+LOOP_COMPONENTS = ("normal", "tangent_1", "tangent_2")
+"""Components of a loop."""
 
 CERTIFICATE = {
     "residual": "scaled residual",
@@ -92,6 +149,10 @@ COORDINATES = {
     "cycle": Variable((), "1", "number of vibration cycles"),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
+    "phase": Variable((), "rad", "phase of the excitation"),
+    "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
+    "nodal_diameter": Variable((), "1", "nodal diameter"),
+    "mode": Variable((), "1", "number of the mode, by frequency"),
     "contact_x": Variable(("contact",), "m", "position of the contact pair, x"),
     "contact_y": Variable(("contact",), "m", "position of the contact pair, y"),
     "contact_z": Variable(("contact",), "m", "position of the contact pair, z"),

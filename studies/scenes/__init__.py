@@ -1,14 +1,20 @@
 """Registry of the bundled scenes.
 
 Every bundled scene is a module of this package with a pydantic class `Parameters`, whose first field is
-`friction_coefficient`, and a function `build(parameters, n_harmonics) -> ReducedModel`. A module is imported when its
-scene is asked for, so that listing the scenes costs nothing.
+`friction_coefficient`, and a function `build(parameters, n_harmonics) -> ReducedModel`. It may also have the functions
+
+- `describe_mesh(parameters) -> SurfaceMesh`,
+- `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more of them than its reduced model,
+- `exact_answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles) -> ExactAnswer`.
+
+A module is imported when its scene is asked for, so that listing the scenes costs nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
 from studies.scene_error import SceneError
@@ -16,7 +22,8 @@ from studies.scene_error import SceneError
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from solver.model import ReducedModel
+    from solver.model import FloatArray, ReducedModel
+    from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh
 
 BUNDLED = ("dovetail_sector", "sdof_slider", "two_masses", "vibro_impact")
 
@@ -42,8 +49,46 @@ def build_scene(model: str, parameters: BaseModel, n_harmonics: int) -> ReducedM
     return build(parameters, n_harmonics)
 
 
+def scene_has(model: str, name: str) -> bool:
+    """Whether a bundled scene has the function `name`. Raises SceneError where no bundled scene has the first name."""
+    return hasattr(_scene_module(model), name)
+
+
+def scene_mesh(model: str, parameters: BaseModel) -> SurfaceMesh:
+    """Outer faces of the mesh of a bundled scene that has one.
+
+    Raises SceneError where the parameters describe no possible structure.
+    """
+    return cast("SurfaceMesh", _scene_attribute(model, "describe_mesh")(parameters))
+
+
+def scene_frequencies(model: str, parameters: BaseModel) -> NaturalFrequencies:
+    """Natural frequencies from a bundled scene that knows more than its reduced model; it may take some seconds.
+
+    Raises SceneError where the parameters describe no possible structure.
+    """
+    return cast("NaturalFrequencies", _scene_attribute(model, "natural_frequencies")(parameters))
+
+
+def scene_answer(
+    model: str,
+    parameters: BaseModel,
+    frequency: float,
+    excitation_amplitude: float,
+    wear_coefficients: FloatArray,
+    cycles: FloatArray,
+) -> ExactAnswer:
+    """Exact answer of a bundled scene that has one. Hz, N, 1/Pa (n_wear,), cycle counts (n_cycles,)."""
+    answer = _scene_attribute(model, "exact_answer")
+    return cast("ExactAnswer", answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles))
+
+
 def _scene_attribute(model: str, name: str) -> Any:
+    return getattr(_scene_module(model), name)
+
+
+def _scene_module(model: str) -> ModuleType:
     if model not in BUNDLED:
         remedy = f"give one of {', '.join(BUNDLED)} or the path of a scene file"
         raise SceneError("model", f'no bundled scene is called "{model}"', remedy)
-    return getattr(import_module(f"{__name__}.{model}"), name)
+    return import_module(f"{__name__}.{model}")

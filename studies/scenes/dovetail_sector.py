@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
+from studies.scene_answers import N_MODES, NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
@@ -25,7 +26,8 @@ from studies.scenes.finite_element.assembly import SectorMatrices, assemble_geom
 from studies.scenes.finite_element.contact_pairs import ContactPairs, build_contact_pairs, join_pairs
 from studies.scenes.finite_element.cyclic import CyclicSector, build_coordinates
 from studies.scenes.finite_element.hex_element import HexElements, elasticity_matrix
-from studies.scenes.finite_element.reduction import build_basis, project, solve_glued
+from studies.scenes.finite_element.reduction import build_basis, glued_frequencies, project, solve_glued
+from studies.scenes.finite_element.surface import outer_faces
 
 __all__ = ["Parameters", "build"]
 
@@ -90,6 +92,42 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
         n_sectors=parameters.n_sectors,
         nodal_diameter=parameters.nodal_diameter,
     )
+
+
+def describe_mesh(parameters: Parameters) -> SurfaceMesh:
+    """Outer faces of disk and blade; the flanks and the cut faces between sectors are among them.
+
+    Raises SceneError where the parameters do not go together.
+    """
+    check_parameters(parameters)
+    mesh = build_dovetail_mesh(parameters)
+    faces, element = outer_faces(mesh.mesh.elements)
+    used, quads = np.unique(faces, return_inverse=True)
+    return SurfaceMesh(
+        nodes=mesh.mesh.nodes[used],
+        quads=quads.reshape(faces.shape),
+        parts=tuple(np.where(mesh.blade_elements[element], "blade", "disk").tolist()),
+    )
+
+
+def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
+    """Lowest frequencies of the glued sector, with the effects of rotation if wanted, at all nodal diameters 0..N/2.
+
+    Raises SceneError where the parameters do not go together.
+    """
+    check_parameters(parameters)
+    mesh = build_dovetail_mesh(parameters)
+    pairs, sector = build_pairs(mesh), build_sector(parameters, mesh)
+    matrices, stiffness = _sector_matrices(parameters, mesh, sector, pairs)
+    nodal_diameters = tuple(range(parameters.n_sectors // 2 + 1))
+    frequencies = np.empty((len(nodal_diameters), N_MODES))
+    for k in nodal_diameters:
+        try:
+            found = glued_frequencies(stiffness, matrices.mass, build_coordinates(sector, pairs, k), N_MODES)
+        except ValueError as error:
+            raise SceneError("rotation_speed", str(parameters.rotation_speed), f"reduce it: {error}") from error
+        frequencies[k] = found / (2.0 * np.pi)
+    return NaturalFrequencies(nodal_diameters, frequencies)
 
 
 def _retained(stiffness: Matrix, pairs: ContactPairs, retention_stiffness: float) -> Matrix:

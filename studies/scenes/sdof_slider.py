@@ -11,7 +11,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from studies.scene_answers import ExactAnswer
+from studies.scenes.den_hartog import DenHartogSlider, worn_normal_force
 
 
 class Parameters(BaseModel):
@@ -72,3 +74,33 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
         surface=("support",),
     )
     return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass",))
+
+
+def exact_answer(
+    parameters: Parameters,
+    frequency: float,
+    excitation_amplitude: float,
+    wear_coefficients: FloatArray,
+    cycles: FloatArray,
+) -> ExactAnswer:
+    """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
+
+    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. NaN where the
+    form does not hold: the mount is damped, the mass stops on its way, or the frequency is one of its singular ones.
+    """
+    p = parameters
+    slider = DenHartogSlider(p.mass, p.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
+    limit = p.friction_coefficient * p.normal_load
+    sliding = np.multiply.outer(wear_coefficients, cycles)
+    if p.damping > 0.0 or not slider.holds(limit):
+        return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
+    # the worn state depends on wear coefficient and cycle count through their product alone
+    different, places = np.unique(sliding, return_inverse=True)
+    relieved = worn_normal_force(slider, p.friction_coefficient, p.normal_load, p.normal_stiffness, p.area, different)
+    if p.normal_stiffness > 0.0:
+        depth = np.abs(np.expm1(relieved)) * p.normal_load / p.normal_stiffness
+    else:
+        depth = p.normal_load / p.area * 4.0 * slider.amplitude(np.array(limit)) * different
+    response = slider.first_harmonic(limit * np.exp(relieved))
+    places = places.reshape(sliding.shape)
+    return ExactAnswer(p.area * depth[places], response[places][..., np.newaxis])

@@ -12,35 +12,57 @@ from studyrunner.evaluate import endings
 from studyrunner.gather import coordinates, describe_run
 from studyrunner.results import MarchResult
 from studyrunner.scene import SceneFacts
+from studyrunner.scene_variables import SceneVariable
 from studyrunner.study import Study
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 
-def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult], certificates: str) -> xr.Dataset:
+def build_dataset(
+    study: Study,
+    facts: SceneFacts,
+    results: Sequence[MarchResult],
+    certificates: str,
+    of_scene: Sequence[SceneVariable] = (),
+) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes = study.dimensions
     shape = tuple(len(values) for values in axes.values())
     sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    sizes |= {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)}
     asked = [name for name in ASKED if name in study.outputs.variables]
-    variables = {**{name: ASKED[name] for name in asked}, **KEPT}
+    loops = list(LOOPS) if study.outputs.loops else []
+    variables = {**{name: ASKED[name] for name in asked}, **{name: LOOPS[name] for name in loops}, **KEPT}
     arrays = {
         name: np.zeros(shape + tuple(sizes[dimension] for dimension in entry.dimensions), dtype=entry.dtype)
         for name, entry in variables.items()
     }
+    for name in loops:
+        arrays[name][:] = np.nan
     for result in results:
         for point in result.points:
             for name in asked:
                 arrays[name][point] = result.values[name]
+            for name in loops:
+                arrays[name][point][:, list(study.outputs.loops)] = result.values[name]
             for name in KEPT:
                 arrays[name][point] = getattr(result, name)
     dataset = xr.Dataset(
         {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
-        coords=coordinates(study, facts),
+        coords={
+            **coordinates(study, facts),
+            **{scene.name: (scene.name, scene.values) for scene in of_scene if scene.coordinate},
+        },
         attrs={**describe_run(study, facts), "certificate_summary": certificates},
     )
+    for scene in of_scene:
+        if not scene.coordinate:
+            dimensions = (*(axes if scene.axes else ()), *scene.entry.dimensions)
+            lengths = (*(shape if scene.axes else ()), *scene.values.shape[-len(scene.entry.dimensions) :])
+            dataset[scene.name] = (dimensions, np.array(np.broadcast_to(scene.values, lengths)))
+            variables[scene.name] = scene.entry
     for name in map(str, dataset.variables):
         entry = COORDINATES.get(name) or variables[name]
-        content = "coordinate" if name in COORDINATES else "modelResult"
+        content = "coordinate" if name in COORDINATES else entry.content
         dataset[name].attrs = {
             "units": entry.units,
             "long_name": entry.long_name,
@@ -54,6 +76,7 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[MarchResult
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
+    dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in flags)
     return dataset
 
 
@@ -62,6 +85,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     encoding: dict[str, dict[str, object]] = {}
     for name in dataset.data_vars:
         encoding[str(name)] = {"zlib": True, "complevel": 1, "shuffle": True}
+        if name in LOOPS:
+            sizes = dataset[name].sizes
+            encoding[str(name)]["chunksizes"] = tuple(1 if of == "contact" else sizes[of] for of in sizes)
     for key, coordinate in dataset.coords.items():
         # Every coordinate value is there: no mark for missing ones.
         encoding[str(key)] = {"_FillValue": None} if coordinate.dtype.kind == "f" else {}

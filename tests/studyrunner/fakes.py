@@ -16,7 +16,7 @@ from studyrunner.scene import SceneFacts
 from studyrunner.sharing import Index
 from studyrunner.study import Study
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
-from studyrunner.variables import ASKED
+from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(
     n_displacements=6,
@@ -60,6 +60,11 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
     values: dict[str, np.ndarray] = {}
     for name in task.variables:
+        if name in LOOPS:
+            shape = (len(task.cycles), len(task.loops), LOOP_PHASES, len(LOOP_COMPONENTS))
+            pairs = 1e3 * np.array(task.loops, dtype=float)[:, None, None] + (name == "loop_force")
+            values[name] = fingerprint + pairs + 1e-3 * np.arange(float(np.prod(shape))).reshape(shape)
+            continue
         shape = (len(task.cycles), *(sizes[dimension] for dimension in ASKED[name].dimensions[1:]))
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
         if ASKED[name].flags:

@@ -8,8 +8,8 @@ from solver.history import WearHistory
 from solver.outcome import Outcome
 
 
-def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED) -> WearHistory:
-    """At these cycle counts: variables count from 0, or from what is theirs."""
+def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np.ndarray | None = None) -> WearHistory:
+    """At these cycle counts: variables count from 0, or from what is theirs. loops: displacements, minus forces."""
     n = len(cycles)
     line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
     return WearHistory(
@@ -23,6 +23,8 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED) -> WearHi
         open_fraction=pair,
         response=(1.0 + pair) * 1j,
         response_peak=pair,
+        loop_displacement=np.zeros((n, 0, 128, 3)) if loops is None else loops,
+        loop_force=np.zeros((n, 0, 128, 3)) if loops is None else -loops,
         jump_cycle=np.nan,
         error_estimate=0.0,
         newton_iterations=7,

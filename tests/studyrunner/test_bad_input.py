@@ -69,7 +69,18 @@ WRONG_KEYS = {
     "half an output": ("slow_time.outputs=2.5", "slow_time.outputs", "2.5", "whole"),
     "depth 0": ("slow_time.largest_depth=0", "slow_time.largest_depth", "0", "above 0"),
     "unknown variable": ("outputs.variables=['wear']", "outputs.variables", '"wear"', "wear_depth"),
-    "loops": ("outputs.loops=[0]", "outputs.loops", "[0]", "[]"),
+    "loops": ("outputs.loops=0", "outputs.loops", "0", "list of contact indices"),
+    "loops of a pair that is not there": ("outputs.loops=[0, 1]", "outputs.loops", "1", "from 0 to 0"),
+    "negative loop": ("outputs.loops=[-1]", "outputs.loops", "-1", "at least 0"),
+    "half a loop": ("outputs.loops=[0.5]", "outputs.loops", "0.5", "whole"),
+    "a loop twice": ("outputs.loops=[0, 0]", "outputs.loops", "0", "once"),
+    "mesh of a scene without one": ("outputs.variables=['mesh']", "outputs.variables", '"mesh"', "has none"),
+    "natural frequencies of nothing": (
+        "outputs.variables=['natural_frequency']",
+        "outputs.variables",
+        "natural_frequency",
+        "nothing moves",
+    ),
     "unknown scene": ("scene.model=turbine", "scene.model", "turbine", "dovetail_sector"),
     "missing scene file": ("scene.model=missing.h5", "scene.model", "missing.h5", "no such file"),
     "scene is a number": ("scene.model=3", "scene.model", "3", "in quotes"),
@@ -107,6 +118,21 @@ def test_wrong_key(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) 
     shown, _, advice = rest.partition(": ")
     assert value in shown
     assert remedy in advice
+
+
+def test_loops_that_no_message_holds(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    counts = ["--set", "slow_time.cycles=1e6", "--set", "slow_time.outputs=200000"]
+    line = line_of(["s.toml", "--set", "outputs.loops=[0]", *counts], capsys)
+    assert "outputs.loops = [0]" in line
+    assert "1.2 GB" in line
+
+
+@pytest.mark.parametrize("option", [["--plan"], ["--write-scene", "s.h5"]])
+def test_nothing_is_planned_or_written_of_a_pair_that_is_not_there(
+    option: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = line_of(["s.toml", *option, "--set", "outputs.loops=[2]"], capsys)
+    assert "outputs.loops = 2" in line
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ OVERRIDES = (
 )
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep", "harmonics")
 SHARED = ("axes.wear_coefficient=[1e-12, 1e-11, 0]", "axes.step=[10, 100]", "axes.scheme=['adaptive', 'implicit']")
+LOOP = "outputs.loops=[1]"
 WEAR_RATE = "outputs.variables=['wear_rate', 'outcome']"
 SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
@@ -132,6 +133,7 @@ def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
     assert attributes["flag_values"].tolist() == [ending.number for ending in endings()]
     assert attributes["flag_meanings"].split()[0] == "converged"
     assert len(attributes["flag_meanings"].split()) == len(endings())
+    assert attributes["sentences"].splitlines() == [ending.sentence for ending in endings()]
 
 
 def test_whole_numbers_stay_whole(opened: xr.Dataset) -> None:
@@ -212,7 +214,10 @@ def test_only_the_variables_asked_for(tmp_path: Path) -> None:
         assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
 
 
-@pytest.mark.parametrize("overrides", [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",), SHARED])
+@pytest.mark.parametrize(
+    "overrides",
+    [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",), SHARED, (*SHARED, LOOP), (WEAR_RATE, LOOP)],
+)
 @pytest.mark.parametrize("bytes_a_slab", [1.0, 3000.0, 1e9], ids=["a point", "some points", "all"])
 def test_the_file_is_the_one_of_the_plain_twin(
     overrides: tuple[str, ...], bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

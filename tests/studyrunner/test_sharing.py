@@ -211,7 +211,7 @@ def marched(
     """Results of the shared task with a stand-in for the march; and wear coefficient and counts of all marches."""
     calls = []
 
-    def fake(*arguments: object, largest_depth: float | None) -> WearHistory:
+    def fake(*arguments: object, largest_depth: float | None, loops: tuple[int, ...]) -> WearHistory:
         wear, cycles = arguments[3], arguments[6]
         assert isinstance(wear, float)
         assert isinstance(cycles, np.ndarray)

@@ -39,7 +39,27 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables
-    assert study.outputs.variables == tuple(ASKED)
+    assert study.outputs.variables == (*ASKED, "exact")
+    assert study.outputs.loops == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "of_scene"), [("dovetail", ("mesh",)), ("sdof_slider", ("exact",)), ("two_masses", ()), ("extremes", None)]
+)
+def test_by_default_the_scene_tells_what_costs_little(name: str, of_scene: tuple[str, ...] | None) -> None:
+    study = read_study(name)
+    if of_scene is not None:
+        assert study.outputs.variables == (*ASKED, *of_scene)
+    assert "natural_frequency" not in study.outputs.variables
+
+
+def test_names_are_kept_in_the_order_of_the_file(tmp_path: Path) -> None:
+    override = "outputs.variables=['natural_frequency', 'mesh', 'wear_rate', 'outcome', 'worn_volume']"
+    study = read_study("dovetail", [override, "outputs.loops=[7, 0]"])
+    assert study.outputs.variables == ("worn_volume", "wear_rate", "mesh", "natural_frequency")
+    assert study.outputs.loops == (0, 7)
+    (tmp_path / "again.toml").write_text(format_study(study), encoding="utf-8")
+    assert read_study(str(tmp_path / "again.toml")).outputs == study.outputs
 
 
 @pytest.mark.parametrize("name", bundled_studies())

@@ -172,6 +172,20 @@ def printed_plan(overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
 
 
+def test_loops_are_handed_back_where_they_are_asked_for_and_the_plan_counts_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _, plan = plan_of("outputs.loops=[0]")
+    assert {task.variables[-2:] for task in plan.marches[0]} == {("loop_displacement", "loop_force")}
+    assert {task.loops for task in plan.marches[0]} == {(0,)}
+    sizes = []
+    for overrides in ([], ["outputs.loops=[0]"]):
+        _, _, said = printed_plan([*overrides, "slow_time.outputs=1001"], capsys)["memory"].partition("result ")
+        sizes.append(float(said.partition(" ")[0]))
+    # 10 points, 1001 counts, 128 phases, 3 components, displacement and force
+    assert sizes[1] - sizes[0] == pytest.approx(10 * 1001 * 128 * 3 * 2 * 8 / 1e6, abs=0.11)
+
+
 def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     lines = printed_plan(GRID, capsys)
     assert lines["points"].startswith("192 = 3 frequency x 2 wear_coefficient")

@@ -65,24 +65,51 @@ def build_basis(
     coupling = (glued_h @ (stiffness @ coordinates.relative)).toarray()
     constraint = coordinates.relative.toarray() - glued @ factors.solve(coupling)
 
-    start = np.random.default_rng(0).standard_normal(n_inner)
-    values, vectors = eigsh(
-        inner,
-        k=n_modes,
-        M=inner_mass,
-        sigma=0.0,
-        OPinv=LinearOperator((n_inner, n_inner), matvec=factors.solve, dtype=inner.dtype),
-        v0=start.astype(inner.dtype),
-    )
-    order = np.argsort(values)
-    values, vectors = values[order], vectors[:, order]
-    if values[0] <= 0.0:
-        raise ValueError("the glued sector is unstable: spin softening exceeds its stiffness")
+    values, vectors = _lowest_modes(inner, inner_mass, factors, n_modes)
+    start = _start(n_inner)
     vectors /= np.sqrt(np.einsum("ij,ij->j", vectors.conj(), inner_mass @ vectors).real)
     # No mode is orthogonal to a random vector: what that sees of a mode is made real and positive.
     seen = start @ vectors
     vectors *= seen.conj() / np.abs(seen)
     return ReducedBasis(nodal=np.hstack([constraint, glued @ vectors]), frequencies=np.sqrt(values))
+
+
+def glued_frequencies(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, coordinates: SectorCoordinates, n_modes: int
+) -> FloatArray:
+    """Lowest natural frequencies (n_modes,) of the glued sector, rad/s, ascending; arguments as in `build_basis`.
+
+    Raises ValueError where the glued sector is singular or, from spin softening, unstable.
+    """
+    glued = coordinates.glued
+    glued_h = glued.conj().T.tocsr()
+    inner = (glued_h @ stiffness @ glued).tocsc()
+    values, _ = _lowest_modes(inner, (glued_h @ mass @ glued).tocsr(), factorise(inner), n_modes)
+    return np.sqrt(values)
+
+
+def _lowest_modes(
+    stiffness: sparse.csc_matrix, mass: sparse.csr_matrix, factors: SuperLU, n_modes: int
+) -> tuple[FloatArray, Matrix]:
+    """Squares (n_modes,) of the lowest angular frequencies, ascending, and the modes (n, n_modes)."""
+    n = stiffness.shape[0]
+    values, vectors = eigsh(
+        stiffness,
+        k=n_modes,
+        M=mass,
+        sigma=0.0,
+        OPinv=LinearOperator((n, n), matvec=factors.solve, dtype=stiffness.dtype),
+        v0=_start(n).astype(stiffness.dtype),
+    )
+    order = np.argsort(values)
+    if values[order[0]] <= 0.0:
+        raise ValueError("the glued sector is unstable: spin softening exceeds its stiffness")
+    return values[order], vectors[:, order]
+
+
+def _start(n: int) -> FloatArray:
+    """Start vector (n,) of the search for modes, always the same."""
+    return np.random.default_rng(0).standard_normal(n)
 
 
 def project(matrix: sparse.csr_matrix, basis: Matrix) -> Matrix:

@@ -1,0 +1,210 @@
+"""Fretting loops: exact cases, the laws in every loop, and loops between the steps of a march."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.harmonics import synthesis
+from solver.history import StartState, WearHistory
+from solver.loops import LOOP_PHASES, at_phases, loop_phases
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings, first_resolution
+from solver.trajectory import Scheme
+from tests.solver.models import branch_states, random_model, scene
+
+FRICTION = 0.5
+AREA = 1e-4
+WEAR = 1.1e-11  # 1/Pa
+SLIDER = SolverSettings(harmonics=9, samples=256)
+DOVETAIL = SolverSettings(harmonics=5, samples=64)
+SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
+CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
+
+
+@lru_cache
+def slider_start(settings: SolverSettings = SLIDER) -> tuple[ReducedModel, StartState]:
+    model = scene("sdof_slider", settings.harmonics)
+    (start,) = branch_states(model, FRICTION, 10.0, [2 * np.pi * 160.0], settings)
+    return model, start
+
+
+def slider_march(scheme: Scheme, cycles: np.ndarray, settings: SolverSettings = SLIDER) -> WearHistory:
+    model, start = slider_start(settings)
+    return march_wear(model, FRICTION, start, WEAR, 8000.0, scheme, cycles, settings, loops=(0,))
+
+
+@lru_cache
+def dovetail_start() -> tuple[ReducedModel, StartState]:
+    model = scene("dovetail_sector", 5, mesh=1)
+    return model, branch_states(model, FRICTION, 0.5, [2 * np.pi * 212.0, 2 * np.pi * 213.0], DOVETAIL)[1]
+
+
+@lru_cache
+def dovetail_march(scheme: Scheme = "implicit", loops: tuple[int, ...] = tuple(range(16))) -> WearHistory:
+    model, start = dovetail_start()
+    cycles = np.array([0.0, 500.0, 2000.0])
+    history = march_wear(model, FRICTION, start, WEAR, 1000.0, scheme, cycles, DOVETAIL, loops=loops)
+    assert history.outcome is Outcome.CONVERGED
+    assert history.slip_range.max() > 1e-7
+    return history
+
+
+def closed(values: np.ndarray) -> np.ndarray:
+    """The loop with its first phase once more at its end; phases on axis -2."""
+    return np.concatenate([values, values[..., :1, :]], axis=-2)
+
+
+def loop_work(history: WearHistory) -> np.ndarray:
+    """Integral of the tangential force over the displacement (n_output, n_loops), N m."""
+    motion, force = (closed(values)[..., 1:] for values in (history.loop_displacement, history.loop_force))
+    mean = 0.5 * (force[..., 1:, :] + force[..., :-1, :])
+    return np.sum(mean * np.diff(motion, axis=-2), axis=(-2, -1))
+
+
+@pytest.mark.parametrize("samples", [64, 96, 128, 200, 256])
+@pytest.mark.parametrize("lead", [0.0, 0.5])
+def test_between_samples_the_values_are_those_of_straight_lines(samples: int, lead: float) -> None:
+    values = np.random.default_rng(samples).normal(size=(2, samples))
+    phases = 2 * np.pi * (np.arange(samples) - lead) / samples
+    found = at_phases(values, lead)
+    for row, own in zip(found, values, strict=True):
+        assert row == pytest.approx(np.interp(loop_phases(), phases, own, period=2 * np.pi), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("samples", [32, 64, 128, 384, 512])
+def test_a_phase_that_is_a_sample_is_that_sample(samples: int) -> None:
+    values = np.random.default_rng(1).normal(size=samples)
+    common = np.gcd(samples, LOOP_PHASES)
+    found = at_phases(values, 0.0)
+    assert np.array_equal(found[:: LOOP_PHASES // common], values[:: samples // common])
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme: Scheme) -> None:
+    history = slider_march(scheme, CYCLES)
+    motion, force = history.loop_displacement[:, 0], history.loop_force[:, 0]
+    assert motion.shape == force.shape == (CYCLES.size, LOOP_PHASES, 3)
+    normal = 10.0 - 1e5 * history.wear_depth[:, 0]
+    assert force[..., 0] == pytest.approx(np.repeat(normal[:, None], LOOP_PHASES, 1), rel=1e-9, abs=0.0)
+    assert motion[..., 0] == pytest.approx(np.repeat(history.wear_depth, LOOP_PHASES, 1), rel=1e-9, abs=1e-15)
+    assert not motion[..., 2].any()
+    assert not force[..., 2].any()
+    # the force is at its limit but in the steps in which the mass turns, of both states that are interpolated
+    share = np.abs(force[..., 1]) / (FRICTION * force[..., 0])
+    assert share.max() <= 1 + 1e-12
+    assert np.count_nonzero(share < 1 - 1e-9, axis=1).max() <= 4
+    # and against the motion
+    velocity = np.roll(motion[..., 1], -1, axis=1) - np.roll(motion[..., 1], 1, axis=1)
+    fast = np.abs(velocity) > 0.1 * np.abs(velocity).max()
+    assert (velocity * force[..., 1] > 0.0)[fast].all()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("samples", [64, 128, 256])
+def test_the_loop_encloses_the_energy_that_friction_takes(scheme: Scheme, samples: int) -> None:
+    history = slider_march(scheme, np.array([0.0, 8000.0, 16000.0]), SolverSettings(harmonics=9, samples=samples))
+    work = loop_work(history)[:, 0]
+    sliding = 0.5 * np.ptp(history.loop_displacement[:, 0, :, 1], axis=1)
+    limit = FRICTION * history.mean_pressure[:, 0] * AREA
+    # 128 straight lines cut the corners of the rectangle, by the square of a step
+    assert work == pytest.approx(4 * limit * sliding, rel=3e-3, abs=0.0)
+    assert work == pytest.approx(FRICTION * history.wear_rate / WEAR, rel=3e-3, abs=0.0)
+
+
+def test_a_mass_that_stops_stands_still_in_its_loop() -> None:
+    model = scene("two_masses", 5)
+    settings = SolverSettings(harmonics=5, samples=128)
+    (start,) = branch_states(model, 0.5, 20.0, [0.4], settings)
+    history = march_wear(model, 0.5, start, 0.0, 1.0, "implicit", np.array([0.0]), settings, loops=(0,))
+    motion, force = history.loop_displacement[0, 0, :, 1], history.loop_force[0, 0, :, 1]
+    stuck = np.abs(force) < 0.98 * 7.2
+    inside = stuck & np.roll(stuck, 1) & np.roll(stuck, -1)
+    still = inside & np.roll(inside, 1)
+    assert np.count_nonzero(still) >= 6
+    assert start.state is not None
+    series = start.state.displacement_h[0, 1] @ synthesis((1, 2, 3, 4, 5), loop_phases())
+    moved, of_series = (np.abs(values - np.roll(values, 1))[still].max() for values in (motion, series))
+    # its series of five harmonics ripples, and is 1 % off in the range
+    assert moved < 1e-4 * np.ptp(motion) < 0.1 * of_series
+    assert np.ptp(motion) == pytest.approx(history.slip_range[0, 0], rel=5e-4, abs=0.0)
+    assert np.ptp(series) != pytest.approx(history.slip_range[0, 0], rel=5e-3, abs=0.0)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
+    history = dovetail_march(scheme)
+    model, _ = dovetail_start()
+    normal, tangential = history.loop_force[..., 0], np.linalg.norm(history.loop_force[..., 1:], axis=-1)
+    assert (normal >= 0.0).all()
+    assert (tangential <= FRICTION * normal * (1 + 1e-12) + 1e-12 * normal.max()).all()
+    # a pair that opens does so between two samples
+    mean = history.mean_pressure * model.contact.area
+    always = history.open_fraction == 0.0
+    assert normal.mean(axis=-1)[always] == pytest.approx(mean[always], rel=1e-9, abs=0.0)
+    assert np.abs(normal.mean(axis=-1) - mean).max() < 5e-3 * mean.max()
+    # a closed pair lies on its worn surface
+    depth = np.repeat(history.wear_depth[..., None], LOOP_PHASES, axis=-1)
+    lifted = history.loop_displacement[..., 0] - depth
+    largest = np.abs(history.loop_displacement[..., 1:]).max()
+    assert np.abs(lifted[always]).max() < 1e-2 * largest
+    # where much slips the slip is nearly all of the motion
+    motion = history.loop_displacement[..., 1:]
+    distance = np.linalg.norm(motion[..., :, None, :] - motion[..., None, :, :], axis=-1).max(axis=(-2, -1))
+    slips = history.slip_range > 0.5 * history.slip_range.max()
+    assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
+
+
+def test_loops_of_a_joint_enclose_the_energy_that_friction_takes() -> None:
+    history = dovetail_march()
+    assert loop_work(history)[0].sum() == pytest.approx(FRICTION * history.wear_rate[0] / WEAR, rel=0.02, abs=0.0)
+
+
+def test_a_loop_does_not_depend_on_the_others_that_are_asked_for() -> None:
+    every, some, none = (dovetail_march(loops=loops) for loops in (tuple(range(16)), (3, 7), ()))
+    for name in ("loop_displacement", "loop_force"):
+        assert np.array_equal(getattr(some, name), getattr(every, name)[:, [3, 7]])
+        assert getattr(none, name).shape == (3, 0, LOOP_PHASES, 3)
+    for name in ("wear_depth", "response", "mean_pressure"):
+        assert np.array_equal(getattr(none, name), getattr(every, name))
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+def test_between_steps_loops_are_interpolated_like_all_else(scheme: Scheme) -> None:
+    ends, between = (slider_march(scheme, cycles) for cycles in (CYCLES[[0, 2, 4]], CYCLES))
+    for name in ("loop_displacement", "loop_force", "mean_pressure"):
+        whole, inner = getattr(ends, name), getattr(between, name)
+        scale = np.abs(whole).max()
+        assert inner[[0, 2, 4]] == pytest.approx(whole, rel=0.0, abs=1e-14 * scale)
+        assert inner[1] == pytest.approx(0.75 * whole[0] + 0.25 * whole[1], rel=0.0, abs=1e-12 * scale)
+        assert inner[3] == pytest.approx(0.25 * whole[1] + 0.75 * whole[2], rel=0.0, abs=1e-12 * scale)
+
+
+def test_what_a_pair_does_not_have_is_zero() -> None:
+    model = random_model(1, ("3d", "one_tangent", "second_tangent", "normal_only", "constant_load"))
+    settings = SolverSettings(3, 64)
+    (start,) = branch_states(model, 0.3, 100.0, [300.0], settings)
+    history = march_wear(
+        model, 0.3, start, 0.0, 1.0, "implicit", np.array([0.0]), settings, loops=tuple(range(model.contact.n_contact))
+    )
+    motion, force = history.loop_displacement[0], history.loop_force[0]
+    missing = model.contact.dofs < 0
+    for pair, component in np.argwhere(missing):
+        assert not motion[pair, :, component].any()
+        constant = model.contact.normal_load[pair] if component == 0 else 0.0
+        assert np.array_equal(force[pair, :, component], np.full(LOOP_PHASES, constant))
+    for pair, component in np.argwhere(~missing):
+        assert np.ptp(motion[pair, :, component]) > 0.0 or np.ptp(force[pair, :, component]) > 0.0
+
+
+def test_a_failed_point_has_no_loops() -> None:
+    model, _ = slider_start()
+    failed = StartState(Outcome.SINGULAR, None, 1.0, first_resolution(SLIDER), np.inf, np.inf, 1, 0.0)
+    history = march_wear(model, FRICTION, failed, WEAR, 1.0, "implicit", np.array([0.0, 1.0]), SLIDER, loops=(0,))
+    for values in (history.loop_displacement, history.loop_force):
+        assert values.shape == (2, 1, LOOP_PHASES, 3)
+        assert np.isnan(values).all()

@@ -1,0 +1,221 @@
+"""What scenes tell beside their models: the mesh, natural frequencies, exact answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from solver.model import ReducedModel
+from studies.scene_answers import N_MODES
+from studies.scene_error import SceneError
+from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
+from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.dovetail_mesh import build_dovetail_mesh
+from studies.scenes.finite_element.surface import outer_faces
+from studies.stuck_modes import stuck_frequencies
+from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
+
+AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])  # Hz, 20-node elements, nodal diameter 0, glued
+WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
+CYCLES = np.array([0.0, 1e3, 3e4, 1e5])
+
+
+def slider(**changes):
+    return scene_parameters("sdof_slider")(**changes)
+
+
+def answer(frequency=160.0, amplitude=10.0, wear=WEAR, cycles=CYCLES, **changes):
+    return scene_answer("sdof_slider", slider(**changes), frequency, amplitude, wear, cycles)
+
+
+def dovetail(**changes):
+    return scene_parameters("dovetail_sector")(mesh=1, **changes)
+
+
+@pytest.mark.parametrize("ratio", [0.4, 0.55, 0.8, 0.97, 1.1, 1.6, 2.5])
+@pytest.mark.parametrize("friction_force", [0.0, 0.5, 3.0, 6.0, 9.0])
+def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, friction_force):
+    mass, stiffness, force = 0.1, 1.6e5, 10.0
+    omega = ratio * np.sqrt(stiffness / mass)
+    own = DenHartogSlider(mass, stiffness, force, omega)
+    try:
+        expected = den_hartog_amplitude(mass, stiffness, force, friction_force, omega)
+    except StopsOccurError:
+        assert not own.holds(friction_force)
+        return
+    assert own.holds(friction_force)
+    assert own.amplitude(np.array(friction_force)) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    if friction_force > 0.0:
+        exact = abs(slider_orbit(mass, 0.0, stiffness, force, friction_force, omega).harmonic(0))
+        assert own.first_harmonic(np.array(friction_force)) == pytest.approx(exact, rel=1e-8, abs=0.0)
+
+
+@pytest.mark.parametrize("frequency", [150.0, 160.0, 185.0, 230.0])
+def test_the_slider_wears_by_its_differential_equation(frequency):
+    found = answer(frequency)
+    for row, wear in enumerate(WEAR):
+        expected = slider_wear_depth(
+            CYCLES,
+            wear_coefficient=max(wear, 1e-30),
+            area=1e-4,
+            friction_coefficient=0.5,
+            normal_load=10.0,
+            normal_stiffness=1e5,
+            amplitude=lambda friction: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * frequency),
+        )
+        assert found.worn_volume[row] == pytest.approx(1e-4 * expected * (wear > 0), rel=1e-9, abs=0.0)
+        for depth, response in zip(expected, found.response_amplitude[row, :, 0], strict=True):
+            friction = 0.5 * (10.0 - 1e5 * depth * (wear > 0))
+            exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * frequency).harmonic(0))
+            assert response == pytest.approx(exact, rel=1e-8, abs=0.0)
+
+
+def test_a_constant_force_wears_at_a_constant_rate():
+    found = answer(normal_stiffness=0.0)
+    amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 5.0, 2 * np.pi * 160.0)
+    assert found.worn_volume == pytest.approx(np.outer(WEAR, CYCLES) * 10.0 * 4 * amplitude, rel=1e-12, abs=0.0)
+    assert np.ptp(found.response_amplitude) == 0.0
+
+
+def test_all_that_the_spring_presses_is_worn_away_in_the_end():
+    found = answer(wear=np.array([1e-3]), cycles=np.array([0.0, 1e5, 1e9]))
+    assert found.worn_volume[0] == pytest.approx([0.0, 1e-8, 1e-8], rel=1e-12, abs=0.0)
+    free = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
+    assert found.response_amplitude[0, 1:, 0] == pytest.approx([free, free], rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"damping": 1.0},
+        {"amplitude": 6.0},
+        {"frequency": 60.0},
+        {"frequency": np.sqrt(1.6e6) / (6 * np.pi)},
+    ],
+    ids=["damped", "stops", "stops far below resonance", "singular"],
+)
+def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
+    found = answer(**changes)
+    assert found.worn_volume.shape == (3, 4)
+    assert found.response_amplitude.shape == (3, 4, 1)
+    assert np.isnan(found.worn_volume).all()
+    assert np.isnan(found.response_amplitude).all()
+
+
+def test_without_friction_the_response_is_that_of_the_spring():
+    found = answer(friction_coefficient=0.0)
+    amplitude = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
+    assert found.response_amplitude == pytest.approx(np.full((3, 4, 1), amplitude), rel=1e-12, abs=0.0)
+    assert found.worn_volume[0, 1] > 0.0
+
+
+def test_outer_faces_of_two_cubes():
+    corners = np.array([[x, y, z] for z in (0, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    elements = np.array([range(8), range(4, 12)])
+    faces, element = outer_faces(elements)
+    assert faces.shape == (10, 4)
+    assert np.count_nonzero(element == 0) == 5
+    assert not any(set(face) == {4, 5, 6, 7} for face in faces.tolist())
+    centre = corners[elements].mean(axis=1)[element]
+    normal = np.cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 1]])
+    assert (np.sum(normal * (corners[faces].mean(axis=1) - centre), axis=1) > 0.0).all()
+
+
+def test_the_mesh_is_the_skin_of_blade_and_disk():
+    mesh, whole = scene_mesh("dovetail_sector", dovetail()), build_dovetail_mesh(dovetail())
+    assert sorted(set(mesh.parts)) == ["blade", "disk"]
+    assert np.array_equal(np.unique(mesh.quads), np.arange(len(mesh.nodes)))
+    # every edge of a closed skin belongs to two faces, which pass it in opposite directions
+    edges = np.concatenate([mesh.quads[:, [i, (i + 1) % 4]] for i in range(4)])
+    there, back = (sorted(map(tuple, way.tolist())) for way in (edges, edges[:, ::-1]))
+    assert there == back
+    # divergence theorem with flat triangles, against the hexahedra of each part cut in the same way from their centre
+    for part, inside in (("blade", whole.blade_elements), ("disk", ~whole.blade_elements)):
+        chosen = mesh.nodes[mesh.quads[np.array(mesh.parts) == part]]
+        volume = sum(np.linalg.det(chosen[:, corners]).sum() / 6.0 for corners in ([0, 1, 2], [0, 2, 3]))
+        box = whole.mesh.nodes[whole.mesh.elements[inside]]
+        edges = np.stack([box[:, 1] - box[:, 0], box[:, 3] - box[:, 0], box[:, 4] - box[:, 0]], axis=1)
+        assert volume == pytest.approx(np.linalg.det(edges).sum(), rel=0.1)
+
+
+def test_frequencies_of_the_glued_sector_at_rest():
+    parameters = scene_parameters("dovetail_sector")(stress_stiffening=False, n_sectors=47)
+    coarse = scene_frequencies("dovetail_sector", dovetail(stress_stiffening=False))
+    assert coarse.nodal_diameters == tuple(range(24))
+    assert coarse.frequencies.shape == (24, N_MODES)
+    assert (np.diff(coarse.frequencies, axis=1) > 0.0).all()
+    assert np.abs(coarse.frequencies[0] / AT_REST - 1.0).max() < 0.12
+    default = stuck_frequencies(build_scene("dovetail_sector", parameters, 0))
+    assert np.abs(default.frequencies[0] / AT_REST - 1.0).max() < 0.03
+
+
+def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector():
+    parameters = dovetail(nodal_diameter=4, n_sectors=12)
+    model = build_scene("dovetail_sector", parameters, 3)
+    whole, own = scene_frequencies("dovetail_sector", parameters), stuck_frequencies(model)
+    assert whole.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
+    assert own.nodal_diameters == tuple(model.linear) == (0, 4)
+    assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)
+
+
+def test_the_frequencies_of_a_small_model():
+    model = build_scene("two_masses", scene_parameters("two_masses")(stiffness_1=3.0, mass_1=2.0), 1)
+    found = stuck_frequencies(model)
+    assert found.nodal_diameters == (0,)
+    assert found.frequencies[0, 0] == pytest.approx(np.sqrt(4.0 / 2.0) / (2 * np.pi), rel=1e-12, abs=0.0)
+    assert np.isnan(found.frequencies[0, 1:]).all()
+
+
+def chain(mass: np.ndarray, stiffness: np.ndarray) -> ReducedModel:
+    """The two masses with others behind them."""
+    model = build_scene("two_masses", scene_parameters("two_masses")(), 1)
+    n = len(mass)
+    wider = replace(
+        model.linear[0],
+        mass=mass,
+        damping=np.zeros((n, n)),
+        stiffness=stiffness,
+        load_static=np.zeros(n),
+        load_harmonic=np.zeros(n, complex),
+        response=np.zeros((2, n)),
+    )
+    return replace(model, linear={0: wider})
+
+
+def test_a_displacement_without_mass_has_no_frequency():
+    random = np.random.default_rng(3)
+    root = random.normal(size=(9, 9))
+    stiffness = root @ root.T + np.eye(9)
+    mass = np.diag([1.0, 1.0, 2.0, 0.0, 0.5, 0.0, 1.0, 3.0, 0.0])
+    found = stuck_frequencies(chain(mass, stiffness)).frequencies[0]
+    keep, gone = [0, 2, 4, 6, 7], [3, 5, 8]
+    condensed = stiffness[np.ix_(keep, keep)] - stiffness[np.ix_(keep, gone)] @ np.linalg.solve(
+        stiffness[np.ix_(gone, gone)], stiffness[np.ix_(gone, keep)]
+    )
+    values = linalg.eigh(condensed, mass[np.ix_(keep, keep)], eigvals_only=True)
+    assert found[:5] == pytest.approx(np.sqrt(values) / (2 * np.pi), rel=1e-10, abs=0.0)
+    assert np.isnan(found[5])
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        (build_scene("sdof_slider", scene_parameters("sdof_slider")(), 1), "nothing moves"),
+        (chain(np.eye(3), np.diag([1.0, 1.0, 0.0])), "nothing holds"),
+    ],
+)
+def test_a_model_without_such_frequencies_says_so(model, words):
+    with pytest.raises(SceneError, match=words):
+        stuck_frequencies(model)
+
+
+def test_which_scene_tells_what():
+    functions = ("describe_mesh", "natural_frequencies", "exact_answer")
+    found = {
+        model: [name for name in functions if scene_has(model, name)] for model in ("dovetail_sector", "sdof_slider")
+    }
+    assert found == {"dovetail_sector": ["describe_mesh", "natural_frequencies"], "sdof_slider": ["exact_answer"]}
+    assert not any(scene_has(model, name) for model in ("two_masses", "vibro_impact") for name in functions)

@@ -1,0 +1,124 @@
+"""Fretting loops in the result file: where they stand, and that other pairs take no room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver.loops import LOOP_PHASES, loop_phases
+from studyrunner import gather, variables
+from studyrunner.cli import main
+from studyrunner.parts import Parts, record_type
+from studyrunner.scene import SceneFacts
+from studyrunner.study_file import read_study
+from studyrunner.tasks import build_tasks
+from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
+
+OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
+AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
+
+
+def wide(n_contact: int) -> SceneFacts:
+    return replace(
+        FACTS, position=np.zeros((n_contact, 3)), area=np.full(n_contact, 1e-4), surface=("flank",) * n_contact
+    )
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[int, str], Path]:
+    def write_file(n_contact: int, loops: str) -> Path:
+        facts = wide(n_contact)
+        study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={loops}", "outputs.variables=['worn_volume']"))
+        plan = build_tasks(study, facts.n_displacements)
+        parts = Parts(tmp_path / "parts", record_type(study, facts))
+        for task in fake_starts(plan, 0):
+            result = fake_march(task, facts)
+            if task.position == 1:
+                result = without_values(result, 6)
+                # noise does not shrink: what is on the disk is what was written
+            else:
+                values = {name: np.random.default_rng(1).normal(size=at.shape) for name, at in result.values.items()}
+                result = replace(
+                    result, values={**result.values, **{n: values[n] for n in variables.LOOPS if n in values}}
+                )
+            parts.add(task, result)
+        parts.flush()
+        path = tmp_path / f"{n_contact}.nc"
+        gather.gather(study, facts, plan, parts, path)
+        parts.remove()
+        return path
+
+    return write_file
+
+
+def test_both_sides_have_the_same_phases() -> None:
+    assert variables.LOOP_PHASES == LOOP_PHASES
+
+
+def test_loops_are_labelled(write: Callable[[int, str], Path]) -> None:
+    with xr.open_dataset(write(5, "[3, 1]")) as result:
+        assert result.phase.values.tolist() == loop_phases().tolist()
+        assert result.component.values.tolist() == ["normal", "tangent_1", "tangent_2"]
+        assert result.phase.attrs["units"] == "rad"
+        for name, units in (("loop_displacement", "m"), ("loop_force", "N")):
+            loop = result[name]
+            assert loop.dims == (*AXES, "cycle", "contact", "phase", "component")
+            assert loop.attrs["units"] == units
+            assert loop.shape[-4:] == (3, 5, LOOP_PHASES, 3)
+            there = loop.sel(frequency=150.0).squeeze().notnull().any(["cycle", "phase", "component"])
+            assert there.values.tolist() == [False, True, False, True, False]
+            assert loop.sel(frequency=160.0).isnull().all()
+            assert loop.sel(frequency=150.0, contact=[1, 3]).notnull().all()
+        assert "contact_area" in result.loop_force.coords
+
+
+def test_pairs_without_loops_take_no_room(write: Callable[[int, str], Path]) -> None:
+    files = {
+        (n_contact, loops): write(n_contact, loops).stat().st_size
+        for n_contact in (3, 300)
+        for loops in ("[]", "[1]", "[0, 1, 2]")
+    }
+    bytes_a_pair = 2 * 3 * LOOP_PHASES * 3 * 8  # of the point that did not fail
+    for n_contact in (3, 300):
+        assert files[n_contact, "[0, 1, 2]"] - files[n_contact, "[1]"] > 1.8 * bytes_a_pair
+        assert files[n_contact, "[1]"] - files[n_contact, "[]"] > 0.9 * bytes_a_pair
+    # what loops add does not grow with the pairs: a chunk takes more than this in the index of the file alone
+    added = [files[n_contact, "[1]"] - files[n_contact, "[]"] for n_contact in (3, 300)]
+    assert abs(added[1] - added[0]) < 16 * 2 * (300 - 3)
+
+
+def test_without_loops_there_are_no_such_names(write: Callable[[int, str], Path]) -> None:
+    with xr.open_dataset(write(5, "[]")) as result:
+        assert not {"loop_force", "loop_displacement", "phase", "component"} & set(result.variables)
+        assert not {"phase", "component"} & set(result.sizes)
+
+
+def test_points_that_share_a_march_have_its_loops_at_their_own_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = [
+        "sdof_slider",
+        *("--set", "axes.frequency=160", "--set", "axes.scheme=['implicit', 'adaptive']"),
+        *("--set", "axes.wear_coefficient=[0, 1e-11, 2e-11]", "--set", "axes.step=[500, 1000]"),
+        *("--set", "slow_time.cycles=2000", "--set", "slow_time.outputs=[500, 2000]"),
+        *("--set", "solver.harmonics=3", "--set", "solver.samples=128", "--set", "outputs.loops=[0]"),
+    ]
+    assert main([*study, "-o", "shared.nc"]) == 0
+    assert main([*study, "-o", "alone.nc", "--set", "solver.shortcuts=false"]) == 0
+    with xr.open_dataset("shared.nc") as shared, xr.open_dataset("alone.nc") as alone:
+        for name in ("loop_displacement", "loop_force"):
+            assert alone[name].notnull().all()
+            scale = float(np.abs(alone[name]).max())
+            np.testing.assert_allclose(shared[name].values, alone[name].values, rtol=0.0, atol=1e-6 * scale)
+        # half the normal force in the worst case: they are not all the same
+        force = shared.loop_force.isel(component=0, phase=0, cycle=-1).squeeze()
+        assert float(force.max() - force.min()) > 0.01
+        np.testing.assert_allclose(
+            shared.loop_force.isel(component=0).mean("phase"), shared.mean_pressure * shared.contact_area, rtol=1e-9
+        )

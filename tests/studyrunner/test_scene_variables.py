@@ -1,0 +1,141 @@
+"""What the result file holds of the scene itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies.scene_answers import NaturalFrequencies
+from studies.scenes import dovetail_sector, scene_mesh
+from studyrunner import gather, scene_variables
+from studyrunner.cli import main
+from studyrunner.output import parts_folder
+from studyrunner.scene import build_study_scene
+from studyrunner.scene_variables import build_scene_variables
+from studyrunner.study_file import read_study
+from studyrunner.tasks import build_tasks
+from tests.studyrunner.dataset_twin import build_dataset, write_dataset
+from tests.studyrunner.fakes import FACTS, fake_histories, fake_parts
+
+SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")
+GRID = (*SLIDER, "axes.wear_coefficient=[1e-11, 0]", "axes.step=[10, 100]", "axes.harmonics=[1, 3]")
+COARSE = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.scheme=implicit")
+
+
+@pytest.mark.parametrize("bytes_a_slab", [1.0, 3000.0, 1e9], ids=["a point", "some points", "all"])
+def test_the_file_is_the_one_of_the_plain_twin(
+    bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
+    study = read_study("sdof_slider", GRID)
+    of_scene = build_scene_variables(study, build_study_scene(study))
+    frequencies = read_study("two_masses", ["outputs.variables=['natural_frequency']"])
+    of_scene += build_scene_variables(frequencies, build_study_scene(frequencies))
+    mesh = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['mesh']"])
+    of_scene += build_scene_variables(mesh, build_study_scene(mesh))
+    plan = build_tasks(study, FACTS.n_displacements)
+    results = [result for _, result in fake_histories(plan)]
+    parts = fake_parts(study, plan, results, parts_folder(tmp_path / "out.nc"))
+    gathered = gather.gather(study, FACTS, plan, parts, tmp_path / "out.nc", of_scene)
+    twin_set = build_dataset(study, FACTS, results, gathered.certificates, of_scene)
+    write_dataset(twin_set, tmp_path / "twin.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:
+        assert opened.exact_worn_volume.dims[-1] == "cycle"
+        assert opened.mesh_part.dtype.kind == "U"
+        xr.testing.assert_identical(opened, twin)
+
+
+def test_exact_answers_stand_at_their_points() -> None:
+    study = read_study("sdof_slider", GRID)
+    found = {scene.name: scene for scene in build_scene_variables(study, build_study_scene(study))}
+    assert set(found) == {"exact_worn_volume", "exact_response_amplitude"}
+    volume, response = found["exact_worn_volume"].values, found["exact_response_amplitude"].values
+    # frequency, wear coefficient, excitation amplitude; nothing depends on step, scheme, sweep, harmonics
+    assert volume.shape == (3, 2, 2, 1, 1, 1, 1, 3)
+    assert response.shape == (3, 2, 2, 1, 1, 1, 1, 3, 1)
+    assert np.isnan(volume[1]).all()
+    assert not volume[[0, 2], 1].any()
+    assert (np.diff(volume[[0, 2], 0], axis=-1) > 0.0).all()
+    for frequency in (0, 2):
+        for amplitude in (0, 1):
+            axes = {
+                "frequency": study.axes.frequency[frequency],
+                "excitation_amplitude": study.axes.excitation_amplitude[amplitude],
+                "wear_coefficient": 1e-11,
+            }
+            own = [f"axes.{name}={value}" for name, value in axes.items()]
+            alone = read_study("sdof_slider", [*own, "slow_time.outputs=3"])
+            one, other = build_scene_variables(alone, build_study_scene(alone))
+            assert np.array_equal(one.values.ravel(), volume[frequency, 0, amplitude].ravel())
+            assert np.array_equal(other.values.ravel(), response[frequency, 0, amplitude].ravel())
+
+
+def test_the_computed_slider_is_near_its_exact_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    overrides = ["axes.frequency=[150, 160]", "axes.scheme=adaptive", "solver.rtol=1e-2", "slow_time.outputs=5"]
+    assert main(["sdof_slider", "-o", "out.nc", *(part for text in overrides for part in ("--set", text))]) == 0
+    with xr.open_dataset("out.nc") as result:
+        for name in ("worn_volume", "response_amplitude"):
+            own, exact = (result[prefix + name].values for prefix in ("", "exact_"))
+            assert own == pytest.approx(exact, rel=1e-2, abs=0.0)
+            assert not np.array_equal(own, exact)
+        assert result.exact_response_amplitude.attrs["units"] == "m"
+        assert result.exact_worn_volume.attrs["coverage_content_type"] == "referenceInformation"
+
+
+def test_mesh_and_natural_frequencies_of_the_sector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    values = np.arange(24 * 6.0).reshape(24, 6)
+    monkeypatch.setattr(scene_variables, "scene_frequencies", lambda *_: NaturalFrequencies(tuple(range(24)), values))
+    asked = "outputs.variables=['mesh', 'natural_frequency']"
+    assert main(["dovetail", "-o", "out.nc", *(part for text in (*COARSE, asked) for part in ("--set", text))]) == 0
+    mesh = scene_mesh("dovetail_sector", read_study("dovetail", COARSE).scene.parameters)
+    with xr.open_dataset("out.nc") as result:
+        assert "worn_volume" not in result
+        assert np.array_equal(result.natural_frequency.sel(nodal_diameter=3), values[3])
+        assert result.natural_frequency.sel(mode=1, nodal_diameter=2) == values[2, 0]
+        assert result.nodal_diameter.dtype == np.int32
+        assert np.array_equal(np.stack([result.mesh_x, result.mesh_y, result.mesh_z], axis=1), mesh.nodes)
+        assert np.array_equal(result.mesh_quad, mesh.quads)
+        assert result.mesh_quad.dtype == np.int32
+        assert result.mesh_part.values.tolist() == list(mesh.parts)
+
+
+def test_natural_frequencies_of_a_scene_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    wave = ("scene.mesh=1", "scene.nodal_diameter=3", "solver.harmonics=2", "scene.n_sectors=20")
+    assert main(["dovetail", "--write-scene", "wave.h5", *(part for text in wave for part in ("--set", text))]) == 0
+    text = '[study]\nname = "s"\n[scene]\nmodel = "wave.h5"\nfriction_coefficient = 0.3\n[axes]\nfrequency = 200.0\n'
+    (tmp_path / "s.toml").write_text(text + "[solver]\nharmonics = 2\n", encoding="utf-8")
+    study = read_study("s.toml", ["outputs.variables=['natural_frequency']"])
+    found = {scene.name: scene.values for scene in build_scene_variables(study, build_study_scene(study))}
+    assert found["nodal_diameter"].tolist() == [0, 3, 6]
+    assert found["mode"].tolist() == [1, 2, 3, 4, 5, 6]
+    whole = dovetail_sector.natural_frequencies(read_study("dovetail", wave).scene.parameters)
+    assert found["natural_frequency"] == pytest.approx(whole.frequencies[[0, 3, 6]], rel=1e-9, abs=0.0)
+    assert "mesh" not in read_study("s.toml").outputs.variables
+
+
+def test_a_sector_that_spins_too_fast_is_bad_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The nodal diameters of the study are fine, another one is not: known before anything is computed."""
+    monkeypatch.chdir(tmp_path)
+
+    def unstable(*_: object) -> None:
+        raise ValueError("the glued sector is unstable: spin softening exceeds its stiffness")
+
+    monkeypatch.setattr(dovetail_sector, "glued_frequencies", unstable)
+    overrides = (*COARSE, "outputs.variables=['natural_frequency']")
+    assert main(["dovetail", "-o", "out.nc", *(part for text in overrides for part in ("--set", text))]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert "scene.rotation_speed = 3000.0: reduce it" in said[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_not_asked_for_is_not_there() -> None:
+    study = read_study("sdof_slider", ["outputs.variables=['worn_volume']"])
+    assert build_scene_variables(study, build_study_scene(study)) == ()
