@@ -98,9 +98,7 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
             yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
 
 
-def _solve(
-    model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None
-) -> WearHistory:
+def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its shares is read."""
     from solver.march import march_wear
     from solver.packing import unpack

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.costs import LearnedCosts
-from studyrunner.evaluate import CONVERGED, CRASHED, NOT_COMPUTED, build_evaluator, describe_failures
+from studyrunner.evaluate import CONVERGED, NOT_COMPUTED, build_evaluator, describe_failures
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.ledger import Ledger
 from studyrunner.output import parts_folder
@@ -26,6 +26,8 @@ from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask,
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from solver.model import ReducedModel
     from studyrunner.gather import Gathered
 
@@ -35,7 +37,7 @@ _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
-class Interrupted(KeyboardInterrupt):  # noqa: N818 - it is no error
+class Interrupted(KeyboardInterrupt):
     """A run was ended from outside; the file holds what was computed until then. summary: how far it was."""
 
     def __init__(self, summary: RunSummary) -> None:

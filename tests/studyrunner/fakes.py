@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
 from studyrunner.parts import Parts, record_type
+
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
