@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from studyrunner.parts import Parts, record_type
 
 from solver.loops import LOOP_PHASES, loop_phases
 from studyrunner import gather, variables
 from studyrunner.cli import main
+from studyrunner.parts import Parts, record_type
 from studyrunner.scene import SceneFacts
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
