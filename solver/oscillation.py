@@ -10,13 +10,13 @@ import numpy as np
 from solver.model import FloatArray, IntArray
 
 SUCCESSIVE = 4  # increments of a wear rate that alternate in sign and do not shrink
-NOTICEABLE = 1e-3  # of the largest wear rate: increments below it are no oscillation
+NOTICEABLE = 1e-3  # of the largest rate of all pairs together: increments below it are no oscillation
 CALMING = 0.98  # an increment that is smaller than this share of the one before calms
 
 
 @dataclass
 class WearRates:
-    """Follows some wear rates (n,) from step to step, and forgets them.
+    """Follows the wear rates of pairs and, last, of all together (n,) from step to step, and forgets them.
 
     An explicit Euler step beyond its limit turns the sign of the error and enlarges it; a physical rise and fall takes
     many steps. largest (n,): of all so far. strongest (n,): the smallest of `SUCCESSIVE` - 1 increments that followed
@@ -49,10 +49,12 @@ class WearRates:
         self.largest = np.maximum(self.largest, np.abs(rates))
         self.value = rates
 
-    @property
-    def oscillate(self) -> bool:
-        """Whether one of them went up and down `SUCCESSIVE` times in a row without calming."""
-        return bool((self.strongest > NOTICEABLE * self.largest).any())
+    def oscillate(self, least: float = 0.0) -> bool:
+        """Whether one of them went up and down `SUCCESSIVE` times in a row without calming, by more than `least` and a
+        share of what all of them wear together: a pair at the edge of the slip zone that wears next to nothing does so
+        at any step.
+        """
+        return bool(self.strongest.max(initial=0.0) > max(NOTICEABLE * self.largest[-1], least))
 
     def carried(self) -> dict[str, Any]:
         """What goes on from step to step, to be packed."""

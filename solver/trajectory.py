@@ -38,10 +38,11 @@ SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
+ROUND_OFF = 1e-9  # of the wear rate if everything slipped all the time: less is no wear
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 _CARRIED = (
-    *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit"),
+    *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
     *("estimate", "estimated_for", "certificate", "point"),
 )
 
@@ -70,8 +71,9 @@ class Trajectory:
         self.jumps = 0
         self.failure = Outcome.MARCH_FAILED
         self.step_limit = float("nan")
-        # of every pair, and of all together
+        # m3 per cycle, of every pair and of all together
         self.rates = WearRates(self.case.model.contact.n_contact + 1)
+        self.largest_rate = 0.0
         self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
 
     def carried(self) -> dict[str, Any]:
@@ -229,6 +231,10 @@ class Trajectory:
         """Whether the current state is stable."""
         return self.is_stable(self.point.evaluation)
 
+    def oscillates(self) -> bool:
+        """Whether the wear rate of the joint or of a pair went up and down from step to step."""
+        return self.rates.oscillate(ROUND_OFF * self.largest_rate)
+
     def is_stable(self, evaluation: Evaluation) -> bool:
         """Whether a state is stable with its wear held."""
         held = Balance(self.joint, evaluation.history, evaluation.wear_depth, self.still)
@@ -251,7 +257,12 @@ class Trajectory:
     def _note(self) -> None:
         """Keep the wear rate of the current state, and the limit of the explicit step at the first one that wears."""
         rate = self.rate()
-        self.rates.add(np.append(rate, rate @ self.joint.contact.area))
+        volumes = rate * self.joint.contact.area
+        self.rates.add(np.append(volumes, volumes.sum()))
+        motion = self.point.evaluation.displacement_h[:, 1:, 1:]
+        pressed = np.abs(self.point.evaluation.force_t[:, 0]).max(axis=1)
+        moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
+        self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
         if np.isnan(self.step_limit) and self.wears():
             balance = Balance(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth, self.still)
             per_work = self.wear_coefficient / self.joint.contact.area

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.ranks import LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
+from studyrunner.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
 from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-_SECONDS_FOR_RANK_0 = 8.0
-"""Rank 0 has so long to write what there is, before another rank ends the run: a job has ten seconds at its limit."""
+_SECONDS_FOR_RANK_0 = 60.0
+"""Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -45,8 +45,10 @@ exit status:
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
   3  finished and saved, but some points failed; their `outcome` says why
+  130  ended by Ctrl-C or SIGTERM; the file holds the points that were computed until then
 
-A run that was ended, in whatever way, goes on where it was when the same command is given again."""
+A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
+is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,10 @@ def parse_options(arguments: Sequence[str]) -> Options:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks."""
+    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
+
+    arguments: None for those of the process, which ends here if the run did not come to its end.
+    """
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -131,9 +136,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
         if isinstance(error, KeyboardInterrupt):
-            if ranks.rank > 0:
-                # The launcher interrupts all ranks, and rank 0 then speaks for them.
-                time.sleep(_SECONDS_FOR_RANK_0)
+            if ranks.rank > 0 and _leave_to_rank_0(ranks):
+                ranks.close()
+                return CONVERGED
             print(f"run-study: {str(error) or 'interrupted'}", file=sys.stderr)
             status = INTERRUPTED
         elif isinstance(error, StorageError):
@@ -144,7 +149,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
             traceback.print_exc()
             status = UNEXPECTED
         ranks.abort(status)
+        if arguments is None:
+            # The thread that computes is still at it, which an interpreter on its way out does not always survive.
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
     return status
+
+
+def _leave_to_rank_0(ranks: Ranks) -> bool:
+    """Waits for rank 0 to write what there is and to end all ranks; it is told, if the launcher has not told all.
+
+    Whether it had come to its end already, with nothing left to do here.
+    """
+    from studyrunner.schedule import RankInterrupted
+
+    ranks.send(RankInterrupted(), 0)
+    latest = time.monotonic() + _SECONDS_FOR_RANK_0
+    while time.monotonic() < latest:
+        # a message moves only while its sender is in the MPI library
+        received = ranks.receive()
+        if received is not None and received[1] is None:
+            return True
+        time.sleep(POLL_SECONDS)
+    return False
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:

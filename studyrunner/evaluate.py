@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Outcome, describe_error
 from solver.packed import Packed
-from solver.settings import SolverSettings
+from solver.settings import Resolution, SolverSettings
+from studyrunner.records import failed_result
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask, Settings
 
@@ -56,7 +57,7 @@ def build_evaluator(
 
 
 def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
-    """Start states of one branch, as the sweep reaches them, but those that are known."""
+    """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.continuation import follow_branch
     from solver.packing import pack
@@ -72,6 +73,7 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
         resume=_packed(task.resume),
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
+    n_left = task.n_results
     for position, start in branch:
         if position in task.known:
             continue
@@ -79,6 +81,25 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
         packed = pack(start)
         yield StartResult(position, Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
+        n_left -= 1
+        if n_left == 0:
+            return
+
+
+def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
+    """What a task still owes after its first results, where it broke off with an error that it should not have."""
+    from solver.packing import pack
+
+    message = describe_error(error)
+    if isinstance(task, MarchTask):
+        for place in range(n_given, task.n_results):
+            yield failed_result(task, place, int(Outcome.EXCEPTION), message)
+        return
+    nan = math.nan
+    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    packed = pack(start)
+    for position in [place for place in task.order if place not in task.known][n_given:]:
+        yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
@@ -119,11 +140,8 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
         loops=task.loops,
-<<<<<<< HEAD
         keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
-=======
->>>>>>> main
     )
 
 

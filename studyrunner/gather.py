@@ -27,16 +27,10 @@ from studyrunner.output import partial_path
 from studyrunner.records import empty_record, variable_sizes
 from studyrunner.scene import SceneFacts
 from studyrunner.scene_variables import SceneVariable
-<<<<<<< HEAD
 from studyrunner.store import Store
 from studyrunner.study import Study
 from studyrunner.study_file import format_study
 from studyrunner.user_error import StorageError
-=======
-from studyrunner.study import Study
-from studyrunner.study_file import format_study
-from studyrunner.tasks import TaskPlan
->>>>>>> main
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 _PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
@@ -66,38 +60,19 @@ class _Index:
 
 
 def gather(
-<<<<<<< HEAD
     study: Study, facts: SceneFacts, ledger: Ledger, path: Path, of_scene: Sequence[SceneVariable] = ()
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
     of_scene: what no task computes. Points that are not computed yet say so in their outcome. Raises StorageError.
-=======
-    study: Study,
-    facts: SceneFacts,
-    plan: TaskPlan,
-    parts: Parts,
-    path: Path,
-    of_scene: Sequence[SceneVariable] = (),
-) -> Gathered:
-    """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
-
-    of_scene: what no task computes. Every point of the study has exactly one record; anything else is a bug and raises
-    ValueError.
->>>>>>> main
     """
     index, gathered = _read_through(study, ledger)
     temporary = partial_path(path)
     try:
         with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
-<<<<<<< HEAD
             _write_values(file, study, facts, ledger.store, index)
             _write_scene(file, study, ledger.store, of_scene)
-=======
-            _write_values(file, study, facts, parts, index)
-            _write_scene(file, study, parts, of_scene)
->>>>>>> main
             _write_coordinates(file, study, facts)
         os.replace(temporary, path)
     except (OSError, RuntimeError) as error:
@@ -165,11 +140,8 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
         lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
         for name, entry in variables.items():
             values = records[name].reshape(*lengths, *records[name].shape[1:])
-<<<<<<< HEAD
             if entry.is_text:
                 values = values.astype(object)
-=======
->>>>>>> main
             if name not in LOOPS:
                 file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
                 continue
@@ -222,15 +194,9 @@ def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np
     return records
 
 
-<<<<<<< HEAD
 def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Sequence[SceneVariable]) -> None:
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, store.kind.itemsize)
-=======
-def _write_scene(file: netCDF4.Dataset, study: Study, parts: Parts, of_scene: Sequence[SceneVariable]) -> None:
-    shape = tuple(len(values) for values in study.dimensions.values())
-    slab = _slab_shape(shape, parts.kind.itemsize)
->>>>>>> main
     for scene in of_scene:
         dimensions = (scene.name,) if scene.coordinate else scene.entry.dimensions
         for dimension, size in zip(dimensions, scene.values.shape[-len(dimensions) :], strict=True):

@@ -26,40 +26,45 @@ _COMPUTING = ("fretwear", "numba", "numpy", "scipy")
 class Identities:
     """Hashes of the tasks of a study on one scene.
 
-    friction_coefficient: Coulomb's. scene_digest: of the model, see SceneFacts. kind: describes the record of a result,
-    so that results with other variables, loops or numbers of outputs are not taken for these.
+    scene_digest: of the model, see SceneFacts. kind: describes the record of a result, so that results with other
+    variables or numbers of outputs are not taken for these.
     """
 
     def __init__(self, study: Study, scene_digest: str, kind: str) -> None:
         self._kind = kind
         self._scene = (scene_digest, study.friction_coefficient, solver_digest())
-        self._lines: dict[tuple[object, ...], tuple[str, ...]] = {}
+        self._lines: dict[int, tuple[str, ...]] = {}
+        self._kept: dict[tuple[object, ...], str] = {}
 
     def of_starts(self, branch: BranchTask) -> tuple[str, ...]:
         """Of the start states at all frequencies of a branch, (n_frequencies,)."""
-        # a time limit decides whether there is a result, not which
-        settings = tuple(item for item in asdict(branch.settings).items() if item[0] != "time_limit")
-        line = (branch.excitation_amplitude, branch.sweep, settings, branch.frequencies)
-        if line not in self._lines:
+        if branch.number not in self._lines:
+            # a time limit decides whether there is a result, not which
+            settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
+            line = (branch.excitation_amplitude, branch.sweep, settings)
             # the penalty is that of the highest frequency
-            key = _digest("line", self._scene, line[:-1], max(branch.frequencies))
+            key = _digest("line", self._scene, line, max(branch.frequencies))
             found = [""] * len(branch.frequencies)
             for place in branch.order:
                 key = _digest(key, branch.frequencies[place])
                 found[place] = key
-            self._lines[line] = tuple(found)
-        return self._lines[line]
+            self._lines[branch.number] = tuple(found)
+        return self._lines[branch.number]
 
     def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:
         """Of the histories of a march, one for each of its shares."""
         start = self.of_starts(branch)[march.position]
         own = (*self._wear(march, march.shares[0]), march.scheme if not march.held else "", march.held)
-        base = ("history", start, self._kind, own, march.largest_depth, march.cycles)
+        kept = march.cycles, march.loops
+        if kept not in self._kept:
+            self._kept[kept] = _digest(self._kind, kept)
+        base = ("history", start, self._kept[kept], own, march.largest_depth)
         return tuple(_digest(*base, place > 0, self._wear(march, share)) for place, share in enumerate(march.shares))
 
-    def of_march(self, branch: BranchTask, march: MarchTask) -> str:
-        """Of the progress of a march, which depends on all counts that are read from it."""
-        return _digest("march", self.of_histories(branch, march))
+    @staticmethod
+    def of_march(histories: tuple[str, ...]) -> str:
+        """Of the progress of a march with these histories, which depends on all counts that are read from it."""
+        return _digest("march", histories)
 
     def of_branch(self, branch: BranchTask) -> str:
         """Of the progress of a branch."""

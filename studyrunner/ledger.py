@@ -30,7 +30,7 @@ class Ledger:
         for branch, line in zip(plan.branches, plan.marches, strict=True):
             for march in line:
                 self._histories[march.number] = identities.of_histories(branch, march)
-                self._marches[march.number] = identities.of_march(branch, march)
+                self._marches[march.number] = identities.of_march(self._histories[march.number])
 
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
         """Where the histories of a march are, one for each share; None for those that are not finished."""
@@ -53,10 +53,13 @@ class Ledger:
         """Branches on whose way are start states that are not known and from which there is something to march."""
         left = []
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
-            known = frozenset(place for place, key in enumerate(keys) if self.store.has_start(key))
-            if self._needed(branch) - known:
-                progress = self.store.read_progress(self.key(branch))
-                left.append(replace(branch, known=known, resume=progress))
+            needed = self._needed(branch)
+            known = frozenset(
+                place for place, key in enumerate(keys) if place not in needed or self.store.has_start(key)
+            )
+            if len(known) < len(keys):
+                key = self.key(branch)
+                left.append(replace(branch, known=known, resume=self.store.read_progress(key), key=key))
         return left
 
     def known_starts(self, branch: BranchTask) -> list[StartResult]:
@@ -70,8 +73,9 @@ class Ledger:
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """The marches from one start state that are not finished, each with its progress."""
+        keys = {march.number: self.key(march) for march in self.plan.marches_from(branch, position)}
         return tuple(
-            replace(march, resume=self.store.read_progress(self.key(march)))
+            replace(march, resume=self.store.read_progress(keys[march.number]), key=keys[march.number])
             for march in self.plan.marches_from(branch, position)
             if not self.is_finished(march)
         )
@@ -94,6 +98,7 @@ class Ledger:
 
     def forget_failed(self) -> None:
         """Points that failed are to be computed again, and what comes behind them on their branch."""
+        failed = self.store.select(lambda records: records["outcome"] != 0)
         for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
             behind: set[int] = set()
             for place in branch.order:
@@ -104,26 +109,27 @@ class Ledger:
             if behind:
                 self.store.forget_progress(self.key(branch))
             for march in line:
-                for key, place_on_disk in zip(self._histories[march.number], self.places(march), strict=True):
-                    if place_on_disk is None:
-                        continue
-                    number, row = place_on_disk
-                    if march.position in behind or self.store.read(number)["outcome"][row] != 0:
+                for key in self._histories[march.number]:
+                    if key in failed or march.position in behind:
                         self.store.forget_history(key)
 
-    def take_as_failed(self, key: str, outcome: int, message: str) -> int:
-        """The task of this key has ended some process: no other run tries it again. How many points it has.
+    def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
+        """The task of this key has ended its process: no other run tries it again. How many points are lost with it.
 
-        A branch ends where it is then: there are no more start states on it.
+        position: place on a branch that it was on the way to, None for a march. The branch ends before that place.
         """
         n_points = 0
         for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
-            unknown = {place for place, start in enumerate(starts) if not self.store.has_start(start)}
+            lost: set[int] = set()
+            if self.key(branch) == key and position in branch.order:
+                behind = branch.order[branch.order.index(position) :]
+                lost = {place for place in behind if not self.store.has_start(starts[place])}
             for march in line:
-                mine = self.key(march) == key or (self.key(branch) == key and march.position in unknown)
-                if mine and not self.is_finished(march):
-                    n_points += len(march.points)
-                    for place in range(march.n_results):
+                if self.key(march) != key and march.position not in lost:
+                    continue
+                for place, known in enumerate(self.places(march)):
+                    if known is None:
+                        n_points += len(march.shares[place].points)
                         self.add_history(march, failed_result(march, place, outcome, message))
         self.store.flush()
         return n_points

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.costs import LearnedCosts
-from studyrunner.evaluate import CONVERGED, NOT_COMPUTED, build_evaluator, describe_failures
+from studyrunner.crashes import Evaluate, Keep, crash_files, note_tasks, read_crashes
+from studyrunner.evaluate import (
+    CONVERGED,
+    CRASHED,
+    NOT_COMPUTED,
+    build_evaluator,
+    describe_failures,
+    failed_results,
+)
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.ledger import Ledger
 from studyrunner.output import parts_folder
 from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
 from studyrunner.records import record_type
-from studyrunner.results import Kept, MarchResult, StartResult
+from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
@@ -30,8 +38,6 @@ if TYPE_CHECKING:
 
     from solver.model import ReducedModel
     from studyrunner.gather import Gathered
-
-Evaluate = Callable[[BranchTask | MarchTask, Callable[[Kept], None]], Iterator[StartResult | MarchResult]]
 
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
@@ -47,10 +53,11 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for the tasks of a study."""
+    """What every rank needs for the tasks of a study. folder: of the run, which not all ranks need see."""
 
     model: ReducedModel
     friction_coefficient: float
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -87,12 +94,14 @@ def run_study(
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
-<<<<<<< HEAD
+    if "natural_frequency" in study.outputs.variables:
+        progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind, fresh=fresh)
     with contextlib.closing(store):
         ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+        take_crashes(ledger)
         if retry_failed:
             ledger.forget_failed()
         n_found = ledger.n_points_finished
@@ -107,16 +116,25 @@ def run_study(
             return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene))
 
         try:
-            job = Job(model, study.friction_coefficient)
+            job = Job(model, study.friction_coefficient, store.folder)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
-            run_tasks(ranks, ledger, build_evaluator(model, study.friction_coefficient), progress)
+            with _evaluator(job, rank=0) as evaluate:
+                run_tasks(ranks, ledger, evaluate, progress)
             progress.say("writing the result")
+            summary = write()
         except KeyboardInterrupt:
             raise Interrupted(write()) from None
-        summary = write()
         ledger.prune()
     return summary
+
+
+def take_crashes(ledger: Ledger) -> None:
+    """Points at which a process crashed in an earlier run have failed; what that run has said of it is removed."""
+    for crash in read_crashes(ledger.store.folder):
+        ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+    for path in crash_files(ledger.store.folder):
+        path.unlink(missing_ok=True)
 
 
 def _open_store(folder: Path, kind: np.dtype[np.void], *, fresh: bool) -> Store:
@@ -129,25 +147,6 @@ def _open_store(folder: Path, kind: np.dtype[np.void], *, fresh: bool) -> Store:
 
 def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
     outcomes = gathered.outcomes
-=======
-    if "natural_frequency" in study.outputs.variables:
-        progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model)
-    parts = Parts(parts_folder(path), record_type(study, facts))
-    try:
-        job = Job(model, study.friction_coefficient)
-        for rank in range(1, ranks.size):
-            ranks.send(job, rank)
-        run_tasks(ranks, plan, build_evaluator(model, study.friction_coefficient), parts, progress)
-        progress.say("writing the result")
-        # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.gather import gather
-
-        gathered = gather(study, facts, plan, parts, path, of_scene)
-    finally:
-        # Nothing goes on from an interrupted run.
-        parts.remove()
->>>>>>> main
     return RunSummary(
         n_points=plan.n_points,
         n_converged=outcomes[CONVERGED],
@@ -160,7 +159,34 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
 
 def work_on_job(ranks: Ranks, job: Job) -> None:
     """Any other rank: computes tasks until there are none."""
-    work_on_tasks(ranks, build_evaluator(job.model, job.friction_coefficient))
+    with _evaluator(job, ranks.rank) as evaluate:
+        work_on_tasks(ranks, evaluate)
+
+
+def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
+    """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
+    compute = build_evaluator(job.model, job.friction_coefficient)
+
+    def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+        given: set[int] = set()
+        for result in compute(task, keep):
+            if isinstance(result, StartResult):
+                given.add(result.position)
+            yield result
+        if isinstance(task, BranchTask) and len(given) < task.n_results and task.resume is not None:
+            # the branch had passed states that are damaged or were not asked for then
+            yield from compute(replace(task, known=task.known | given, resume=None), keep)
+
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+        n_given = 0
+        try:
+            for result in compute_all(task, keep):
+                n_given += 1
+                yield result
+        except Exception as error:
+            yield from failed_results(task, n_given, error)
+
+    return note_tasks(evaluate, job.folder, rank)
 
 
 class Course:

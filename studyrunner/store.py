@@ -2,21 +2,22 @@
 
 It stands beside the result file. Records of histories are plain arrays of numpy, one element a history; start states
 and the progress of long tasks are bundles of arrays with a text that says what they are. No file holds a pickle. Each
-is written under a temporary name, flushed to the disk and renamed: it is whole or not there. What came in the last
-moment goes into one file, so that thousands of short tasks do not make as many. Rank 0 writes all of them, as no other
-rank need see the folder.
+is written under a temporary name, flushed to the disk and renamed: it is whole or not there, and a check sum tells
+whether it still is. What came in the last moment goes into one file, so that thousands of short tasks do not make as
+many. Rank 0 writes all of them, as no other rank need see the folder.
 """
 
 from __future__ import annotations
 
 import fcntl
 import io
-import json
 import math
 import os
+import re
 import socket
 import time
 import zipfile
+import zlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import IO
@@ -38,6 +39,10 @@ KEY_TYPE = "S32"
 _BYTES_A_FILE = 8e6
 _LOCK = "lock"
 _RECORDS, _STARTS, _PROGRESS, _PARTIAL = ".npy", ".starts.npz", ".progress.npz", ".partial"
+_OWN = re.compile(r"(\d{8}(\.npy|\.starts\.npz)|[0-9a-f]{32}\.progress\.npz)(\.partial)?")
+_SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
+_CHECK_SUM_BYTES = 4
+_BYTES_AT_ONCE = 2**20
 
 
 class StoreInUseError(Exception):
@@ -69,9 +74,13 @@ class Store:
             self._lock = _lock(folder / _LOCK)
         except OSError as error:
             raise StorageError(folder, error) from error
-        if fresh:
-            self._remove(self._own_files())
-        self._look_round()
+        try:
+            if fresh:
+                self._remove(self._own_files())
+            self._look_round()
+        except OSError as error:
+            self.close()
+            raise StorageError(folder, error) from error
 
     def add_history(self, key: str, record: NDArray[np.void], task: str = "") -> None:
         """A record (1,) to be written. task: what the progress of a task is known by that this history ends."""
@@ -92,10 +101,15 @@ class Store:
     def read_start(self, key: str) -> Kept:
         """A start state that is on the disk."""
         path, place = self._starts[key]
-        return _read_bundle(path, place)
+        try:
+            return _read_bundle(path, place)
+        except OSError as error:
+            raise StorageError(path, error) from error
 
     def keep_progress(self, key: str, progress: Kept) -> None:
-        """Writes how far a task is, in place of what was written of it before."""
+        """Writes how far a task is, in place of what was written of it before; what it has given so far goes first."""
+        if self._new_starts:
+            self.flush()
         self._write(self.folder / f"{key}{_PROGRESS}", lambda file: _write_bundle(file, {key: progress}))
         self._progress.add(key)
 
@@ -103,15 +117,19 @@ class Store:
         """How far a task was; None where that is not known."""
         if key not in self._progress:
             return None
+        path = self.folder / f"{key}{_PROGRESS}"
         try:
-            return _read_bundle(self.folder / f"{key}{_PROGRESS}", 0)
-        except _UNREADABLE:
+            return _read_bundle(path, 0)
+        except OSError as error:
+            raise StorageError(path, error) from error
+        except Exception:
+            # whatever is wrong with it, it is no loss but of time
             self.forget_progress(key)
             return None
 
     def forget_progress(self, key: str) -> None:
         """The task is finished, or to be done again."""
-        (self.folder / f"{key}{_PROGRESS}").unlink(missing_ok=True)
+        self._remove([self.folder / f"{key}{_PROGRESS}"])
         self._progress.discard(key)
 
     def tick(self) -> None:
@@ -130,7 +148,7 @@ class Store:
         if self._new_records:
             path = self.folder / f"{name}{_RECORDS}"
             records = np.concatenate(list(self._new_records.values()))
-            self._write(path, lambda file: np.save(file, records, allow_pickle=False))
+            self._write(path, lambda file: _write_records(file, records))
             self.histories |= {key: (len(self.files), row) for row, key in enumerate(self._new_records)}
             self.files.append(path)
             self._new_records = {}
@@ -143,8 +161,23 @@ class Store:
 
     def read(self, number: int) -> NDArray[np.void]:
         """Records of a file; they stay on the disk until they are used."""
-        records: NDArray[np.void] = np.load(self.files[number], mmap_mode="r", allow_pickle=False)
+        path = self.files[number]
+        try:
+            records: NDArray[np.void] = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError) as error:
+            raise StorageError(path, error) from error
         return records
+
+    def select(self, chosen: Callable[[NDArray[np.void]], NDArray[np.bool_]]) -> set[str]:
+        """Hashes of the histories for whose records `chosen` says so; it is given those of a file at once."""
+        found: set[str] = set()
+        for number in range(len(self.files)):
+            records = self.read(number)
+            for row in np.flatnonzero(chosen(records)).tolist():
+                key = _text(records[KEY][row])
+                if self.histories.get(key) == (number, row):
+                    found.add(key)
+        return found
 
     def forget_history(self, key: str) -> None:
         """The history is to be computed again: its new record will stand for it."""
@@ -182,17 +215,19 @@ class Store:
             raise StorageError(path, error) from error
 
     def _own_files(self) -> list[Path]:
-        patterns = (f"[0-9]*{_RECORDS}", f"[0-9]*{_STARTS}", f"*{_PROGRESS}", f"*{_PARTIAL}")
-        return sorted(path for pattern in patterns for path in self.folder.glob(pattern))
+        return sorted(path for path in self.folder.iterdir() if _OWN.fullmatch(path.name))
 
     def _remove(self, files: Iterable[Path]) -> None:
         for path in files:
-            path.unlink(missing_ok=True)
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise StorageError(path, error) from error
 
     def _look_round(self) -> None:
-        """What earlier runs have left; what cannot be read is no loss, as it is computed again."""
+        """What earlier runs have left; what is damaged is computed again. Raises OSError where the disk fails."""
         for path in self._own_files():
-            if path.name[:8].isdecimal():
+            if not path.name.endswith((_PROGRESS, _PROGRESS + _PARTIAL)):
                 self._number = max(self._number, int(path.name[:8]) + 1)
             try:
                 if path.name.endswith(_PARTIAL):
@@ -201,58 +236,93 @@ class Store:
                     self._progress.add(path.name.removesuffix(_PROGRESS))
                 elif path.name.endswith(_STARTS):
                     self._starts |= {key: (path, place) for place, key in enumerate(_keys_of(path))}
-                elif path.name.endswith(_RECORDS):
-                    records = np.load(path, mmap_mode="r", allow_pickle=False)
+                else:
+                    records = _load_records(path)
                     if records.dtype == self.kind and records.ndim == 1:
-                        keys = [key.decode("ascii") for key in records[KEY].tolist()]
+                        keys = map(_text, records[KEY].tolist())
                         self.histories |= {key: (len(self.files), row) for row, key in enumerate(keys)}
                         self.files.append(path)
-            except _UNREADABLE:
+            except OSError:
+                # a disk that fails for now is no reason to throw anything away
+                raise
+            except Exception:
                 path.unlink(missing_ok=True)
-
-
-_UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile)
 
 
 def _lock(path: Path) -> IO[str]:
     """The lock file, held until it is closed or the process ends, however it ends."""
+    latest = time.monotonic() + _SECONDS_TO_DIE
     file = path.open("a+", encoding="utf-8")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        file.seek(0)
-        owner = file.read().strip() or "unknown"
-        file.close()
-        raise StoreInUseError(owner) from None
-    except OSError:
-        # a file system without locks: better to run without one than not at all
-        return file
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            break
+        except BlockingIOError:
+            if time.monotonic() > latest:
+                file.seek(0)
+                owner = file.read().strip() or "unknown"
+                file.close()
+                raise StoreInUseError(owner) from None
+            time.sleep(_SECONDS_TO_DIE / 50)
+        except OSError:
+            # a file system without locks: better to run without one than not at all
+            return file
     file.truncate(0)
     file.write(f"process {os.getpid()} on {socket.gethostname()}")
     file.flush()
     return file
 
 
+def _text(key: bytes) -> str:
+    return key.decode("ascii")
+
+
+def _write_records(file: IO[bytes], records: NDArray[np.void]) -> None:
+    """As numpy writes them, and a check sum."""
+    buffer = io.BytesIO()
+    np.save(buffer, records, allow_pickle=False)
+    content = buffer.getbuffer()
+    file.write(content)
+    file.write(zlib.crc32(content).to_bytes(_CHECK_SUM_BYTES, "little"))
+
+
+def _load_records(path: Path) -> NDArray[np.void]:
+    """Records that stay on the disk until they are used. Raises ValueError where they are damaged."""
+    left, found = path.stat().st_size - _CHECK_SUM_BYTES, 0
+    with path.open("rb") as file:
+        while left > 0:
+            some = file.read(min(left, _BYTES_AT_ONCE))
+            found, left = zlib.crc32(some, found), left - len(some)
+        if found.to_bytes(_CHECK_SUM_BYTES, "little") != file.read():
+            raise ValueError("the check sum is another one")
+    records: NDArray[np.void] = np.load(path, mmap_mode="r", allow_pickle=False)
+    return records
+
+
 def _write_bundle(file: IO[bytes], entries: Mapping[str, Kept]) -> None:
-    """Arrays under the names "entry.place", and a text that lists keys and texts of the entries."""
-    texts = json.dumps([[key, entry.text, len(entry.arrays)] for key, entry in entries.items()])
-    arrays = {
-        f"{number}.{place}": array
-        for number, entry in enumerate(entries.values())
-        for place, array in enumerate(entry.arrays)
-    }
+    """Their keys; the text of each under the name "entry.text", its arrays under "entry.place"."""
+    arrays: dict[str, NDArray[np.generic]] = {"keys": np.array(list(entries), KEY_TYPE)}
+    for number, entry in enumerate(entries.values()):
+        arrays[f"{number}.text"] = np.frombuffer(entry.text.encode(), np.uint8)
+        arrays |= {f"{number}.{place}": array for place, array in enumerate(entry.arrays)}
     # into memory first: a zip file is written with many small writes and seeks
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, texts=np.frombuffer(texts.encode(), np.uint8), **arrays)
+    np.savez(buffer, allow_pickle=False, **arrays)
     file.write(buffer.getbuffer())
 
 
 def _read_bundle(path: Path, number: int) -> Kept:
-    with np.load(path, allow_pickle=False) as bundle:
-        _, text, n_arrays = json.loads(bundle["texts"].tobytes())[number]
+    # numpy does not close what it opens where that is no bundle
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as bundle:
+        n_arrays = sum(name.startswith(f"{number}.") for name in bundle.files) - 1
+        text = bundle[f"{number}.text"].tobytes().decode()
         return Kept(text, tuple(bundle[f"{number}.{place}"] for place in range(n_arrays)))
 
 
 def _keys_of(path: Path) -> list[str]:
+    """Keys of a bundle. Raises ValueError where it is damaged."""
+    with zipfile.ZipFile(path) as file:
+        if file.testzip() is not None:
+            raise ValueError("a check sum is another one")
     with np.load(path, allow_pickle=False) as bundle:
-        return [key for key, *_ in json.loads(bundle["texts"].tobytes())]
+        return list(map(_text, bundle["keys"].tolist()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -272,7 +273,7 @@ class Study(Section):
         """Coulomb's coefficient of the scene."""
         return read_number(dict(self.scene.parameters)["friction_coefficient"])
 
-    @property
+    @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
         """Cycle counts of the result, ascending."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs

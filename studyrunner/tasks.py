@@ -53,8 +53,9 @@ class Settings:
 class BranchTask:
     """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
 
-    number: of the branch in the study. cost: estimated seconds. known: places of the frequencies whose results an
-    earlier run has left, which are not given again. resume: how far that run was; None to begin with the first one.
+    number: of the branch in the study. cost: estimated seconds. known: places of the frequencies whose results are not
+    asked for: an earlier run has left them, or all that starts from them. resume: how far that run was; None to begin
+    with the first one. key: what the branch is known by in the folder of the run.
     """
 
     number: int
@@ -65,6 +66,7 @@ class BranchTask:
     cost: float
     known: frozenset[int] = frozenset()
     resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -103,12 +105,8 @@ class MarchTask:
     cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
     cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
         those planned for and something moves.
-<<<<<<< HEAD
     start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
-=======
-    start: start state, None until its branch has reached it.
->>>>>>> main
-    number: of the march in the study.
+    number: of the march in the study. key: what it is known by in the folder of the run.
     """
 
     number: int
@@ -127,6 +125,7 @@ class MarchTask:
     moves: bool = True
     start: Kept | None = field(default=None, compare=False, repr=False)
     resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
 
     @property
     def wear_coefficient(self) -> float:

@@ -19,14 +19,11 @@ class Variable:
     dtype: str = "float64"
     flags: tuple[str, ...] = ()
     content: str = "modelResult"
-<<<<<<< HEAD
 
     @property
     def is_text(self) -> bool:
         """Whether the values are texts."""
         return self.dtype.startswith("U")
-=======
->>>>>>> main
 
 
 ASKED = {

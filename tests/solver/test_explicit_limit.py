@@ -118,7 +118,17 @@ def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscil
     followed = WearRates(2)
     for rate in rates:
         followed.add(np.array([1.0, rate]))
-    assert followed.oscillate is oscillates is oscillation_of_all(rates)
+    assert followed.oscillate() is oscillates is oscillation_of_all(rates)
+    assert not followed.oscillate(10.0)
+
+
+@pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
+def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, oscillates: bool) -> None:
+    followed = WearRates(3)
+    for step in range(8):
+        pair = share * (1.0 + step % 2)
+        followed.add(np.array([pair, 2.0, 2.0 + pair]))
+    assert followed.oscillate() is oscillates
 
 
 @settings(max_examples=200, deadline=None)
@@ -130,7 +140,7 @@ def test_oscillation_is_that_of_all_rates_together_also_when_carried_on(rates: l
             carried, followed = followed.carried(), WearRates(1)
             followed.take_up(carried)
         followed.add(np.array([rate]))
-    assert followed.oscillate is oscillation_of_all(rates)
+    assert followed.oscillate() is oscillation_of_all(rates)
 
 
 def oscillation_of_all(rates: Sequence[float]) -> bool:
