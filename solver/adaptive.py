@@ -22,6 +22,7 @@ is interpolated, and runs that differ in k_w alone are the same trajectory.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,8 @@ FIRST = 0.05  # of the explicit step limit: the first step, before anything is k
 FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears where there is no limit
 ITERATIONS = 10  # of a step: one that takes more is halved
 SHORTEST = 1e-4  # of the first step
+
+_CARRIED = ("error", "_length", "_shortest", "_before")
 
 
 @dataclass
@@ -94,6 +97,15 @@ class AdaptiveSteps:
                 self._before, self._length = (length, depth), length
                 return arrived, length
             self._length = max(shorter * length, 0.999 * shortest)
+
+    def carried(self) -> dict[str, Any]:
+        """What goes on from step to step, to be packed."""
+        return {name: getattr(self, name) for name in _CARRIED}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has carried so far."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
 
     def restart(self) -> None:
         """What came before tells nothing of what follows: behind a jump."""

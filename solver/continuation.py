@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Callable, Iterator
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from solver.history import StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, follow_naturally, vibration_change
+from solver.outcome import Outcome, describe_error
+from solver.packed import Packed
+from solver.packing import pack, unpack
+from solver.path import Effort, OutOfTimeError, PathPoint, follow_naturally, vibration_change
 from solver.response import periodic_state, solve_first_state
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.settling import settle
@@ -35,7 +37,10 @@ COSTLY = 2500  # unknowns from which a branch is followed with fewer harmonics t
 LIGHT = 1600  # unknowns of a state that a branch is followed with then
 ALIKE = 0.2  # relative difference of the first harmonics of such a state to the refined one
 MOST_ITERATIONS = 2500  # from one frequency to the next
+REFRESH = 100  # iterations after which the kept factorisation is given up at the next frequency, as in `march`
 MOST_LANDINGS = 6  # ends of branches on the way from one frequency to the next
+
+_CARRIED = ("point", "failure", "branch", "fold")
 
 Sweep = Literal["up", "down"]
 
@@ -47,6 +52,8 @@ def follow_branch(
     frequencies: FloatArray,
     sweep: Sweep,
     settings: SolverSettings,
+    keep: Callable[[Packed], None] | None = None,
+    resume: Packed | None = None,
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one.
 
@@ -55,16 +62,33 @@ def follow_branch(
     is where a slow sweep of the machine would land if the branch is one curve; where that fails, the structure is left
     to settle in time from the last state, and at last the state is sought from nothing.
     excitation_amplitude in N. Each state starts from the tangential history of the one before.
+    keep: called now and then, after the state was taken from the iterator, with the progress of the sweep. resume: such
+        progress of a sweep with the same arguments (frequencies beyond those passed may differ, but not the highest
+        one), from which this one goes on: the remaining states are the same to the last bit, but for `run_time`.
     """
     order = np.arange(frequencies.size) if sweep == "up" else np.arange(frequencies.size)[::-1]
     omegas = 2.0 * np.pi * frequencies
     penalty_omega = float(omegas.max())
     line = _Line(build_case(model, friction_coefficient, penalty_omega, settings), excitation_amplitude)
+    n_done, refreshed = 0, 0
+    if resume is not None:
+        n_done, carried = unpack(resume)
+        line.take_up(carried)
+        refreshed = line.effort.iterations
     started = time.thread_time()
-    for index in order:
+    for place in range(n_done, order.size):
+        index = order[place]
         spent = line.effort.iterations
         line.fold = float("nan")
-        outcome, refined = line.advance(float(omegas[index]), sweep)
+        line.effort.deadline = started + settings.time_limit
+        message = ""
+        try:
+            outcome, refined = line.advance(float(omegas[index]), sweep)
+        except OutOfTimeError:
+            outcome, refined = Outcome.TIME_LIMIT, None
+        except Exception as error:
+            # one bad point is one bad point: the sweep goes on from the state before
+            outcome, refined, message = Outcome.EXCEPTION, None, describe_error(error)
         now = time.thread_time()
         state, estimate = None, UNKNOWN
         if refined is not None:
@@ -83,9 +107,17 @@ def follow_branch(
                 run_time=now - started,
                 branch=line.branch,
                 fold_frequency=line.fold / (2.0 * np.pi),
+                message=message,
             ),
         )
         started = now
+        if line.effort.iterations >= refreshed + REFRESH:
+            progress = pack((place + 1, line.carried()))
+            # with or without anybody who keeps it, so that all sweeps take the same way
+            line.take_up(unpack(progress)[1])
+            refreshed = line.effort.iterations
+            if keep is not None:
+                keep(progress)
 
 
 class _Line:
@@ -106,6 +138,26 @@ class _Line:
         self.failure = Outcome.START_FAILED
         self.branch = 0
         self.fold = float("nan")
+
+    def carried(self) -> dict[str, Any]:
+        """What goes on from frequency to frequency, to be packed."""
+        values = {name: getattr(self, name) for name in _CARRIED}
+        light = None
+        if self.light is not None:
+            light = (self.light.case.resolution, self.light.point, self.light.estimate, self.light.accurate)
+        return values | {"resolution": self.case.resolution, "iterations": self.effort.iterations, "light": light}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has carried so far, without its kept factorisation."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
+        self.case = self.case.at(carried["resolution"])
+        self.effort.iterations = carried["iterations"]
+        self.solver = JacobianSolver()
+        self.light = None
+        if carried["light"] is not None:
+            resolution, *others = carried["light"]
+            self.light = Refined(self.case.at(resolution), *others)
 
     def advance(self, omega: float, sweep: Sweep) -> tuple[Outcome, Refined | None]:
         """State at the next angular frequency, rad/s, with the harmonics that it needs."""

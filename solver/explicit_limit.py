@@ -1,4 +1,4 @@
-"""Where the explicit scheme becomes unstable: predicted from the exact tangents, and seen in the wear rates.
+"""Where the explicit scheme becomes unstable, predicted from the exact tangents.
 
 The wear rate g(W) of the joint falls where wear takes load off a pair. An explicit Euler step multiplies a disturbance
 of W by 1 + h dg/dW: it grows where h exceeds 2 / mu, mu the largest positive eigenvalue of -dg/dW. With an implicit
@@ -9,9 +9,7 @@ zero are those of J^-1 (J_h - J) / h: no other matrix is needed than the two Jac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,8 +18,6 @@ from solver.linear import JacobianSolver, ritz_values
 from solver.model import FloatArray
 
 PRODUCTS = 16  # products of Arnoldi's method, one linear solve each
-SUCCESSIVE = 4  # increments of the wear rate that alternate in sign and do not shrink
-NOTICEABLE = 1e-3  # of the largest wear rate: increments below it are no oscillation
 
 
 def explicit_step_limit(balance: Balance, at: Evaluation, wear_per_work: FloatArray, solver: JacobianSolver) -> float:
@@ -58,21 +54,3 @@ def explicit_step_limit(balance: Balance, at: Evaluation, wear_per_work: FloatAr
 def balance_without_wear(balance: Balance, at: Evaluation) -> Balance:
     """The balance of a state at its wear depth, held."""
     return Balance(balance.joint, at.history, at.wear_depth, np.zeros_like(at.wear_depth))
-
-
-def wear_oscillates(rates: Sequence[float]) -> bool:
-    """Whether wear rates of successive steps went up and down `SUCCESSIVE` times in a row without calming.
-
-    An explicit Euler step beyond its limit turns the sign of the error and enlarges it; a physical rise and fall takes
-    many steps.
-    """
-    values = np.asarray(rates)
-    size = float(np.abs(values).max(initial=0.0))
-    increments = np.diff(values)
-    run = 0
-    for before, after in pairwise(increments):
-        alternates = before * after < 0.0 and abs(after) >= 0.98 * abs(before) and abs(after) > NOTICEABLE * size
-        run = run + 1 if alternates else 0
-        if run >= SUCCESSIVE - 1:
-            return True
-    return False

@@ -39,6 +39,7 @@ class StartState:
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
     branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
     fold_frequency: Hz, the fold at which the sweep left its branch on the way to this frequency; NaN if none.
+    message: what an unexpected error said, see `Outcome.EXCEPTION`.
     """
 
     outcome: Outcome
@@ -51,6 +52,7 @@ class StartState:
     run_time: float
     branch: int = 0
     fold_frequency: float = float("nan")
+    message: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class WearHistory:
     step_limit: cycles, predicted largest stable explicit step at the first state that wears: 2 over the largest
     positive rate at which the wear rate falls with the depth; inf where none. oscillates: the wear rate went up and
     down from step to step without calming, as in an unstable explicit scheme.
+    message: what an unexpected error said, see `Outcome.EXCEPTION`.
     """
 
     outcome: Outcome

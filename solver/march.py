@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from solver.adaptive import AdaptiveSteps
-from solver.explicit_limit import wear_oscillates
 from solver.history import StartState, WearHistory
 from solver.joint import build_case
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Outcome, describe_error
+from solver.packed import Packed
+from solver.packing import pack, unpack
+from solver.path import OutOfTimeError
 from solver.record import Recorder
 from solver.settings import SolverSettings
 from solver.trajectory import Scheme, Trajectory
 
 MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
 STEP_ITERATIONS = 10
+REFRESH = 100  # iterations after which the factorisation kept from step to step is given up, so that a march can be
+# kept on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing
 
 
 def march_wear(
@@ -32,6 +38,8 @@ def march_wear(
     settings: SolverSettings,
     largest_depth: float | None = None,
     loops: tuple[int, ...] = (),
+    keep: Callable[[Packed], None] | None = None,
+    resume: Packed | None = None,
 ) -> WearHistory:
     """Wear history of one point of a study.
 
@@ -39,21 +47,34 @@ def march_wear(
     counts to report, the first 0; between two steps they are interpolated, and the last step is shortened to end on the
     last of them. largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
     loops: pairs whose fretting loops are kept at every count.
+    keep: called now and then with the progress of the march. resume: such progress of a march with the same arguments,
+        from which this one goes on: its history is the same to the last bit, but for `run_time`.
     """
     started = time.thread_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
-        return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency)
+        return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = Trajectory(case, start, wear_coefficient, scheme, loops)
+    spent_before, message = 0.0, ""
+    march.effort.deadline = started + settings.time_limit
     try:
-        outcome = march.begin()
-        recorder.add(0.0, march.report(), wear_coefficient)
-        end, n_steps = float(cycles[-1]), 0
+        outcome, n_steps, end = Outcome.CONVERGED, 0, float(cycles[-1])
+        if resume is None:
+            outcome = march.begin()
+            recorder.add(0.0, march.report(), wear_coefficient)
+        else:
+            n_steps, spent_before, *carried = unpack(resume)
+            march.take_up(carried[0])
+            recorder.take_up(carried[1])
+            march.effort.deadline -= spent_before
         steps: AdaptiveSteps | FixedSteps = (
             AdaptiveSteps(march, settings.rtol) if scheme == "adaptive" else FixedSteps(march, end, step, largest_depth)
         )
+        if resume is not None:
+            steps.take_up(carried[2])
+        refreshed = march.effort.iterations
         while outcome is Outcome.CONVERGED and march.cycle < end:
             if not march.wears():
                 recorder.add(end, march.report(), wear_coefficient)
@@ -76,11 +97,26 @@ def march_wear(
                 steps.restart()
             outcome = march.check()
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
+            if outcome is Outcome.CONVERGED and march.effort.iterations >= refreshed + REFRESH:
+                spent = spent_before + time.thread_time() - started
+                parts = (march, recorder, steps)
+                progress = pack([n_steps, spent, *(part.carried() for part in parts)])
+                # with or without anybody who keeps it, so that all marches take the same way
+                for part, carried in zip(parts, unpack(progress)[2:], strict=True):
+                    part.take_up(carried)
+                refreshed = march.effort.iterations
+                if keep is not None:
+                    keep(progress)
         if outcome is Outcome.CONVERGED and not march.stays():
             outcome = Outcome.UNSTABLE
     except np.linalg.LinAlgError:
         outcome = Outcome.SINGULAR
-    spent = time.thread_time() - started
+    except OutOfTimeError:
+        outcome = Outcome.TIME_LIMIT
+    except Exception as error:
+        # one bad point is one bad point: the study goes on
+        outcome, message = Outcome.EXCEPTION, describe_error(error)
+    spent = spent_before + time.thread_time() - started
     # adaptive steps go beyond the end
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
     history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent)
@@ -88,9 +124,10 @@ def march_wear(
         history,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
+        message=message,
         step_limit=march.step_limit if march.step_limit > 0.0 else float("inf"),
         # what alternates with the other schemes are small corners of the wear rate, not the steps
-        oscillates=scheme == "explicit" and (wear_oscillates(march.rates) or march.pairs_oscillate()),
+        oscillates=scheme == "explicit" and march.oscillates(),
     )
 
 
@@ -114,6 +151,13 @@ class FixedSteps:
         # a remainder below round-off of the count is no step of its own
         reach = self.end if before + planned >= self.end * (1.0 - 1e-12) else before + planned
         return self.trajectory.advance(reach), reach - before
+
+    def carried(self) -> dict[str, Any]:
+        """Nothing."""
+        return {}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Nothing to go on from."""
 
     def restart(self) -> None:
         """Euler steps know nothing of those before."""

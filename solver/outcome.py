@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from enum import IntEnum
+from pathlib import Path
 
 
 class Outcome(IntEnum):
@@ -18,6 +20,10 @@ class Outcome(IntEnum):
     CERTIFICATE_FAILED = 7
     UNSTABLE = 8
     ADRIFT = 9
+    TIME_LIMIT = 10
+    EXCEPTION = 11
+    CRASHED = 12
+    NOT_COMPUTED = 13
 
     @property
     def meaning(self) -> str:
@@ -46,6 +52,17 @@ _SENTENCES = {
     " direction, use more frequencies or start elsewhere.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
+    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",
+    Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",
+    Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
+    Outcome.NOT_COMPUTED: "The run ended before this point was computed: the same command goes on from here.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
 }
+
+
+def describe_error(error: Exception) -> str:
+    """What an unexpected error says, and where it came from: one line for the result file."""
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
+    return " ".join(f"{type(error).__name__}: {error}{place}".split())

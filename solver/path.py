@@ -6,6 +6,7 @@ belongs to a value of it. The work is bounded: `MOST_STEPS` steps, `MOST_FAILURE
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,15 +39,27 @@ class PathPoint:
 
 @dataclass
 class Effort:
-    """Newton iterations spent; shared by the parts of one computation. limit: after which a branch is given up."""
+    """Newton iterations spent; shared by the parts of one computation. limit: after which a branch is given up.
+    deadline: CPU time of the thread, s, after which the whole computation is.
+    """
 
     iterations: int = 0
     limit: float = np.inf
+    deadline: float = np.inf
 
     @property
     def exhausted(self) -> bool:
         """Whether no more steps are to be begun."""
         return self.iterations > self.limit
+
+    def check_time(self) -> None:
+        """Raises OutOfTimeError behind the deadline."""
+        if self.deadline < np.inf and time.thread_time() > self.deadline:
+            raise OutOfTimeError
+
+
+class OutOfTimeError(Exception):
+    """A computation has taken the CPU time that it may take; those who began it say so in an outcome."""
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
@@ -61,10 +74,15 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
 def solve_balance(
     balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, effort: Effort, most: int = 30
 ) -> NewtonResult[Evaluation]:
-    """Newton on one balance from a predicted force (n_rel, 2H+1), N."""
+    """Newton on one balance from a predicted force (n_rel, 2H+1), N. Raises OutOfTimeError."""
+
+    def direction(at: Evaluation) -> FloatArray:
+        effort.check_time()
+        return solver.solve(balance.linearise(at), -at.residual)
+
     result = solve_newton(
         balance.evaluate,
-        lambda at: solver.solve(balance.linearise(at), -at.residual),
+        direction,
         start,
         tolerance,
         most,

@@ -33,6 +33,8 @@ CERTIFIED = (
     "wear_rate_error",
 )
 
+_CARRIED = ("_kept", "_last", "_local_errors")
+
 
 @dataclass
 class Recorder:
@@ -67,6 +69,15 @@ class Recorder:
         self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "volume_error", *CERTIFIED)}
         self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
         self._kept["stable"] = np.ones(n_output, np.bool_)
+
+    def carried(self) -> dict[str, Any]:
+        """What was kept so far, to be packed."""
+        return {name: getattr(self, name) for name in _CARRIED}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has kept so far."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
 
     def add(self, cycle: float, report: StateReport, wear_coefficient: float, error: float | None = None) -> None:
         """State at the end of a step; `cycle` never falls.

@@ -145,14 +145,15 @@ def _free_motion(balance: Balance) -> FloatArray:
 
 
 def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
-    """The frozen state that is handed on, in physical units."""
+    """The frozen state that is handed on, in physical units; its arrays lie in rows, as when read from a file."""
+    at = point.evaluation
     return PeriodicState(
         omega=joint.omega,
         excitation_amplitude=joint.excitation_amplitude,
-        displacement_h=point.evaluation.displacement_h,
-        contact_force_h=point.evaluation.force_h,
-        start_history=point.evaluation.history,
-        wear_depth=point.evaluation.wear_depth,
+        displacement_h=np.array(at.displacement_h, order="C"),
+        contact_force_h=np.array(at.force_h, order="C"),
+        start_history=np.array(at.history, order="C"),
+        wear_depth=np.array(at.wear_depth, order="C"),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,12 +17,14 @@ class SolverSettings:
     samples: N, equally spaced time samples in a period, at which the contact law is applied, more than 2 H; or "auto".
     tolerance: largest accepted scaled residual of the harmonic balance.
     rtol: relative error of response and wear rate that automatic harmonics and samples aim at.
+    time_limit: CPU seconds that the way to a start state may take, or a march, before it is given up.
     """
 
     harmonics: int | Automatic = "auto"
     samples: int | Automatic = "auto"
     tolerance: float = 1e-8
     rtol: float = 1e-2
+    time_limit: float = math.inf
 
     @property
     def automatic(self) -> bool:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from solver.adapt import Estimate, refine
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
-from solver.explicit_limit import explicit_step_limit, wear_oscillates
+from solver.explicit_limit import explicit_step_limit
 from solver.history import StartState
 from solver.joint import Case, Joint
 from solver.jump import landings
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
+from solver.oscillation import WearRates
 from solver.outcome import Outcome
 from solver.path import (
     SMALLEST_SHARE,
@@ -37,7 +38,13 @@ SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
+ROUND_OFF = 1e-9  # of the wear rate if everything slipped all the time: less is no wear
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
+
+_CARRIED = (
+    *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
+    *("estimate", "estimated_for", "certificate", "point"),
+)
 
 
 @dataclass
@@ -64,9 +71,26 @@ class Trajectory:
         self.jumps = 0
         self.failure = Outcome.MARCH_FAILED
         self.step_limit = float("nan")
-        self.rates: list[float] = []
-        self.pair_rates: list[FloatArray] = []
+        # m3 per cycle, of every pair and of all together
+        self.rates = WearRates(self.case.model.contact.n_contact + 1)
+        self.largest_rate = 0.0
         self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
+
+    def carried(self) -> dict[str, Any]:
+        """What goes on from step to step, to be packed; a factorisation that is kept for the next step is not in it."""
+        values = {name: getattr(self, name) for name in _CARRIED}
+        own = {"resolution": self.case.resolution, "iterations": self.effort.iterations, "rates": self.rates.carried()}
+        return values | own
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has carried so far, without its kept factorisation."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
+        self.rates.take_up(carried["rates"])
+        self.case = self.case.at(carried["resolution"])
+        self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        self.effort.iterations = carried["iterations"]
+        self.solver = JacobianSolver()
 
     def begin(self) -> Outcome:
         """Take up the unworn state: it is evaluated, not solved again."""
@@ -207,9 +231,9 @@ class Trajectory:
         """Whether the current state is stable."""
         return self.is_stable(self.point.evaluation)
 
-    def pairs_oscillate(self) -> bool:
-        """Whether the wear rate of some pair went up and down from step to step."""
-        return any(wear_oscillates(pair) for pair in np.array(self.pair_rates).T)
+    def oscillates(self) -> bool:
+        """Whether the wear rate of the joint or of a pair went up and down from step to step."""
+        return self.rates.oscillate(ROUND_OFF * self.largest_rate)
 
     def is_stable(self, evaluation: Evaluation) -> bool:
         """Whether a state is stable with its wear held."""
@@ -233,8 +257,12 @@ class Trajectory:
     def _note(self) -> None:
         """Keep the wear rate of the current state, and the limit of the explicit step at the first one that wears."""
         rate = self.rate()
-        self.pair_rates.append(rate)
-        self.rates.append(float(rate @ self.joint.contact.area))
+        volumes = rate * self.joint.contact.area
+        self.rates.add(np.append(volumes, volumes.sum()))
+        motion = self.point.evaluation.displacement_h[:, 1:, 1:]
+        pressed = np.abs(self.point.evaluation.force_t[:, 0]).max(axis=1)
+        moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
+        self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
         if np.isnan(self.step_limit) and self.wears():
             balance = Balance(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth, self.still)
             per_work = self.wear_coefficient / self.joint.contact.area

@@ -56,7 +56,7 @@ class CertificateTable:
         self._noted = {name: _Noted() for name in ("too long", "oscillating", "unstable")}
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
-        """Records (n,) as in `parts`, and the points that each of them is of."""
+        """Records (n,) as in `records`, and the points that each of them is of."""
         converged = records["outcome"] == CONVERGED
         first = [min(of_one) for of_one in points]
         self._n_histories += int(np.count_nonzero(converged))

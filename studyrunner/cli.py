@@ -14,8 +14,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.ranks import LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
-from studyrunner.user_error import UserError
+from studyrunner.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
+from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
     from studyrunner.study import Study
@@ -25,8 +25,8 @@ CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-_INTERRUPTED_LINE = "run-study: interrupted, nothing was written"
-_SECONDS_FOR_RANK_0 = 3.0
+_SECONDS_FOR_RANK_0 = 60.0
+"""Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -44,7 +44,11 @@ exit status:
   0  all points were computed to tolerance
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
-  3  finished and saved, but some points failed; their `outcome` says why"""
+  3  finished and saved, but some points failed; their `outcome` says why
+  130  ended by Ctrl-C or SIGTERM; the file holds the points that were computed until then
+
+A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
+is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class Options:
     plan: bool
     overrides: tuple[str, ...]
     write_scene: Path | None
+    fresh: bool
+    retry_failed: bool
 
 
 class _Parser(argparse.ArgumentParser):
@@ -88,8 +94,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
     parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
+    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run has left")
     parser.add_argument(
-        "--fresh", action="store_true", help="start over; every run does so, as runs leave nothing to go on from"
+        "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
     )
     found = parser.parse_args(list(arguments))
     return Options(
@@ -98,11 +105,16 @@ def parse_options(arguments: Sequence[str]) -> Options:
         plan=found.plan,
         overrides=tuple(found.overrides),
         write_scene=None if found.write_scene is None else Path(found.write_scene),
+        fresh=found.fresh,
+        retry_failed=found.retry_failed,
     )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks."""
+    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
+
+    arguments: None for those of the process, which ends here if the run did not come to its end.
+    """
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -116,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except KeyboardInterrupt:
         if launcher_rank() == 0:
-            print(_INTERRUPTED_LINE, file=sys.stderr)
+            print("run-study: interrupted", file=sys.stderr)
         return INTERRUPTED
     try:
         status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
@@ -124,17 +136,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
         if isinstance(error, KeyboardInterrupt):
-            if ranks.rank > 0:
-                # The launcher interrupts all ranks, and rank 0 then speaks for them.
-                time.sleep(_SECONDS_FOR_RANK_0)
-            print(_INTERRUPTED_LINE, file=sys.stderr)
+            if ranks.rank > 0 and _leave_to_rank_0(ranks):
+                ranks.close()
+                return CONVERGED
+            print(f"run-study: {str(error) or 'interrupted'}", file=sys.stderr)
             status = INTERRUPTED
+        elif isinstance(error, StorageError):
+            print(f"run-study: {error}", file=sys.stderr)
+            status = UNEXPECTED
         else:
             print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
             traceback.print_exc()
             status = UNEXPECTED
         ranks.abort(status)
+        if arguments is None:
+            # The thread that computes is still at it, which an interpreter on its way out does not always survive.
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
     return status
+
+
+def _leave_to_rank_0(ranks: Ranks) -> bool:
+    """Waits for rank 0 to write what there is and to end all ranks; it is told, if the launcher has not told all.
+
+    Whether it had come to its end already, with nothing left to do here.
+    """
+    from studyrunner.schedule import RankInterrupted
+
+    ranks.send(RankInterrupted(), 0)
+    latest = time.monotonic() + _SECONDS_FOR_RANK_0
+    while time.monotonic() < latest:
+        # a message moves only while its sender is in the MPI library
+        received = ranks.receive()
+        if received is not None and received[1] is None:
+            return True
+        time.sleep(POLL_SECONDS)
+    return False
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -156,7 +194,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         elif options.write_scene is not None:
             status = _write_scene(study, options.write_scene)
         else:
-            return _compute(ranks, study, options.output)
+            return _compute(ranks, study, options)
     except UserError as error:
         print(f"run-study: {error}", file=sys.stderr)
         status = BAD_INPUT
@@ -199,19 +237,27 @@ def _write_scene(study: Study, path: Path) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, study: Study, output: Path | None) -> int:
+def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.output import check_output
     from studyrunner.progress import RunProgress, format_seconds
-    from studyrunner.run import run_study
+    from studyrunner.run import Interrupted, run_study
     from studyrunner.scene import build_study_scene
 
-    path = Path(f"{study.study.name}.nc") if output is None else output
+    path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_output("-o", path, study.files)
     progress = RunProgress()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
     model = build_study_scene(study)
-    with progress:
-        summary = run_study(ranks, study, model, target, progress)
+    try:
+        with progress:
+            summary = run_study(
+                ranks, study, model, target, progress, fresh=options.fresh, retry_failed=options.retry_failed
+            )
+    except Interrupted as ended:
+        done = ended.summary.n_points - ended.summary.n_left
+        raise KeyboardInterrupt(
+            f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
+        ) from None
     failed = summary.n_points - summary.n_converged
     print(
         f"{path}: {summary.n_points} points, {summary.n_converged} computed to tolerance, {failed} failed,"

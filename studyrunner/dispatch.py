@@ -129,6 +129,11 @@ class Dispatcher(Generic[Task]):
         """Whether nothing waits and nothing is computed."""
         return not self._held and self._n_waiting == 0
 
+    @property
+    def wants_more(self) -> bool:
+        """Whether fewer tasks wait than all ranks have use for, for long."""
+        return not self._enough_waits
+
     def add(self, tasks: Iterable[Task]) -> None:
         """Tasks that have become possible."""
         for task in tasks:
@@ -171,6 +176,10 @@ class Dispatcher(Generic[Task]):
                 self._free[rank] = None
         return task
 
+    def task(self, number: int) -> Task:
+        """A task that is computed."""
+        return self._held[number].task
+
     def watch(self) -> None:
         """Called many times a second: now and then learns from tasks that take longer than expected.
 
@@ -193,12 +202,15 @@ class Dispatcher(Generic[Task]):
         self._others.reorder()
 
     @property
+    def _enough_waits(self) -> bool:
+        return len(self._others) >= _WAITING + _WAITING_A_RANK * self._n_ranks
+
+    @property
     def _n_waiting(self) -> int:
         return len(self._openers) + len(self._others)
 
     def _hand_out(self, rank: int) -> Assignment[Task]:
-        enough = len(self._others) >= _WAITING + _WAITING_A_RANK * self._n_ranks
-        number, task = (self._openers if self._openers and not enough else self._others).pop()
+        number, task = (self._openers if self._openers and not self._enough_waits else self._others).pop()
         self._held[number] = _Held(task, task.n_results, None if self._held_by[rank] else self._clock())
         self._held_by[rank].append(number)
         return Assignment(number, task)

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
-from solver.outcome import Outcome
-from solver.settings import SolverSettings
-from studyrunner.results import MarchResult, StartResult
+from solver.outcome import Outcome, describe_error
+from solver.packed import Packed
+from solver.settings import Resolution, SolverSettings
+from studyrunner.records import failed_result
+from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask, Settings
 
 
@@ -27,7 +29,10 @@ class Ending:
     sentence: str
 
 
-CONVERGED = int(Outcome.CONVERGED)
+CONVERGED, CRASHED, NOT_COMPUTED = int(Outcome.CONVERGED), int(Outcome.CRASHED), int(Outcome.NOT_COMPUTED)
+
+Keep = Callable[[Kept], None]
+"""Takes note of how far a task is."""
 
 _ROUND_OFF = 1e-10
 
@@ -39,22 +44,23 @@ def endings() -> tuple[Ending, ...]:
 
 def build_evaluator(
     model: ReducedModel, friction_coefficient: float
-) -> Callable[[BranchTask | MarchTask], Iterator[StartResult | MarchResult]]:
+) -> Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]:
     """The function that does the tasks of a study on this model and gives their results one by one."""
 
-    def evaluate(task: BranchTask | MarchTask) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         if isinstance(task, BranchTask):
-            yield from follow(model, friction_coefficient, task)
+            yield from follow(model, friction_coefficient, task, keep)
         else:
-            yield from march(model, friction_coefficient, task)
+            yield from march(model, friction_coefficient, task, keep)
 
     return evaluate
 
 
-def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -> Iterator[StartResult]:
-    """Start states of one branch, as the sweep reaches them."""
+def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
+    """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.continuation import follow_branch
+    from solver.packing import pack
 
     branch = follow_branch(
         model,
@@ -63,43 +69,70 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask) -
         np.array(task.frequencies),
         cast("Literal['up', 'down']", task.sweep),
         _solver_settings(task.settings),
+        keep=lambda progress: keep(Kept(progress.text, progress.arrays)),
+        resume=_packed(task.resume),
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
+    n_left = task.n_results
     for position, start in branch:
+        if position in task.known:
+            continue
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
-        yield StartResult(position, start, _moves(start), n_unknowns)
+        packed = pack(start)
+        yield StartResult(position, Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
+        n_left -= 1
+        if n_left == 0:
+            return
 
 
-def march(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> Iterator[MarchResult]:
+def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
+    """What a task still owes after its first results, where it broke off with an error that it should not have."""
+    from solver.packing import pack
+
+    message = describe_error(error)
+    if isinstance(task, MarchTask):
+        for place in range(n_given, task.n_results):
+            yield failed_result(task, place, int(Outcome.EXCEPTION), message)
+        return
+    nan = math.nan
+    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    packed = pack(start)
+    for position in [place for place in task.order if place not in task.known][n_given:]:
+        yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)
+
+
+def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
     """The histories of a task, one for each of its shares.
 
     One march gives all of them. Where it fails, or its wear rate oscillates, that may have been after the end of
     another history, which then takes a march of its own.
     """
-    history = _solve(model, friction_coefficient, task)
+    history = _solve(model, friction_coefficient, task, keep)
     yield build_result(task, history)
     tells_all = history.outcome is Outcome.CONVERGED and not history.oscillates
     for place, share in enumerate(task.shares[1:], start=1):
         if tells_all:
             yield build_result(task, history, place)
         else:
-            alone = replace(task, shares=(share,))
+            alone = replace(task, shares=(share,), resume=None)
             yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
 
 
-def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask) -> WearHistory:
+def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its shares is read."""
     from solver.march import march_wear
+    from solver.packing import unpack
 
-    if not isinstance(task.start, StartState):
+    start = None if task.start is None else unpack(Packed(task.start.text, task.start.arrays))
+    if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
     # The march begins at cycle 0, whether that count is kept or not.
     counts = np.unique(np.concatenate([[0.0], *(task.counts(share) for share in task.shares)]))
     return march_wear(
         model,
         friction_coefficient,
-        task.start,
+        start,
         task.wear_coefficient,
         task.step,
         cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
@@ -107,6 +140,8 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask) ->
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
         loops=task.loops,
+        keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
+        resume=_packed(task.resume),
     )
 
 
@@ -139,6 +174,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         fold_frequency=history.fold_frequency,
         step_limit=history.step_limit / slower,
         oscillates=history.oscillates,
+        message=history.message,
         share=place,
     )
 
@@ -172,7 +208,12 @@ def _moves(start: StartState) -> bool:
 
 def _solver_settings(settings: Settings) -> SolverSettings:
     # "auto" goes through as it is: the solver has to know it.
-    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol)
+    limit = settings.time_limit
+    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol, limit)
+
+
+def _packed(kept: Kept | None) -> Packed | None:
+    return None if kept is None else Packed(kept.text, kept.arrays)
 
 
 def describe_failures(outcomes: Mapping[int, int]) -> tuple[str, ...]:

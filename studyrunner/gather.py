@@ -21,14 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.certificates import CertificateTable
-from studyrunner.evaluate import endings
+from studyrunner.evaluate import NOT_COMPUTED, endings
+from studyrunner.ledger import Ledger
 from studyrunner.output import partial_path
-from studyrunner.parts import Parts, histories_of, variable_sizes
+from studyrunner.records import empty_record, variable_sizes
 from studyrunner.scene import SceneFacts
 from studyrunner.scene_variables import SceneVariable
+from studyrunner.store import Store
 from studyrunner.study import Study
 from studyrunner.study_file import format_study
-from studyrunner.tasks import TaskPlan
+from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 _PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
@@ -48,74 +50,80 @@ class Gathered:
 
 @dataclass(frozen=True)
 class _Index:
-    """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,)."""
+    """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,).
+
+    The file is -1 for points that are not computed.
+    """
 
     file: NDArray[np.int32]
     row: NDArray[np.int32]
 
 
 def gather(
-    study: Study,
-    facts: SceneFacts,
-    plan: TaskPlan,
-    parts: Parts,
-    path: Path,
-    of_scene: Sequence[SceneVariable] = (),
+    study: Study, facts: SceneFacts, ledger: Ledger, path: Path, of_scene: Sequence[SceneVariable] = ()
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
-    of_scene: what no task computes. Every point of the study has exactly one record; anything else is a bug and raises
-    ValueError.
+    of_scene: what no task computes. Points that are not computed yet say so in their outcome. Raises StorageError.
     """
-    index, gathered = _read_through(study, plan, parts)
+    index, gathered = _read_through(study, ledger)
     temporary = partial_path(path)
     try:
         with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
-            _write_values(file, study, facts, parts, index)
-            _write_scene(file, study, parts, of_scene)
+            _write_values(file, study, facts, ledger.store, index)
+            _write_scene(file, study, ledger.store, of_scene)
             _write_coordinates(file, study, facts)
         os.replace(temporary, path)
+    except (OSError, RuntimeError) as error:
+        # the library says the one or the other where the disk is full
+        raise StorageError(path, error) from error
     finally:
         temporary.unlink(missing_ok=True)
     return gathered
 
 
-def _read_through(study: Study, plan: TaskPlan, parts: Parts) -> tuple[_Index, Gathered]:
+def _read_through(study: Study, ledger: Ledger) -> tuple[_Index, Gathered]:
     """Reads every file once: where each point is, how it ended, and the table."""
     shape = tuple(len(values) for values in study.dimensions.values())
-    marches = list(itertools.chain.from_iterable(plan.marches))
-    index = _Index(*(np.zeros(math.prod(shape), dtype=np.int32) for _ in range(2)))
-    filled = np.zeros(math.prod(shape), dtype=np.int64)
+    index = _Index(np.full(math.prod(shape), -1, dtype=np.int32), np.zeros(math.prod(shape), dtype=np.int32))
+    found: dict[int, list[tuple[int, tuple[tuple[int, ...], ...]]]] = {}
+    for march in itertools.chain.from_iterable(ledger.plan.marches):
+        for share, place in zip(march.shares, ledger.places(march), strict=True):
+            if place is not None:
+                number, row = place
+                found.setdefault(number, []).append((row, share.points))
+                at = [int(np.ravel_multi_index(point, shape)) for point in share.points]
+                index.file[at], index.row[at] = number, row
     table = CertificateTable(study)
     outcomes: Counter[int] = Counter()
-    for number in range(len(parts.files)):
-        records = parts.read(number)
-        points = [marches[march].shares[share].points for march, share in histories_of(records)]
-        for row, (of_one, outcome) in enumerate(zip(points, records["outcome"].tolist(), strict=True)):
-            places = [int(np.ravel_multi_index(point, shape)) for point in of_one]
-            index.file[places], index.row[places] = number, row
-            filled[places] += 1
-            outcomes[outcome] += len(of_one)
-        table.add(points, records)
-    if not np.all(filled == 1):
-        raise ValueError(f"{np.count_nonzero(filled != 1)} points were not computed exactly once")
+    for number, entries in found.items():
+        records = ledger.store.read(number)[[row for row, _ in entries]]
+        for outcome, (_, points) in zip(records["outcome"].tolist(), entries, strict=True):
+            outcomes[outcome] += len(points)
+        table.add([points for _, points in entries], records)
+    outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
     return index, Gathered(outcomes, table.format())
 
 
-def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts: Parts, index: _Index) -> None:
+def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store: Store, index: _Index) -> None:
     shape = tuple(len(values) for values in study.dimensions.values())
     sizes = variable_sizes(study, facts)
     asked = [name for name in ASKED if name in study.outputs.variables]
     variables = {**{name: ASKED[name] for name in asked}, **(LOOPS if study.outputs.loops else {}), **KEPT}
     for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
         file.createDimension(name, size)
-    slab = _slab_shape(shape, parts.kind.itemsize)
+    slab = _slab_shape(shape, store.kind.itemsize)
     for name, entry in variables.items():
+        dimensions = (*study.dimensions, *entry.dimensions)
+        if entry.is_text:
+            # of any length, which cannot be compressed
+            file.createVariable(name, str, dimensions).setncatts(_attributes(name, entry))
+            continue
         variable = file.createVariable(
             name,
             entry.dtype,
-            (*study.dimensions, *entry.dimensions),
+            dimensions,
             compression="zlib",
             complevel=1,
             shuffle=True,
@@ -128,10 +136,12 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, parts:
     if not any("contact" in entry.dimensions for entry in variables.values()):
         file.setncattr("coordinates", _ON_CONTACT)
     for region, first, last in _slabs(shape, slab):
-        records = _read_slab(parts, index, first, last)
+        records = _read_slab(store, index, first, last)
         lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
         for name, entry in variables.items():
             values = records[name].reshape(*lengths, *records[name].shape[1:])
+            if entry.is_text:
+                values = values.astype(object)
             if name not in LOOPS:
                 file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
                 continue
@@ -168,21 +178,25 @@ def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, 
         first = last
 
 
-def _read_slab(parts: Parts, index: _Index, first: int, last: int) -> NDArray[np.void]:
+def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np.void]:
     """Records of points that follow each other in the file."""
     files, rows = index.file[first:last], index.row[first:last]
-    records = np.empty(last - first, dtype=parts.kind)
+    missing = empty_record(store.kind)
+    missing["outcome"] = NOT_COMPUTED
+    records = np.repeat(missing, last - first)
     order = np.argsort(files, kind="stable")
-    bounds = np.flatnonzero(np.diff(files[order], prepend=-1, append=-1))
+    bounds = np.flatnonzero(np.diff(files[order], prepend=-2, append=-2))
     for begin, end in itertools.pairwise(bounds):
         places = order[begin:end]
-        records[places] = parts.read(int(files[places[0]]))[rows[places]]
+        number = int(files[places[0]])
+        if number >= 0:
+            records[places] = store.read(number)[rows[places]]
     return records
 
 
-def _write_scene(file: netCDF4.Dataset, study: Study, parts: Parts, of_scene: Sequence[SceneVariable]) -> None:
+def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Sequence[SceneVariable]) -> None:
     shape = tuple(len(values) for values in study.dimensions.values())
-    slab = _slab_shape(shape, parts.kind.itemsize)
+    slab = _slab_shape(shape, store.kind.itemsize)
     for scene in of_scene:
         dimensions = (scene.name,) if scene.coordinate else scene.entry.dimensions
         for dimension, size in zip(dimensions, scene.values.shape[-len(dimensions) :], strict=True):

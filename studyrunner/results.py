@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,6 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.sharing import Index
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Something of the solver in a form that goes into a file: a text that refers to arrays by their place."""
+
+    text: str
+    arrays: tuple[NDArray[np.generic], ...]
+
+    @property
+    def n_bytes(self) -> int:
+        """Size in a file."""
+        return len(self.text) + sum(array.nbytes for array in self.arrays)
 
 
 @dataclass(frozen=True)
@@ -21,9 +35,24 @@ class StartResult:
     """
 
     position: int
-    start: object
+    start: Kept
     moves: bool
     n_unknowns: int
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no state."""
+        return self.n_unknowns == 0
+
+    def keep(self) -> Kept:
+        """All but the position, for a file."""
+        return Kept(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
+
+
+def read_start(position: int, kept: Kept) -> StartResult:
+    """What `StartResult.keep` gave."""
+    moves, n_unknowns, text = json.loads(kept.text)
+    return StartResult(position, Kept(text, kept.arrays), moves, n_unknowns)
 
 
 @dataclass(frozen=True)
@@ -47,4 +76,5 @@ class MarchResult:
     fold_frequency: float
     step_limit: float
     oscillates: bool
+    message: str = ""
     share: int = 0

@@ -1,116 +1,238 @@
-"""One run: hands out the tasks of a study, gathers their results and writes the file."""
+"""One run: hands out the tasks of a study that are left, gathers the results and writes the file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.costs import LearnedCosts
-from studyrunner.evaluate import CONVERGED, build_evaluator, describe_failures
+from studyrunner.crashes import Evaluate, Keep, crash_files, note_tasks, read_crashes
+from studyrunner.evaluate import (
+    CONVERGED,
+    CRASHED,
+    NOT_COMPUTED,
+    build_evaluator,
+    describe_failures,
+    failed_results,
+)
+from studyrunner.identity import Identities, hash_of_kind
+from studyrunner.ledger import Ledger
 from studyrunner.output import parts_folder
-from studyrunner.parts import Parts, record_type
 from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
+from studyrunner.records import record_type
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
+from studyrunner.store import Store, StoreInUseError
 from studyrunner.study import Study
 from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
-    from solver.model import ReducedModel
+    import numpy as np
 
-Evaluate = Callable[[BranchTask | MarchTask], Iterator[StartResult | MarchResult]]
+    from solver.model import ReducedModel
+    from studyrunner.gather import Gathered
 
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """A run was ended from outside; the file holds what was computed until then. summary: how far it was."""
+
+    def __init__(self, summary: RunSummary) -> None:
+        super().__init__(summary)
+        self.summary = summary
+
+
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for the tasks of a study."""
+    """What every rank needs for the tasks of a study. folder: of the run, which not all ranks need see."""
 
     model: ReducedModel
     friction_coefficient: float
+    folder: Path
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. failures: a line for each way in which points failed. certificates: the table of the worst."""
+    """How a run ended. n_left: points that are not computed yet. n_found: those that an earlier run has left.
+
+    failures: a line for each way in which points failed. certificates: the table of the worst.
+    """
 
     n_points: int
     n_converged: int
+    n_left: int
+    n_found: int
     failures: tuple[str, ...]
     certificates: str
 
 
-def run_study(ranks: Ranks, study: Study, model: ReducedModel, path: Path, progress: RunProgress) -> RunSummary:
-    """Rank 0: computes the study of this model together with the other ranks and writes the file `path`."""
+def run_study(
+    ranks: Ranks,
+    study: Study,
+    model: ReducedModel,
+    path: Path,
+    progress: RunProgress,
+    *,
+    fresh: bool = False,
+    retry_failed: bool = False,
+) -> RunSummary:
+    """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
+
+    It goes on from what an earlier run has left in the folder beside the file, unless `fresh`; retry_failed: points
+    that failed there are computed again. Raises UserError where another run is at work there, StorageError where
+    something cannot be written, and Interrupted.
+    """
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
     if "natural_frequency" in study.outputs.variables:
         progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
-    parts = Parts(parts_folder(path), record_type(study, facts))
-    try:
-        job = Job(model, study.friction_coefficient)
-        for rank in range(1, ranks.size):
-            ranks.send(job, rank)
-        run_tasks(ranks, plan, build_evaluator(model, study.friction_coefficient), parts, progress)
-        progress.say("writing the result")
-        # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.gather import gather
+    kind = record_type(study, facts)
+    store = _open_store(parts_folder(path), kind, fresh=fresh)
+    with contextlib.closing(store):
+        ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+        take_crashes(ledger)
+        if retry_failed:
+            ledger.forget_failed()
+        n_found = ledger.n_points_finished
+        if n_found:
+            progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
 
-        gathered = gather(study, facts, plan, parts, path, of_scene)
-    finally:
-        # Nothing goes on from an interrupted run.
-        parts.remove()
+        def write() -> RunSummary:
+            # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
+            from studyrunner.gather import gather
+
+            store.flush()
+            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene))
+
+        try:
+            job = Job(model, study.friction_coefficient, store.folder)
+            for rank in range(1, ranks.size):
+                ranks.send(job, rank)
+            with _evaluator(job, rank=0) as evaluate:
+                run_tasks(ranks, ledger, evaluate, progress)
+            progress.say("writing the result")
+            summary = write()
+        except KeyboardInterrupt:
+            raise Interrupted(write()) from None
+        ledger.prune()
+    return summary
+
+
+def take_crashes(ledger: Ledger) -> None:
+    """Points at which a process crashed in an earlier run have failed; what that run has said of it is removed."""
+    for crash in read_crashes(ledger.store.folder):
+        ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+    for path in crash_files(ledger.store.folder):
+        path.unlink(missing_ok=True)
+
+
+def _open_store(folder: Path, kind: np.dtype[np.void], *, fresh: bool) -> Store:
+    try:
+        return Store(folder, kind, fresh=fresh)
+    except StoreInUseError as error:
+        remedy = "another run is writing there: wait for its end, or give another result file with -o"
+        raise UserError(str(folder), "in use", Verbatim(f"by {error}"), remedy) from None
+
+
+def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
+    outcomes = gathered.outcomes
     return RunSummary(
-        plan.n_points, gathered.outcomes[CONVERGED], describe_failures(gathered.outcomes), gathered.certificates
+        n_points=plan.n_points,
+        n_converged=outcomes[CONVERGED],
+        n_left=outcomes[NOT_COMPUTED],
+        n_found=n_found,
+        failures=describe_failures(outcomes),
+        certificates=gathered.certificates,
     )
 
 
 def work_on_job(ranks: Ranks, job: Job) -> None:
     """Any other rank: computes tasks until there are none."""
-    work_on_tasks(ranks, build_evaluator(job.model, job.friction_coefficient))
+    with _evaluator(job, ranks.rank) as evaluate:
+        work_on_tasks(ranks, evaluate)
+
+
+def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
+    """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
+    compute = build_evaluator(job.model, job.friction_coefficient)
+
+    def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+        given: set[int] = set()
+        for result in compute(task, keep):
+            if isinstance(result, StartResult):
+                given.add(result.position)
+            yield result
+        if isinstance(task, BranchTask) and len(given) < task.n_results and task.resume is not None:
+            # the branch had passed states that are damaged or were not asked for then
+            yield from compute(replace(task, known=task.known | given, resume=None), keep)
+
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+        n_given = 0
+        try:
+            for result in compute_all(task, keep):
+                n_given += 1
+                yield result
+        except Exception as error:
+            yield from failed_results(task, n_given, error)
+
+    return note_tasks(evaluate, job.folder, rank)
 
 
 class Course:
     """How far the tasks of a study are, and what their results make possible.
 
-    keep: called with every finished march and its result. A march becomes available with its start state, while its
-    branch goes on. What a task computes never depends on the order.
+    A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
+    order.
     """
 
-    def __init__(self, plan: TaskPlan, keep: Callable[[MarchTask, MarchResult], None]) -> None:
-        self.plan = plan
+    def __init__(self, ledger: Ledger) -> None:
         self.costs = LearnedCosts()
-        self.n_points = 0
-        self.n_starts_left = sum(branch.n_results for branch in plan.branches)
-        self._keep = keep
+        self.branches = ledger.branches_left()
+        self.n_points = ledger.n_points_finished
+        self.n_starts_left = sum(branch.n_results for branch in self.branches)
+        self._ledger = ledger
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
-        self._left[BRANCHES] = sum(branch.cost for branch in plan.branches)
-        self._left[MARCHES] = plan.cost - self._left[BRANCHES]
+        self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
+        lines = ledger.plan.marches
+        self._left[MARCHES] = sum(march.cost for line in lines for march in line if not ledger.is_finished(march))
+
+    def begin(self) -> Iterator[BranchTask | MarchTask]:
+        """The tasks that are possible from the start."""
+        yield from self.branches
+        for branch in self._ledger.plan.branches:
+            for result in self._ledger.known_starts(branch):
+                yield from self._start(branch, result)
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
         """Takes a result; returns the tasks that it makes possible."""
         self._left[task.kind] -= task.cost / task.n_results
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
             self.n_starts_left -= 1
-            planned = self.plan.marches_from(task.number, result.position)
-            new = start_marches(planned, result)
-            for before, march in zip(planned, new, strict=True):
-                self._left[MARCHES] -= before.cost
-                self._left[march.kind] += march.cost
-            return new
+            self._ledger.add_start(task, result)
+            return self._start(task, result)
         if isinstance(task, MarchTask) and isinstance(result, MarchResult):
-            self._keep(task, result)
+            self._ledger.add_history(task, result)
             self.n_points += len(result.points)
         return ()
+
+    def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
+        planned = self._ledger.marches_from(branch.number, result.position)
+        new = start_marches(planned, result)
+        for before, march in zip(planned, new, strict=True):
+            self._left[MARCHES] -= before.cost
+            self._left[march.kind] += march.cost
+        return new
 
     @property
     def seconds(self) -> tuple[float, float]:
@@ -120,9 +242,9 @@ class Course:
         return spent, spent + left
 
 
-def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, parts: Parts, progress: RunProgress) -> None:
-    """Rank 0: has all tasks done and their results written to `parts`. The others work on tasks."""
-    course = Course(plan, parts.add)
+def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunProgress) -> None:
+    """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
+    course = Course(ledger)
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
         new = course.take(task, result)
@@ -131,16 +253,16 @@ def run_tasks(ranks: Ranks, plan: TaskPlan, evaluate: Evaluate, parts: Parts, pr
         return new
 
     def tick() -> None:
-        parts.tick()
-        progress.report(*course.seconds, course.n_points, plan.n_points)
+        ledger.store.tick()
+        progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
 
-    n_branches = count(len(plan.branches), "branch", "branches")
-    n_frequencies = count(len(plan.branches[0].frequencies), "frequency", "frequencies")
-    progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
-    progress.report(0.0, plan.cost, 0, plan.n_points)
-    first: list[BranchTask | MarchTask] = [*plan.branches]
-    serve_tasks(ranks, first, evaluate, take, course.costs, tick)
-    parts.flush()
+    if course.branches:
+        n_branches = count(len(course.branches), "branch", "branches")
+        n_frequencies = count(len(course.branches[0].frequencies), "frequency", "frequencies")
+        progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
+    progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
+    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep)
+    ledger.store.flush()
 
 
 def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:

@@ -1,16 +1,17 @@
 """Sends tasks to ranks while they run, and receives the results; knows nothing of what a task is.
 
-A task has one result or several; each is handed on at once, while its rank goes on with the task. Rank 0 computes as
-well: its main thread sends tasks and receives results, a second thread computes. Which rank gets which task is decided
-in `dispatch`.
+A task has one result or several; each is handed on at once, while its rank goes on with the task. A long one says now
+and then how far it is, so that another run can go on from there. Rank 0 computes as well: its main thread sends tasks
+and receives results, a second thread computes. Which rank gets which task is decided in `dispatch`.
 """
 
 from __future__ import annotations
 
+import itertools
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -18,7 +19,14 @@ from studyrunner.costs import LearnedCosts
 from studyrunner.dispatch import Assignment, Dispatcher, Work
 from studyrunner.ranks import POLL_SECONDS, Ranks, wait_for_message
 
+SECONDS_TO_PROGRESS = 5.0
+"""A task says how far it is at most so often, with many ranks less often."""
+
+_MANY_RANKS = 100
+"""More ranks say it less often, as rank 0 writes all of it to the disk."""
+
 _LOOKS_A_TICK = 100
+_AT_ONCE = 64
 
 Task = TypeVar("Task", bound=Work)
 Result = TypeVar("Result")
@@ -33,17 +41,47 @@ class _Delivery(Generic[Result]):
     seconds: float
 
 
-def _work(assignment: Assignment[Task], run: Callable[[Task], Iterable[Result]]) -> Iterator[_Delivery[Result]]:
-    """What a rank sends back for a task, as soon as it is there."""
+@dataclass(frozen=True)
+class _Progress:
+    """How far a task is."""
+
+    number: int
+    progress: object
+
+
+@dataclass(frozen=True)
+class RankInterrupted:
+    """A rank was told from outside to end: so are all."""
+
+
+Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
+"""Does a task and gives its results one by one; it may hand its progress to the function that it is given."""
+
+
+def _work(
+    assignment: Assignment[Task],
+    run: Run[Task, Result],
+    send: Callable[[object], None],
+    seconds_to_progress: float,
+) -> None:
+    """Sends back what a task gives, as soon as it is there."""
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
-    began = time.perf_counter()
-    for result in run(task):
+    began = sent = time.perf_counter()
+
+    def keep(progress: object) -> None:
+        nonlocal sent
+        # a task that has given all its results has no progress
+        if n_given < task.n_results and time.perf_counter() > sent + seconds_to_progress:
+            send(_Progress(assignment.number, progress))
+            sent = time.perf_counter()
+
+    for result in run(task, keep):
         n_given += 1
         if n_given > task.n_results:
             raise wrong
-        yield _Delivery(assignment.number, result, time.perf_counter() - began)
+        send(_Delivery(assignment.number, result, time.perf_counter() - began))
         began = time.perf_counter()
     if n_given < task.n_results:
         raise wrong
@@ -52,10 +90,12 @@ def _work(assignment: Assignment[Task], run: Callable[[Task], Iterable[Result]])
 class _LocalWorker(Generic[Task, Result]):
     """The computing thread of rank 0."""
 
-    def __init__(self, run: Callable[[Task], Iterable[Result]]) -> None:
+    def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
         self._run = run
+        self._ended = False
+        self._seconds_to_progress = seconds_to_progress
         self._waiting: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
-        self._sent: queue.SimpleQueue[_Delivery[Result] | BaseException] = queue.SimpleQueue()
+        self._sent: queue.SimpleQueue[object] = queue.SimpleQueue()
         # A daemon: an exception in the main thread ends the process although a task still runs.
         self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
         self._thread.start()
@@ -64,8 +104,8 @@ class _LocalWorker(Generic[Task, Result]):
         """Puts a task behind those that it already has."""
         self._waiting.put(assignment)
 
-    def receive(self, seconds: float) -> _Delivery[Result] | None:
-        """What it sends next, waiting for it at most `seconds`. Raises what the task raised."""
+    def receive(self, seconds: float) -> object:
+        """What it sends next, None where nothing comes within `seconds`. Raises what a task raised."""
         try:
             message = self._sent.get(timeout=seconds)
         except queue.Empty:
@@ -80,34 +120,48 @@ class _LocalWorker(Generic[Task, Result]):
         self._thread.join()
         self.receive(0.0)
 
+    def give_up(self) -> None:
+        """Nobody wants any more results: leaves the time to the main thread as soon as it can."""
+        self._ended = True
+
     def _compute(self) -> None:
-        while (assignment := self._waiting.get()) is not None:
-            try:
-                for message in _work(assignment, self._run):
-                    self._sent.put(message)
-            except BaseException as error:  # handed to the main thread, which raises it
-                self._sent.put(error)
+        try:
+            while (assignment := self._waiting.get()) is not None:
+                _work(assignment, self._run, self._send, self._seconds_to_progress)
+        except BaseException as error:  # handed to the main thread, which raises it
+            self._sent.put(error)
+
+    def _send(self, message: object) -> None:
+        if self._ended:
+            raise KeyboardInterrupt
+        self._sent.put(message)
 
 
 def serve_tasks(
     ranks: Ranks,
     tasks: Iterable[Task],
-    run: Callable[[Task], Iterable[Result]],
+    run: Run[Task, Result],
     take: Callable[[Task, Result], Iterable[Task]],
     costs: LearnedCosts,
     tick: Callable[[], None] = lambda: None,
+    keep: Callable[[Task, object], None] = lambda *_: None,
 ) -> None:
     """Rank 0: has all tasks done, its own share by `run`, and hands every result to `take`.
 
     run: gives the results of a task one by one. take: called in the main thread, in the order in which results arrive;
         returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
-        second.
-    Raises what a task on this rank raised; an exception on another rank ends that rank's process.
+        second. keep: called with how far a task is; never after its last result. tasks: are taken one by one, as
+        there is use for them.
+    Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
+    another rank ends that rank's process.
     """
     dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
-    local = _LocalWorker(run)
+    local = _LocalWorker(run, _seconds_to_progress(ranks))
+    known = iter(tasks)
 
     def hand_out() -> None:
+        while dispatcher.wants_more and (more := list(itertools.islice(known, _AT_ONCE))):
+            dispatcher.add(more)
         for rank, assignment in dispatcher.assign():
             if rank == 0:
                 local.assign(assignment)
@@ -115,39 +169,54 @@ def serve_tasks(
                 ranks.send(assignment, rank)
 
     def accept(rank: int, message: object) -> None:
+        if isinstance(message, _Progress):
+            keep(dispatcher.task(message.number), message.progress)
+            return
+        if isinstance(message, RankInterrupted):
+            raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
         task = dispatcher.deliver(rank, message.number, message.seconds)
         dispatcher.add(take(task, message.result))
         hand_out()
 
-    dispatcher.add(tasks)
-    hand_out()
-    while not dispatcher.done:
-        quiet = False
-        for _ in range(_LOOKS_A_TICK):
-            received, message = ranks.receive(), local.receive(0.0)
-            if received is not None:
-                accept(*received)
-            if message is not None:
+    try:
+        hand_out()
+        while not dispatcher.done:
+            quiet = False
+            for _ in range(_LOOKS_A_TICK):
+                received, message = ranks.receive(), local.receive(0.0)
+                if received is not None:
+                    accept(*received)
+                if message is not None:
+                    accept(0, message)
+                quiet = received is None and message is None
+                if quiet:
+                    break
+            dispatcher.watch()
+            tick()
+            if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
                 accept(0, message)
-            quiet = received is None and message is None
-            if quiet:
-                break
-        dispatcher.watch()
-        tick()
-        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
-            accept(0, message)
+    except BaseException:
+        local.give_up()
+        raise
     local.stop()
     for rank in range(1, ranks.size):
         ranks.send(None, rank)
 
 
-def work_on_tasks(ranks: Ranks, run: Callable[[Task], Iterable[Result]]) -> None:
+def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:
     """Any other rank: computes what rank 0 sends, until it sends None."""
+
+    def send(reply: object) -> None:
+        ranks.send(reply, 0)
+        ranks.flush()
+
     while (message := wait_for_message(ranks)) is not None:
         if not isinstance(message, Assignment):
             raise TypeError(f"rank 0 sent {message!r} instead of a task")
-        for reply in _work(message, run):
-            ranks.send(reply, 0)
-            ranks.flush()
+        _work(message, run, send, _seconds_to_progress(ranks))
+
+
+def _seconds_to_progress(ranks: Ranks) -> float:
+    return SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -155,6 +156,9 @@ class SolverSection(Section):
     shortcuts: Annotated[bool, BeforeValidator(read_switch)] = Field(
         True, description="whether points with the same history share one; false: every point is computed on its own"
     )
+    time_limit: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+        None, description="s, CPU time that a start state or a wear history may take; none unless it is given"
+    )
 
 
 class OutputsSection(Section):
@@ -269,7 +273,7 @@ class Study(Section):
         """Coulomb's coefficient of the scene."""
         return read_number(dict(self.scene.parameters)["friction_coefficient"])
 
-    @property
+    @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
         """Cycle counts of the result, ascending."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs

@@ -16,6 +16,7 @@ from studyrunner.estimate import (
     iterations_of_march,
     seconds_an_iteration,
 )
+from studyrunner.results import Kept
 from studyrunner.sharing import (
     Alike,
     Choice,
@@ -45,13 +46,16 @@ class Settings:
     samples: int | Automatic
     tolerance: float
     rtol: float
+    time_limit: float
 
 
 @dataclass(frozen=True)
 class BranchTask:
     """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
 
-    number: of the branch in the study. cost: estimated seconds.
+    number: of the branch in the study. cost: estimated seconds. known: places of the frequencies whose results are not
+    asked for: an earlier run has left them, or all that starts from them. resume: how far that run was; None to begin
+    with the first one. key: what the branch is known by in the folder of the run.
     """
 
     number: int
@@ -60,11 +64,20 @@ class BranchTask:
     settings: Settings
     frequencies: tuple[float, ...]
     cost: float
+    known: frozenset[int] = frozenset()
+    resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Places of the frequencies in the order of the sweep."""
+        places = range(len(self.frequencies))
+        return tuple(places if self.sweep == "up" else reversed(places))
 
     @property
     def n_results(self) -> int:
         """Start states that it gives."""
-        return len(self.frequencies)
+        return len(self.frequencies) - len(self.known)
 
     @property
     def opens_others(self) -> bool:
@@ -92,8 +105,8 @@ class MarchTask:
     cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
     cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
         those planned for and something moves.
-    start: start state, None until its branch has reached it.
-    number: of the march in the study.
+    start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
+    number: of the march in the study. key: what it is known by in the folder of the run.
     """
 
     number: int
@@ -110,7 +123,9 @@ class MarchTask:
     cost: float
     n_unknowns: int
     moves: bool = True
-    start: object = field(default=None, compare=False)
+    start: Kept | None = field(default=None, compare=False, repr=False)
+    resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
 
     @property
     def wear_coefficient(self) -> float:
@@ -250,7 +265,13 @@ def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
 
 def _settings(study: Study, line: Index) -> Settings:
     harmonics, samples, tolerance, rtol = line[2:]
-    return Settings(study.harmonics[harmonics], study.samples[samples], study.tolerance[tolerance], study.rtol[rtol])
+    return Settings(
+        harmonics=study.harmonics[harmonics],
+        samples=study.samples[samples],
+        tolerance=study.tolerance[tolerance],
+        rtol=study.rtol[rtol],
+        time_limit=math.inf if study.solver.time_limit is None else study.solver.time_limit,
+    )
 
 
 def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 _LONGEST_VALUE = 80
 
 
@@ -23,6 +25,20 @@ class UserError(Exception):
         """The line that the user reads."""
         shown = self.key if self.value is None else f"{self.key} = {show_value(self.value)}"
         return " ".join(f"{self.place}: {shown}: {self.remedy}".split())
+
+
+class StorageError(Exception):
+    """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
+
+    What was written before is kept, and the same command goes on from there.
+    """
+
+    def __init__(self, path: Path, error: Exception) -> None:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        super().__init__(
+            f"{path}: {reason}: make room there or give another result file with -o; what was computed is kept, and the"
+            " same command goes on from it"
+        )
 
 
 class Verbatim(str):

@@ -20,6 +20,11 @@ class Variable:
     flags: tuple[str, ...] = ()
     content: str = "modelResult"
 
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are texts."""
+        return self.dtype.startswith("U")
+
 
 ASKED = {
     "worn_volume": Variable(("cycle",), "m3", "worn volume, sum over contact pairs of depth times area"),
@@ -126,6 +131,7 @@ KEPT = {
         "int8",
         ("steady", "oscillating"),
     ),
+    "message": Variable((), "1", "what an unexpected error said, empty where there was none", "U240"),
 }
 """Those that every result holds."""
 

@@ -31,6 +31,43 @@ class Overheads:
     latency: float = 1e-3
 
 
+class MemoryLedger:
+    """Takes the place of `studyrunner.ledger.Ledger`, without a disk: nothing is there from an earlier run."""
+
+    n_points_finished = 0
+
+    def __init__(self, plan: TaskPlan) -> None:
+        self.plan = plan
+        self.starts: list[tuple[BranchTask, StartResult]] = []
+        self.histories: list[tuple[MarchTask, MarchResult]] = []
+
+    def branches_left(self) -> list[BranchTask]:
+        """All of them."""
+        return list(self.plan.branches)
+
+    def is_finished(self, march: MarchTask) -> bool:
+        """None is."""
+        del march
+        return False
+
+    def known_starts(self, branch: BranchTask) -> list[StartResult]:
+        """None is known."""
+        del branch
+        return []
+
+    def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
+        """All of them."""
+        return self.plan.marches_from(branch, position)
+
+    def add_start(self, branch: BranchTask, result: StartResult) -> None:
+        """Takes note of it."""
+        self.starts.append((branch, result))
+
+    def add_history(self, march: MarchTask, result: MarchResult) -> None:
+        """Takes note of it."""
+        self.histories.append((march, result))
+
+
 @dataclass(frozen=True)
 class Replay:
     """How a replay went. work: sum of all costs, s. longest_way: s, of a start state along its branch and a march from
@@ -65,7 +102,7 @@ def replay(
     started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s.
     """
     clock = 0.0
-    course = Course(plan, lambda *_: None)
+    course = Course(MemoryLedger(plan))
     dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, course.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, StartResult | MarchResult]] = []
@@ -83,9 +120,8 @@ def replay(
         now = max(sent + overheads.latency, free_at[rank])
         results: list[tuple[StartResult | MarchResult, float]] = []
         if isinstance(task, BranchTask):
-            order = range(task.n_results) if task.sweep == "up" else reversed(range(task.n_results))
             way = 0.0
-            for position in order:
+            for position in task.order:
                 start, seconds = started(task, position)
                 way += seconds
                 ways[task.number, position] = way

@@ -1,14 +1,21 @@
 """run-study with a stand-in for the solver, to be started by the tests under mpiexec.
 
 FAKE_SECONDS: longest time of a march; each rank then notes those that it took in a file.
-FAKE_FAILURE: rank whose first march raises.
+FAKE_FAILURE: rank whose first march gives more results than it should: a bug, which raises.
+FAKE_STEPS: every march takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
+takes two. What was gone on from is noted in a file.
+FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
+to the fourth one where "in branch" stands behind.
+FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
 FAKE_PATIENCE: each branch stops after its first start state until a march from it is done; after this time it raises.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -18,45 +25,100 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner import run
+from studyrunner import run, schedule
 from studyrunner.cli import main
 from studyrunner.ranks import launcher_rank
-from studyrunner.results import MarchResult, StartResult
+from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.tasks import BranchTask, MarchTask
 from tests.studyrunner.fakes import fake_branch, fake_evaluate
 
-BULK = np.zeros(100_000)
+BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)
 """Goes with every start state: larger than what MPI sends off at once."""
 
 
 def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
     facts = describe_scene(model)
-    seconds = float(os.environ.get("FAKE_SECONDS", "0.002"))
+    seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
     failing = int(os.environ.get("FAKE_FAILURE", "-1"))
+    n_steps = int(os.environ.get("FAKE_STEPS", "0"))
+    crash, _, in_branch = os.environ.get("FAKE_CRASH", "").partition(" ")
 
-    def evaluate(task: BranchTask | MarchTask) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
         if isinstance(task, BranchTask):
-            for started in fake_branch(task):
-                yield replace(started, start=(started.start, BULK))
+            left = [position for position in task.order if position not in task.known]
+            for place, started in enumerate(fake_branch(replace(task, known=frozenset()))):
+                if not left:
+                    return
+                if in_branch and started.position == 3:
+                    end_process(crash)
+                if place < gone_on_from(task):
+                    continue
+                if n_steps:
+                    time.sleep(2.0 * seconds)
+                if started.position in left:
+                    left.remove(started.position)
+                    yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
+                if n_steps:
+                    keep(Kept("branch", (np.array([place + 1.0]),)))
                 if "FAKE_PATIENCE" in os.environ:
                     wait_for(Path(f"branch{task.number}.txt"), float(os.environ["FAKE_PATIENCE"]))
         else:
-            yield from march(task)
+            yield from march(task, keep)
 
-    def march(task: MarchTask) -> Iterator[MarchResult]:
+    def march(task: MarchTask, keep: Callable[[Kept], None]) -> Iterator[MarchResult]:
+        if crash and not in_branch and task.position == 1:
+            end_process(crash)
         if launcher_rank() == failing:
-            raise ZeroDivisionError("a task that fails")
-        assert isinstance(task.start, tuple)
-        for result in fake_evaluate(replace(task, start=task.start[0]), facts, seconds):
+            # not the task, but what is around it
+            yield from fake_evaluate(task, facts=facts)
+        carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
+        for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
             assert isinstance(result, MarchResult)
-            if "FAKE_SECONDS" in os.environ:
+            if "FAKE_SECONDS" in os.environ and not n_steps:
                 for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
                     with Path(name).open("a", encoding="utf-8") as file:
                         file.write(f"{result.run_time}\n")
-            yield result
+            yield replace(result, error_estimate=carried)
 
     return evaluate
+
+
+def gone_on_from(task: BranchTask | MarchTask) -> int:
+    """Step that an earlier run has come to."""
+    if task.resume is None:
+        return 0
+    with Path("resumed.txt").open("a", encoding="utf-8") as file:
+        file.write(f"{task.resume.text} {task.resume.arrays[0][0]:g}\n")
+    return int(task.resume.arrays[0][0])
+
+
+def walk(task: MarchTask, n_steps: int, seconds: float, keep: Callable[[Kept], None]) -> float:
+    """A number that depends on every bit of what is carried from step to step."""
+    first = gone_on_from(task)
+    carried = 0.1 + 0.01 * (task.number % 50) if task.resume is None else float(task.resume.arrays[0][1])
+    for step in range(first, n_steps):
+        carried = 3.99 * carried * (1.0 - carried)
+        time.sleep(seconds)
+        keep(Kept("march", (np.array([step + 1.0, carried]),)))
+    return carried
+
+
+def watch_memory(samples: list[int]) -> None:
+    """Memory of this process, KiB, that is not that of files: those that it reads are in memory as long as there is
+    room only."""
+    while True:
+        (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon")]
+        samples.append(int(line.split()[1]))
+        time.sleep(0.02)
+
+
+def end_process(how: str) -> None:
+    """As a bug in compiled code would."""
+    if how == "segfault":
+        ctypes.string_at(0)
+    elif how == "abort":
+        os.abort()
 
 
 def wait_for(file: Path, patience: float) -> None:
@@ -70,4 +132,12 @@ def wait_for(file: Path, patience: float) -> None:
 
 if __name__ == "__main__":
     run.build_evaluator = build_fake
-    sys.exit(main())
+    schedule.SECONDS_TO_PROGRESS = 0.03
+    if "FAKE_NOTHING" in os.environ and launcher_rank() == 0:
+        samples = [0]
+        threading.Thread(target=watch_memory, args=(samples,), daemon=True).start()
+        status = main()
+        print(f"rank 0: {max(samples)} KiB, {time.process_time()} s", file=sys.stderr)
+    else:
+        status = main()
+    sys.exit(status)

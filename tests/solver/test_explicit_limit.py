@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from solver.explicit_limit import wear_oscillates
 from solver.history import WearHistory
 from solver.march import march_wear
 from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.oscillation import WearRates
 from solver.settings import SolverSettings
 from solver.trajectory import Scheme
 from tests.solver.models import branch_states, scene
@@ -111,4 +115,41 @@ def test_the_limit_of_the_slider_is_that_of_differences_of_its_wear_rate() -> No
     ],
 )
 def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscillates: bool) -> None:
-    assert wear_oscillates(rates) is oscillates
+    followed = WearRates(2)
+    for rate in rates:
+        followed.add(np.array([1.0, rate]))
+    assert followed.oscillate() is oscillates is oscillation_of_all(rates)
+    assert not followed.oscillate(10.0)
+
+
+@pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
+def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, oscillates: bool) -> None:
+    followed = WearRates(3)
+    for step in range(8):
+        pair = share * (1.0 + step % 2)
+        followed.add(np.array([pair, 2.0, 2.0 + pair]))
+    assert followed.oscillate() is oscillates
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.sampled_from([0.0, 1.0, 1.0005, 1.5, 1.99, 2.0, 3.0, 1e4]), max_size=14), st.integers(0, 14))
+def test_oscillation_is_that_of_all_rates_together_also_when_carried_on(rates: list[float], cut: int) -> None:
+    followed = WearRates(1)
+    for place, rate in enumerate(rates):
+        if place == cut:
+            carried, followed = followed.carried(), WearRates(1)
+            followed.take_up(carried)
+        followed.add(np.array([rate]))
+    assert followed.oscillate() is oscillation_of_all(rates)
+
+
+def oscillation_of_all(rates: Sequence[float]) -> bool:
+    """The plain definition, from all rates of a march."""
+    size = max(np.abs(rates), default=0.0)
+    run = 0
+    for before, after in pairwise(np.diff(rates)):
+        alternates = before * after < 0.0 and abs(after) >= 0.98 * abs(before) and abs(after) > 1e-3 * size
+        run = run + 1 if alternates else 0
+        if run >= 3:
+            return True
+    return False

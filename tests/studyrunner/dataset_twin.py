@@ -38,6 +38,7 @@ def build_dataset(
     }
     for name in loops:
         arrays[name][:] = np.nan
+    arrays["message"] = arrays["message"].astype(object)
     for result in results:
         for point in result.points:
             for name in asked:
@@ -84,6 +85,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """The file as xarray writes it."""
     encoding: dict[str, dict[str, object]] = {}
     for name in dataset.data_vars:
+        if dataset[name].dtype.kind in "OU":
+            # texts of any length cannot be compressed
+            continue
         encoding[str(name)] = {"zlib": True, "complevel": 1, "shuffle": True}
         if name in LOOPS:
             sizes = dataset[name].sizes

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studyrunner.parts import Parts, record_type
-from studyrunner.results import MarchResult, StartResult
+from studyrunner.identity import Identities, hash_of_kind
+from studyrunner.ledger import Ledger
+from studyrunner.records import record_type
+from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
 from studyrunner.sharing import Index
+from studyrunner.store import Store
 from studyrunner.study import Study
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
@@ -28,8 +31,15 @@ FACTS = SceneFacts(
 )
 
 
+def no_keep(progress: Kept) -> None:
+    """Progress that nobody keeps."""
+
+
 def fake_evaluate(
-    task: BranchTask | MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0
+    task: BranchTask | MarchTask,
+    keep: Callable[[Kept], None] = no_keep,
+    facts: SceneFacts = FACTS,
+    seconds: float = 0.0,
 ) -> Iterator[StartResult | MarchResult]:
     """Results that depend on everything in the task but its cost; a march takes up to `seconds`, unevenly."""
     if isinstance(task, BranchTask):
@@ -40,20 +50,20 @@ def fake_evaluate(
 
 
 def fake_branch(task: BranchTask) -> Iterator[StartResult]:
-    """Start states in the order of the sweep."""
+    """Start states in the order of the sweep, those that are known left out."""
     given = (task.settings.harmonics, task.settings.samples, task.settings.tolerance, task.settings.rtol)
     settings = tuple(0.5 if value == "auto" else value for value in given)
-    places = list(enumerate(task.frequencies))
-    for position, frequency in places if task.sweep == "up" else reversed(places):
-        start = (frequency, task.excitation_amplitude, task.sweep == "up", *settings)
-        yield StartResult(position, start, moves=position % 2 == 0, n_unknowns=18)
+    for position in task.order:
+        if position not in task.known:
+            start = (task.frequencies[position], task.excitation_amplitude, task.sweep == "up", *settings)
+            yield StartResult(position, Kept("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
     """A history whose values tell the share of the task."""
-    assert isinstance(task.start, tuple)
+    assert task.start is not None
     share = task.shares[place]
-    fingerprint = float(np.dot(task.start, [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
+    fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
     fingerprint += share.wear_coefficient * 1e9 + share.step * 1e-4 + 0.5 * (task.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
@@ -102,16 +112,27 @@ def without_values(result: MarchResult, outcome: int) -> MarchResult:
     return replace(result, outcome=outcome, values=values)
 
 
-def fake_parts(study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path) -> Parts:
-    """The files of a run that had these results, some in a file."""
+def open_ledger(
+    study: Study, plan: TaskPlan, folder: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
+) -> Ledger:
+    """What is in the folder of a study; its store is to be closed."""
+    kind = record_type(study, facts)
+    store = Store(folder, kind, fresh=fresh)
+    return Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+
+
+def fake_ledger(
+    study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path, facts: SceneFacts = FACTS
+) -> Ledger:
+    """The folder of a run that had these results and no others, some in a file."""
     marches = march_of_points(plan)
-    parts = Parts(folder, record_type(study, FACTS))
+    ledger = open_ledger(study, plan, folder, facts, fresh=True)
     for place, result in enumerate(results):
-        parts.add(marches[result.points], result)
+        ledger.add_history(marches[result.points], result)
         if place % 3 == 0:
-            parts.flush()
-    parts.flush()
-    return parts
+            ledger.store.flush()
+    ledger.store.flush()
+    return ledger
 
 
 def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from studyrunner.certificates import CertificateTable
-from studyrunner.parts import pack, record_type
+from studyrunner.records import pack, record_type
 from studyrunner.results import MarchResult
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
 from studyrunner.variables import CERTIFICATE
-from tests.studyrunner.fakes import FACTS, fake_histories, march_of_points, without_values
+from tests.studyrunner.fakes import FACTS, fake_histories, without_values
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -46,11 +46,10 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
 
 def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
     """The table of results that come in some at a time."""
-    plan = build_tasks(study, FACTS.n_displacements)
-    marches = march_of_points(plan)
     table = CertificateTable(study)
     for some in (results[:1], results[1:6], results[6:]):
-        records = pack(record_type(study, FACTS), [(marches[result.points], result) for result in some])
+        kind = record_type(study, FACTS)
+        records = np.concatenate([np.empty(0, kind), *(pack(kind, "", result) for result in some)])
         table.add([result.points for result in some], records)
     return table.format()
 

@@ -9,7 +9,7 @@ from studyrunner.run import Course
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, TaskPlan, build_tasks
 from tests.benchmarks.scheduling import SHAPES, replay_shape
-from tests.benchmarks.simulation import Overheads, replay
+from tests.benchmarks.simulation import MemoryLedger, Overheads, replay
 from tests.studyrunner.fakes import fake_branch, fake_march
 
 
@@ -20,7 +20,7 @@ def plan_of() -> TaskPlan:
 
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     plan = plan_of()
-    course = Course(plan, lambda *_: None)
+    course = Course(MemoryLedger(plan))
     spent, expected = course.seconds
     assert (spent, expected) == (0.0, pytest.approx(plan.cost))
     marches = []
@@ -41,13 +41,17 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
 
 def test_finished_marches_are_kept_with_their_results() -> None:
     plan = plan_of()
-    kept = []
-    course = Course(plan, lambda task, result: kept.append((task.number, result.points)))
+    ledger = MemoryLedger(plan)
+    course = Course(ledger)
     for branch in plan.branches:
         for started in fake_branch(branch):
             for task in course.take(branch, started):
                 course.take(task, fake_march(task))
+    kept = [(task.number, result.points) for task, result in ledger.histories]
     assert sorted(kept) == [(task.number, task.points) for line in plan.marches for task in line]
+    assert [(branch.number, start.position) for branch, start in ledger.starts] == [
+        (branch.number, position) for branch in plan.branches for position in branch.order
+    ]
 
 
 @pytest.mark.parametrize("n_ranks", [1, 3, 1000])

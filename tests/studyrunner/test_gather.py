@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,14 +16,15 @@ import xarray as xr
 
 from studyrunner import gather
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.evaluate import endings
+from studyrunner.evaluate import NOT_COMPUTED, endings
 from studyrunner.gather import Gathered
 from studyrunner.output import parts_folder
 from studyrunner.results import MarchResult
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
+from studyrunner.user_error import StorageError
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_histories, fake_march, fake_parts, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger, fake_march, fake_starts, without_values
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -46,11 +48,9 @@ def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gather
     """The file of a run of the study with these results."""
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
-    parts = fake_parts(study, plan, results, parts_folder(path))
-    try:
-        return gather.gather(study, FACTS, plan, parts, path)
-    finally:
-        parts.remove()
+    ledger = fake_ledger(study, plan, results, parts_folder(path))
+    with contextlib.closing(ledger.store):
+        return gather.gather(study, FACTS, ledger, path)
 
 
 @pytest.fixture
@@ -89,6 +89,7 @@ CONTRACT = {
     "fold_frequency": ((), "Hz"),
     "step_limit": ((), "1"),
     "oscillates": ((), "1"),
+    "message": ((), "1"),
 }
 
 
@@ -177,6 +178,10 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "certificate_failed",
             "unstable",
             "adrift",
+            "time_limit",
+            "exception",
+            "crashed",
+            "not_computed",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:
@@ -255,16 +260,42 @@ def test_slabs_are_all_points_in_the_order_of_the_file(shape: tuple[int, ...], n
 def test_outcomes_are_counted(tmp_path: Path) -> None:
     results = fake_results()
     results[0] = without_values(results[0], 6)
-    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1}
+    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, NOT_COMPUTED: 0}
 
 
-@pytest.mark.parametrize("change", [lambda results: results[1:], lambda results: [*results, results[0]]])
-def test_a_point_that_is_missing_or_twice_there_is_a_bug(
-    change: Callable[[list[MarchResult]], list[MarchResult]], tmp_path: Path
-) -> None:
-    with pytest.raises(ValueError, match="1 points were not computed exactly once"):
-        write(change(fake_results()), tmp_path / "out.nc")
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("n_left", [1, 7, 8])
+def test_points_that_are_not_computed_say_so(n_left: int, tmp_path: Path) -> None:
+    results = fake_results()
+    assert write(results[n_left:], tmp_path / "out.nc").outcomes[NOT_COMPUTED] == n_left
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        left = {point for result in results[:n_left] for point in result.points}
+        assert {tuple(place) for place in np.argwhere(opened.outcome.values == NOT_COMPUTED).tolist()} == left
+        for name in set(CONTRACT) - {"outcome", "message"}:
+            for point in left:
+                there = opened[name].values[point]
+                assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
+        for result in results[n_left:]:
+            (point,) = result.points
+            np.testing.assert_array_equal(opened.worn_volume.values[point], result.values["worn_volume"])
+
+
+def test_of_two_records_of_a_point_the_later_one_stands(tmp_path: Path) -> None:
+    results = fake_results()
+    later = replace(results[0], error_estimate=0.75)
+    assert write([*results, later], tmp_path / "out.nc").outcomes == {0: 8, NOT_COMPUTED: 0}
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        (point,) = later.points
+        assert opened.error_estimate.values[point] == 0.75
+
+
+def test_messages_stand_beside_their_points(tmp_path: Path) -> None:
+    results = fake_results()
+    results[2] = replace(without_values(results[2], 11), message="ZeroDivisionError: an § error (a.py, line 3)")
+    write(results, tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as opened:
+        (point,) = results[2].points
+        assert opened.message.values[point] == results[2].message
+        assert np.count_nonzero(opened.message.values != "") == 1
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,10 +310,10 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
         replace_file(source, target)
 
     monkeypatch.setattr(gather.os, "replace", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == [path, parts_folder(path)]
 
 
 def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -291,8 +322,9 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    parts = fake_parts(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
-    gather.gather(study, FACTS, plan, parts, tmp_path / "dovetail.nc")
+    ledger = fake_ledger(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
+    with contextlib.closing(ledger.store):
+        gather.gather(study, FACTS, ledger, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
 

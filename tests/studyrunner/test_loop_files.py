@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,10 @@ import xarray as xr
 from solver.loops import LOOP_PHASES, loop_phases
 from studyrunner import gather, variables
 from studyrunner.cli import main
-from studyrunner.parts import Parts, record_type
 from studyrunner.scene import SceneFacts
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, open_ledger, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
@@ -35,7 +35,7 @@ def write(tmp_path: Path) -> Callable[[int, str], Path]:
         facts = wide(n_contact)
         study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={loops}", "outputs.variables=['worn_volume']"))
         plan = build_tasks(study, facts.n_displacements)
-        parts = Parts(tmp_path / "parts", record_type(study, facts))
+        ledger = open_ledger(study, plan, tmp_path / "parts", facts, fresh=True)
         for task in fake_starts(plan, 0):
             result = fake_march(task, facts)
             if task.position == 1:
@@ -46,11 +46,11 @@ def write(tmp_path: Path) -> Callable[[int, str], Path]:
                 result = replace(
                     result, values={**result.values, **{n: values[n] for n in variables.LOOPS if n in values}}
                 )
-            parts.add(task, result)
-        parts.flush()
+            ledger.add_history(task, result)
+        ledger.store.flush()
         path = tmp_path / f"{n_contact}.nc"
-        gather.gather(study, facts, plan, parts, path)
-        parts.remove()
+        with contextlib.closing(ledger.store):
+            gather.gather(study, facts, ledger, path)
         return path
 
     return write_file

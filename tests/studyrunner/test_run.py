@@ -15,7 +15,7 @@ from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.evaluate import _solver_settings, build_result
 from studyrunner.progress import RunProgress, format_seconds
-from studyrunner.results import MarchResult, StartResult
+from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
@@ -38,8 +38,8 @@ def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, March
     def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
         facts = describe_scene(model)
 
-        def evaluate(task: BranchTask | MarchTask) -> Iterator[StartResult | MarchResult]:
-            for result in fake_evaluate(task, facts):
+        def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+            for result in fake_evaluate(task, keep, facts):
                 yield result if isinstance(result, StartResult) else change(task, result)
 
         return evaluate
@@ -74,15 +74,18 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 def test_unexpected_failure_keeps_the_old_file(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def fail(task: MarchTask, result: MarchResult) -> MarchResult:
+    def fail(*_: object) -> None:
         raise ZeroDivisionError("a bug")
 
     (folder / "out.nc").write_text("an earlier result", encoding="utf-8")
-    use_fake(monkeypatch, fail)
-    assert main(SMALL) == 1
+    use_fake(monkeypatch, lambda _, result: result)
+    with monkeypatch.context() as broken:
+        broken.setattr(run.Course, "take", fail)
+        assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_text(encoding="utf-8") == "an earlier result"
-    assert len(list(folder.iterdir())) == 1
+    assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.parts"]
+    assert main(SMALL) == 0
 
 
 def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

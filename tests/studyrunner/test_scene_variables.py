@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from studyrunner.scene_variables import build_scene_variables
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_histories, fake_parts
+from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger
 
 SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")
 GRID = (*SLIDER, "axes.wear_coefficient=[1e-11, 0]", "axes.step=[10, 100]", "axes.harmonics=[1, 3]")
@@ -38,8 +39,9 @@ def test_the_file_is_the_one_of_the_plain_twin(
     of_scene += build_scene_variables(mesh, build_study_scene(mesh))
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
-    parts = fake_parts(study, plan, results, parts_folder(tmp_path / "out.nc"))
-    gathered = gather.gather(study, FACTS, plan, parts, tmp_path / "out.nc", of_scene)
+    ledger = fake_ledger(study, plan, results, parts_folder(tmp_path / "out.nc"))
+    with contextlib.closing(ledger.store):
+        gathered = gather.gather(study, FACTS, ledger, tmp_path / "out.nc", of_scene)
     twin_set = build_dataset(study, FACTS, results, gathered.certificates, of_scene)
     write_dataset(twin_set, tmp_path / "twin.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:

@@ -32,10 +32,12 @@ def take_nothing(job: Job, result: object) -> list[Job]:
 
 
 def serve(
-    tasks: list[Job], run: Callable[[Job], Iterable[object]], take: Callable[[Job, object], list[Job]] = take_nothing
+    tasks: Iterable[Job],
+    run: Callable[[Job], Iterable[object]],
+    take: Callable[[Job, object], list[Job]] = take_nothing,
 ) -> LearnedCosts:
     costs = LearnedCosts()
-    serve_tasks(Alone(), tasks, run, take, costs)
+    serve_tasks(Alone(), tasks, lambda job, _: run(job), take, costs)
     return costs
 
 

@@ -15,13 +15,15 @@ from hypothesis import strategies as st
 
 from solver.history import StartState, WearHistory
 from solver.outcome import Outcome
+from solver.packing import pack
 from solver.settings import Resolution
 from studyrunner.evaluate import build_result, march
-from studyrunner.results import MarchResult
+from studyrunner.results import Kept, MarchResult
 from studyrunner.sharing import Share, march_counts, share_histories
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
 from studyrunner.tasks import MarchTask, build_tasks
+from tests.studyrunner.fakes import no_keep
 from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
@@ -174,7 +176,8 @@ def shared_task() -> MarchTask:
     study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2")
     ((task,),) = build_tasks(study, 2).marches
     start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
-    return replace(task, start=start)
+    packed = pack(start)
+    return replace(task, start=Kept(packed.text, packed.arrays))
 
 
 def test_each_share_has_its_own_counts_and_rates_back() -> None:
@@ -211,7 +214,9 @@ def marched(
     """Results of the shared task with a stand-in for the march; and wear coefficient and counts of all marches."""
     calls = []
 
-    def fake(*arguments: object, largest_depth: float | None, loops: tuple[int, ...]) -> WearHistory:
+    def fake(
+        *arguments: object, largest_depth: float | None, loops: tuple[int, ...], keep: object, resume: object
+    ) -> WearHistory:
         wear, cycles = arguments[3], arguments[6]
         assert isinstance(wear, float)
         assert isinstance(cycles, np.ndarray)
@@ -220,7 +225,7 @@ def marched(
 
     monkeypatch.setattr("solver.march.march_wear", fake)
     task = shared_task()
-    return list(march(None, 0.5, task)), calls  # type: ignore[arg-type]
+    return list(march(None, 0.5, task, no_keep)), calls  # type: ignore[arg-type]
 
 
 def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:

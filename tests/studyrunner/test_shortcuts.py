@@ -46,6 +46,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, xr.Da
 
 def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
     """To round-off; violations are relative themselves, and what is left of them where they vanish is round-off."""
+    if short[name].dtype.kind in "OU":
+        assert (short[name] == long[name]).all(), name
+        return
     round_off = 1e-9 if name in CERTIFICATE else 0.0
     found, expected = short[name].astype(float), long[name].astype(float)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=round_off, err_msg=name)

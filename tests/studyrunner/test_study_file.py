@@ -34,6 +34,7 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
         "samples": "auto",
         "tolerance": 1e-8,
         "rtol": 1e-2,
+        "time_limit": None,
         "shortcuts": True,
     }
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -140,7 +141,8 @@ def test_marches_are_found_by_their_start_state() -> None:
 def test_automatic_settings_are_those_of_the_task_and_estimated_for_the_plan() -> None:
     study, plan = plan_of("axes.frequency=150", "axes.harmonics=[3, 'auto']", "axes.rtol=[1e-2, 1e-3]")
     assert [branch.settings for branch in plan.branches] == [
-        Settings(harmonics, "auto", 1e-8, rtol) for harmonics, rtol in itertools.product((3, "auto"), (1e-2, 1e-3))
+        Settings(harmonics, "auto", 1e-8, rtol, math.inf)
+        for harmonics, rtol in itertools.product((3, "auto"), (1e-2, 1e-3))
     ]
     assert plan.n_unknowns == 2 * (2 * AUTOMATIC_HARMONICS + 1)
     assert plan.branches[0].cost < plan.branches[2].cost

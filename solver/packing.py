@@ -1,0 +1,88 @@
+"""Values of the solver as text and plain arrays, for whoever keeps them: what a march or a sweep carries on.
+
+`unpack(pack(value))` is equal to `value` to the last bit, and its arrays lie in memory in rows. The order in which an
+array lies decides the order of sums over it, and so their last bits: a computation that is to go on elsewhere to the
+same numbers goes on from the unpacked value itself.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.adapt import Estimate
+from solver.balance import Evaluation
+from solver.certificate import Certificate
+from solver.history import PeriodicState, StartState
+from solver.outcome import Outcome
+from solver.packed import Packed
+from solver.path import PathPoint
+from solver.response import StateReport
+from solver.settings import Resolution
+
+_CLASSES: dict[str, type[Any]] = {
+    known.__name__: known
+    for known in (Certificate, Estimate, Evaluation, PathPoint, PeriodicState, Resolution, StartState, StateReport)
+}
+
+
+def pack(value: object) -> Packed:
+    """Text and arrays of a value: numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and the
+    frozen results of the solver. Raises TypeError for anything else: a bug.
+    """
+    arrays: list[NDArray[np.generic]] = []
+    text = json.dumps(_described(value, arrays))
+    return Packed(text, tuple(arrays))
+
+
+def unpack(packed: Packed) -> Any:
+    """The value. Raises ValueError, KeyError, TypeError or IndexError where text and arrays are not those of one."""
+    return _rebuilt(json.loads(packed.text), packed.arrays)
+
+
+def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
+    """JSON of a value; its arrays are appended to `arrays`."""
+    if isinstance(value, Outcome):
+        return {"outcome": int(value)}
+    # np.float64 is a float; as a plain one it would divide by zero differently
+    if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, np.generic)):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        arrays.append(np.array(value, order="C"))
+        return {"scalar" if isinstance(value, np.generic) else "array": len(arrays) - 1}
+    if isinstance(value, tuple | list):
+        kind = "tuple" if isinstance(value, tuple) else "list"
+        return {kind: [_described(item, arrays) for item in value]}
+    if isinstance(value, dict):
+        return {"dict": {key: _described(item, arrays) for key, item in value.items()}}
+    name = type(value).__name__
+    if is_dataclass(value) and _CLASSES.get(name) is type(value):
+        items = {field.name: _described(getattr(value, field.name), arrays) for field in fields(value)}
+        return {"class": name, "fields": items}
+    raise TypeError(f"{name} is not a value that can be packed")
+
+
+def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> object:
+    if not isinstance(node, dict):
+        return node
+    if "class" in node:
+        items = {name: _rebuilt(item, arrays) for name, item in node["fields"].items()}
+        return _CLASSES[node["class"]](**items)
+    ((kind, content),) = node.items()
+    if kind == "array":
+        return np.array(arrays[content], order="C")
+    if kind == "scalar":
+        return arrays[content][()]
+    if kind == "outcome":
+        return Outcome(content)
+    if kind == "tuple":
+        return tuple(_rebuilt(item, arrays) for item in content)
+    if kind == "list":
+        return [_rebuilt(item, arrays) for item in content]
+    if kind == "dict":
+        return {key: _rebuilt(item, arrays) for key, item in content.items()}
+    raise ValueError(f"unknown kind of value: {kind}")

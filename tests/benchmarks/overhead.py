@@ -1,0 +1,87 @@
+"""What a point costs beyond its computing: a study of trivial points, the time and the memory of rank 0.
+
+    python -m tests.benchmarks.overhead [POINTS]
+
+Tasks give made-up results at once. In one process, all of it runs in turn: the time is that of rank 0, of the ranks
+that compute and of the disk together. Under mpiexec with 4 ranks it is shared with the other ranks, which take turns on
+the cores of this machine.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.mpi.launching import FAKED, ROOT, launcher
+
+FREQUENCIES = 10
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Wall seconds of a whole run, and the time and largest memory of rank 0: seconds of its processor, MiB."""
+
+    seconds: float
+    of_rank_0: float
+    memory: float
+
+
+def run(n_ranks: int, n_points: int, folder: Path, name: str = "out.nc", outputs: int = 11) -> Spent:
+    """A study of trivial points from its start to its end. outputs: cycle counts at which a point has results."""
+    arguments = [
+        *(FAKED, "sdof_slider"),
+        *("--set", f"axes.frequency={{start = 100, stop = 200, num = {FREQUENCIES}}}"),
+        *("--set", f"axes.wear_coefficient={{start = 1e-12, stop = 1e-11, num = {n_points // FREQUENCIES}}}"),
+        *(
+            "--set",
+            "axes.scheme=implicit",
+            "--set",
+            f"slow_time.outputs={outputs}",
+            "--set",
+            "outputs.variables=['worn_volume']",
+        ),
+        *("--set", "solver.shortcuts=false", "-o", name),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "FAKE_NOTHING": "1"}
+    began = time.perf_counter()
+    done = subprocess.run(
+        [*launcher(n_ranks), sys.executable, *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    seconds = time.perf_counter() - began
+    ((memory, of_rank_0),) = re.findall(r"rank 0: (\d+) KiB, (\S+) s", done.stderr)
+    return Spent(seconds, float(of_rank_0), int(memory) / 1024)
+
+
+def spent_on_points(n_ranks: int, n_points: int, folder: Path) -> Spent:
+    """What so many points take beyond what a study of few does."""
+    few = run(n_ranks, FREQUENCIES, folder, f"few{n_ranks}.nc")
+    many = run(n_ranks, n_points, folder, f"many{n_ranks}.nc")
+    return Spent(many.seconds - few.seconds, many.of_rank_0 - few.of_rank_0, many.memory - few.memory)
+
+
+def main() -> None:
+    """Prints a line for one process and one for 4 ranks."""
+    n_points = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
+    with tempfile.TemporaryDirectory() as name:
+        for n_ranks in (0, 4):
+            spent = spent_on_points(n_ranks, n_points, Path(name))
+            print(
+                f"{n_points} points, {f'{n_ranks} ranks' if n_ranks else 'one process'}:"
+                f" {1e3 * spent.seconds / n_points:.3f} ms a point, of which rank 0 is busy for"
+                f" {1e3 * spent.of_rank_0 / n_points:.3f} ms; it grows by {spent.memory:.0f} MiB"
+            )
+
+
+if __name__ == "__main__":
+    main()

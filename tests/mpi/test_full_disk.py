@@ -1,0 +1,57 @@
+"""A full disk: one line says so, what was finished is kept, and the run goes on when there is room."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from tests.mpi.launching import FAKED, results, run_to_end
+
+STUDY = [
+    FAKED,
+    "sdof_slider",
+    *("--set", "axes.frequency={start = 100, stop = 139, num = 40}"),
+    *("--set", "axes.scheme=implicit"),
+]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 12 MB; a start state of the stand-in takes 0.8 MB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("a file system can be mounted by root only")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.mark.parametrize("n_ranks", [0, 2])
+def test_a_full_disk_costs_nothing_that_was_finished(n_ranks: int, small_disk: Path, tmp_path: Path) -> None:
+    environment = {"FAKE_SECONDS": "0.02", "FAKE_STEPS": "2"}
+    target = str(small_disk / "out.nc")
+    ended = run_to_end(n_ranks, [*STUDY, "-o", target], tmp_path, environment)
+    assert ended.status == 1
+    (line,) = [line for line in ended.said.splitlines() if line.startswith("run-study: ")]
+    assert "No space left on device: make room there" in line
+    assert "Traceback" not in ended.said
+    assert not (small_disk / "out.nc").exists()
+    kept = sorted((small_disk / "out.nc.parts").glob("*.npz"))
+    assert kept
+    before = {path: path.stat().st_mtime_ns for path in kept if "progress" not in path.name}
+    # as full as it is the run ends at once, in the same way
+    assert run_to_end(n_ranks, [*STUDY, "-o", target], tmp_path, environment).status == 1
+    subprocess.run(["mount", "-o", "remount,size=100m", str(small_disk)], check=True)
+    ended = run_to_end(n_ranks, [*STUDY, "-o", target], tmp_path, environment)
+    assert ended.status == 0, ended.said
+    assert all(path.stat().st_mtime_ns == when for path, when in before.items())
+    assert run_to_end(0, [*STUDY, "-o", "whole.nc"], tmp_path, environment).status == 0
+    xr.testing.assert_identical(results(Path(target)), results(tmp_path / "whole.nc"))

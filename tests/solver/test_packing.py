@@ -1,0 +1,166 @@
+"""What a march and a sweep carry on survives being kept, and what is taken up again ends with the same numbers."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from solver import continuation, march
+from solver.continuation import follow_branch
+from solver.history import StartState, WearHistory
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.packed import Packed
+from solver.packing import pack, unpack
+from solver.settings import Resolution, SolverSettings
+from solver.trajectory import Scheme
+from tests.solver.models import branch_states, dovetail, scene
+from tests.solver.test_explicit_limit import WEAR as SEESAW_WEAR
+from tests.solver.test_explicit_limit import exact_limit, seesaw
+from tests.solver.test_jump import start as impacting_start
+from tests.solver.test_jump import worn_wall
+
+AUTO = SolverSettings(rtol=3e-2)
+MOST_STOPS = 3  # from which a march is taken up again
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        3,
+        -0.0,
+        math.inf,
+        "text",
+        Outcome.ADRIFT,
+        (1, (2.5, [None, "a"])),
+        {"a": {"b": 1}},
+        Resolution((1, 3), 64),
+        np.float64(0.1),
+    ],
+)
+def test_plain_values_come_back(value: object) -> None:
+    found = unpack(pack(value))
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_arrays_come_back_in_rows_and_as_copies() -> None:
+    array = np.asfortranarray(np.random.default_rng(0).normal(size=(3, 4)))
+    packed = pack((array, array[:, ::2], np.array([True]), np.array([1j])))
+    found = unpack(packed)
+    for one, other in zip(found, (array, array[:, ::2], np.array([True]), np.array([1j])), strict=True):
+        np.testing.assert_array_equal(one, other, strict=True)
+        assert one.flags.c_contiguous
+    array[:] = 0.0
+    found[0][:] = 1.0
+    assert (unpack(packed)[0] != 0.0).all()
+    assert (unpack(packed)[0] != 1.0).any()
+
+
+@pytest.mark.parametrize("value", [object(), {1, 2}, np.random.default_rng(0), AUTO])
+def test_what_nobody_knows_is_refused(value: object) -> None:
+    with pytest.raises(TypeError, match="packed"):
+        pack(value)
+
+
+@pytest.mark.parametrize("text", ["{", '{"what": 1}', '{"class": "Path", "fields": {}}', '{"array": 3}'])
+def test_other_texts_are_refused(text: str) -> None:
+    with pytest.raises((ValueError, KeyError, IndexError)):
+        unpack(Packed(text, ()))
+
+
+def assert_same(found: object, expected: object) -> None:
+    """Equal to the last bit, but for the time that it took."""
+    for entry in fields(expected):
+        if entry.name != "run_time":
+            np.testing.assert_array_equal(getattr(found, entry.name), getattr(expected, entry.name), err_msg=entry.name)
+
+
+def from_every_stop(
+    model: ReducedModel,
+    friction: float,
+    start: StartState,
+    wear: float,
+    step: float,
+    scheme: Scheme,
+    end: float,
+    settings: SolverSettings,
+) -> tuple[WearHistory, list[Packed]]:
+    """History, and the places at which it was kept: from each of them it has to end the same way."""
+    cycles = np.linspace(0.0, end, 5)
+    kept: list[Packed] = []
+    whole = march_wear(model, friction, start, wear, step, scheme, cycles, settings, keep=kept.append)
+    for progress in kept[:: max(1, len(kept) // MOST_STOPS)]:
+        again = march_wear(model, friction, start, wear, step, scheme, cycles, settings, resume=progress)
+        assert_same(again, whole)
+    return whole, kept
+
+
+@pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("explicit", 800.0), ("adaptive", 1.0)])
+def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(march, "REFRESH", 8)
+    (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
+    whole, kept = from_every_stop(dovetail(7), 0.5, start, 1.1e-11, step, scheme, 8e3, AUTO)
+    assert whole.outcome is Outcome.CONVERGED
+    assert whole.worn_volume[-1] > 0.0
+    assert len(kept) >= 3
+
+
+@pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
+def test_a_march_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(march, "REFRESH", 30)
+    settings = SolverSettings(11, 128)
+    whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, step, scheme, 1000.0, settings)
+    cycles = [unpack(progress)[2]["cycle"] for progress in kept]
+    assert min(cycles) < whole.jump_cycle < max(cycles)
+
+
+def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(march, "REFRESH", 1)
+    monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 100)
+    (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
+    step = 1.2 * exact_limit()
+    whole, kept = from_every_stop(
+        seesaw(), 1e-4, start, SEESAW_WEAR, step, "explicit", 20.0 * step, SolverSettings(3, 128)
+    )
+    assert whole.oscillates
+    assert any(unpack(progress)[2]["rates"]["n_alternating"].max() in (1, 2) for progress in kept)
+
+
+def test_a_start_state_comes_back() -> None:
+    (start,) = branch_states(dovetail(3), 0.5, 0.5, [2 * np.pi * 212.0], SolverSettings(3, 64))
+    found = unpack(pack(start))
+    assert_same(replace(found, state=None), replace(start, state=None))
+    assert_same(found.state, start.state)
+    failed = replace(start, state=None, outcome=Outcome.BRANCH_LOST)
+    assert_same(unpack(pack(failed)), failed)
+
+
+@pytest.mark.parametrize("sweep", ["up", "down"])
+def test_a_sweep_goes_on_to_the_same_numbers(sweep: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""
+    monkeypatch.setattr(continuation, "REFRESH", 1)
+    for model, friction, amplitude, frequencies in (
+        (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
+        (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
+    ):
+        monkeypatch.setattr(continuation, "COSTLY", 200)
+        kept: list[Packed] = []
+        arguments = (model, friction, amplitude, frequencies, sweep, AUTO)
+        whole = dict(follow_branch(*arguments, keep=kept.append))
+        assert len(kept) >= 2
+        for progress in kept:
+            done = unpack(progress)[0]
+            again = dict(follow_branch(*arguments, resume=progress))
+            assert len(again) == len(whole) - done
+            for index, start in again.items():
+                assert_same(replace(start, state=None), replace(whole[index], state=None))
+                if start.state is not None:
+                    assert_same(start.state, whole[index].state)

@@ -1,0 +1,327 @@
+"""A run that is ended at any point leaves a result that opens, and the next one ends with the same numbers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner import run, schedule
+from studyrunner.cli import main
+from studyrunner.evaluate import NOT_COMPUTED
+from studyrunner.results import Kept, MarchResult, StartResult
+from studyrunner.scene import describe_scene
+from studyrunner.store import Store
+from studyrunner.tasks import BranchTask, MarchTask
+from tests.studyrunner.fakes import fake_branch, fake_evaluate
+
+N_POINTS, N_RESULTS = 8, 4 + 8
+SMALL = [
+    "sdof_slider",
+    *("--set", "axes.frequency=[100, 110]"),
+    *("--set", "axes.sweep=['up', 'down']"),
+    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
+    *("--set", "axes.scheme=implicit"),
+    *("-o", "out.nc"),
+]
+Task = BranchTask | MarchTask
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Solver:
+    """A stand-in that counts what it does and may do something else at one of its results."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.tasks: list[Task] = []
+        self.n_results = 0
+        self.disturb: Callable[[Task, int], None] = lambda *_: None
+
+        def build_fake(model: object, _: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+            return lambda task, keep: self.evaluate(model, task, keep)
+
+        monkeypatch.setattr(run, "build_evaluator", build_fake)
+
+    def evaluate(self, model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        self.tasks.append(task)
+        for result in fake_evaluate(task, keep, describe_scene(model)):
+            self.n_results += 1
+            self.disturb(task, self.n_results)
+            yield result
+
+    def begin_again(self) -> None:
+        self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
+    return Solver(monkeypatch)
+
+
+def load(name: str = "out.nc") -> xr.Dataset:
+    with xr.open_dataset(name) as result:
+        return result.load().drop_vars("run_time")
+
+
+def whole(solver: Solver) -> xr.Dataset:
+    """The result of a run that nothing disturbs."""
+    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    solver.begin_again()
+    return load("whole.nc")
+
+
+def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
+    """Points that are there are right, the others hold nothing; how many are there."""
+    left = found.outcome == NOT_COMPUTED
+    for name in set(found.data_vars) - {"outcome", "message", "exact_worn_volume", "exact_response_amplitude"}:
+        for point in np.argwhere(left.values):
+            there = found[name].values[tuple(point)]
+            assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
+        xr.testing.assert_equal(found[name].where(~left), expected[name].where(~left))
+    return int((~left).sum())
+
+
+@pytest.mark.parametrize("at", range(1, N_RESULTS + 1))
+def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+    expected = whole(solver)
+
+    def interrupt(_: Task, n_results: int) -> None:
+        if n_results == at:
+            raise KeyboardInterrupt
+
+    solver.disturb = interrupt
+    capsys.readouterr()
+    assert main(SMALL) == 130
+    n_there = assert_partial(load(), expected)
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == f"run-study: interrupted: out.nc holds {n_there} of {N_POINTS} points, the same command goes on"
+    n_first = solver.n_results - 1
+    solver.begin_again()
+    assert main(SMALL) == 0
+    assert n_first + solver.n_results == N_RESULTS
+    xr.testing.assert_identical(load(), expected)
+    again = capsys.readouterr().err
+    assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
+
+
+@pytest.mark.parametrize("at", [1, 2, 3, 6, 9])
+@pytest.mark.parametrize("where", ["flush", "_write", "add_history"])
+def test_an_interrupt_anywhere_in_the_main_thread(
+    where: str, at: int, solver: Solver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before and after each of the calls that change what is kept."""
+    expected = whole(solver)
+    own, n_calls = getattr(Store, where), 0
+
+    def called(store: Store, *arguments: object, **named: object) -> object:
+        nonlocal n_calls
+        n_calls += 1
+        if n_calls == at:
+            raise KeyboardInterrupt
+        found = own(store, *arguments, **named)
+        if n_calls + 1 == at:
+            n_calls += 1
+            raise KeyboardInterrupt
+        return found
+
+    with monkeypatch.context() as changed:
+        changed.setattr(Store, where, called)
+        status = main(SMALL)
+    assert status == (130 if n_calls >= at else 0)
+    assert_partial(load(), expected)
+    assert main(SMALL) == 0
+    xr.testing.assert_identical(load(), expected)
+
+
+def test_an_interrupt_while_the_result_is_written(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = whole(solver)
+    from studyrunner import gather
+
+    own, n_calls = gather.gather, 0
+
+    def interrupted(*arguments: object) -> object:
+        nonlocal n_calls
+        n_calls += 1
+        if n_calls == 1:
+            raise KeyboardInterrupt
+        return own(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(gather, "gather", interrupted)
+    assert main(SMALL) == 130
+    xr.testing.assert_identical(load(), expected)
+    solver.begin_again()
+    assert main(SMALL) == 0
+    assert solver.tasks == []
+
+
+def test_a_study_that_was_made_larger_holds_what_it_held_whenever_it_ends(solver: Solver) -> None:
+    whole(solver)
+    assert main(SMALL) == 0
+    before = load()
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    solver.disturb = interrupt
+    assert main([*SMALL[:-2], "--set", "axes.wear_coefficient=[5e-12, 3e-11, 1e-11]", "-o", "out.nc"]) == 130
+    assert int((load().outcome == 0).sum()) == N_POINTS
+    xr.testing.assert_equal(load().sel(wear_coefficient=[5e-12, 1e-11]).worn_volume, before.worn_volume)
+
+
+def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+    expected = whole(solver)
+
+    def fail(task: Task, _: int) -> None:
+        if isinstance(task, MarchTask) and (task.branch, task.position, task.wear_coefficient) == (1, 0, 1e-11):
+            raise ZeroDivisionError("a bug in\nthe solver")
+
+    solver.disturb = fail
+    assert main(SMALL) == 3
+    assert "1 x exception: The computation broke off with an error" in capsys.readouterr().out
+    found = load()
+    bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
+    assert found.outcome.sel(bad).item() == 11
+    line = str(found.message.sel(bad).item())
+    assert line.startswith("ZeroDivisionError: a bug in the solver (test_going_on.py, line ")
+    assert int((found.outcome == 0).sum()) == N_POINTS - 1
+    good = found.outcome == 0
+    xr.testing.assert_equal(found.worn_volume.where(good), expected.worn_volume.where(good))
+    # another run does not try it again
+    solver.begin_again()
+    assert main(SMALL) == 3
+    assert solver.tasks == []
+    xr.testing.assert_identical(load(), found)
+    # unless it is asked to
+    assert main([*SMALL, "--retry-failed"]) == 0
+    assert len(solver.tasks) == 1
+    xr.testing.assert_identical(load(), expected)
+
+
+def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> None:
+    expected = whole(solver)
+
+    def fail(task: Task, _: int) -> None:
+        # the second state of the sweep upwards
+        if isinstance(task, BranchTask) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
+            seen[id(task)] = place + 1
+            if place == 1:
+                raise ZeroDivisionError("a bug")
+
+    seen: dict[int, int] = {}
+    solver.disturb = fail
+    assert main(SMALL) in (0, 3)
+    assert len(solver.tasks) == 2 + 8
+    solver.begin_again()
+    assert main([*SMALL, "--retry-failed"]) == 0
+    assert [type(task) for task in solver.tasks][:1] == [BranchTask]
+    assert solver.n_results == 1 + 2 or solver.n_results == 1
+    xr.testing.assert_identical(load(), expected)
+
+
+def test_an_earlier_run_is_forgotten_where_asked_for(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+    expected = whole(solver)
+    assert main(SMALL) == 0
+    n_tasks = len(solver.tasks)
+    solver.begin_again()
+    assert main([*SMALL, "--fresh"]) == 0
+    assert len(solver.tasks) == n_tasks
+    assert "from an earlier run" not in capsys.readouterr().err
+    xr.testing.assert_identical(load(), expected)
+
+
+def test_a_second_run_of_the_same_study_is_refused(
+    solver: Solver, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    second: list[int] = []
+
+    def run_again(_: Task, n_results: int) -> None:
+        # signals are for the main thread
+        if n_results == 1:
+            second.append(main(SMALL))
+
+    monkeypatch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
+    monkeypatch.setattr("studyrunner.store._SECONDS_TO_DIE", 0.1)
+    solver.disturb = run_again
+    assert main(SMALL) == 0
+    assert second == [2]
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
+    assert "out.nc.parts: in use = by process" in line
+    assert "another run is writing there: wait for its end, or give another result file with -o" in line
+
+
+def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = whole(solver)
+    monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.01)
+    evaluate = solver.evaluate
+
+    def slow(model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        if isinstance(task, MarchTask) and task.resume is None:
+            time.sleep(0.02)
+            keep(Kept("half of it", (np.array([task.number]),)))
+            raise KeyboardInterrupt
+        yield from evaluate(model, task, keep)
+
+    monkeypatch.setattr(solver, "evaluate", slow)
+    # each run comes as far as to the first half of one more march
+    assert [main(SMALL) for _ in range(9)] == [130] * 8 + [0]
+    marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
+    assert len(marches) == 8
+    assert all(task.resume == Kept("half of it", (np.array([task.number]),)) for task in marches)
+    xr.testing.assert_identical(load(), expected)
+    assert not list(Path("out.nc.parts").glob("*.progress.npz"))
+
+
+def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files of start states may be damaged while the progress of their branch is not."""
+    expected = whole(solver)
+    monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
+    own, ended = solver.evaluate, False
+
+    def resuming(model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        nonlocal ended
+        if isinstance(task, MarchTask):
+            yield from own(model, task, keep)
+            return
+        passed = 0 if task.resume is None else int(task.resume.arrays[0])
+        for place, start in enumerate(fake_branch(replace(task, known=frozenset()))):
+            if place >= passed and start.position not in task.known:
+                yield start
+                if place == 1 and not ended:
+                    ended = True
+                    raise KeyboardInterrupt
+                keep(Kept("branch", (np.array(place + 1),)))
+
+    monkeypatch.setattr(solver, "evaluate", resuming)
+    assert main(SMALL) == 130
+    assert list(Path("out.nc.parts").glob("*.progress.npz"))
+    for path in Path("out.nc.parts").glob("*.starts.npz"):
+        path.unlink()
+    assert main(SMALL) == 0
+    xr.testing.assert_identical(load(), expected)
+
+
+def test_a_time_limit_is_one_bad_point() -> None:
+    """With the solver itself: all points have their outcome, and a larger limit finishes those that failed."""
+    study = [
+        *("sdof_slider", "--set", "axes.frequency=[160]", "--set", "axes.scheme=['implicit']"),
+        *("--set", "solver.harmonics=5", "--set", "solver.samples=64", "--set", "slow_time.cycles=100_000"),
+    ]
+    # what is compiled is compiled here
+    assert main([*study, "--set", "axes.step=1000", "-o", "first.nc"]) == 0
+    assert main([*study, "--set", "axes.step=[1, 1000]", "--set", "solver.time_limit=1", "-o", "out.nc"]) == 3
+    found = load().squeeze()
+    assert found.outcome.sel(step=1000.0) == 0
+    assert found.outcome.sel(step=1.0) == 10
+    assert found.worn_volume.sel(step=1.0).isnull().all()
+    assert "time_limit" in load().outcome.attrs["flag_meanings"]
+    sentence = "The computation took longer than solver.time_limit"
+    assert any(line.startswith(sentence) for line in load().outcome.attrs["sentences"].splitlines())

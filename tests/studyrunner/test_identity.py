@@ -1,0 +1,206 @@
+"""What a finished task is known by: everything that its result depends on, and nothing else."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from studyrunner import identity
+from studyrunner.identity import Identities, hash_of_kind
+from studyrunner.records import record_type
+from studyrunner.study_file import read_study
+from studyrunner.tasks import TaskPlan, build_tasks
+from tests.studyrunner.fakes import FACTS
+
+BASE = {
+    "axes.frequency": "[150, 155, 160]",
+    "axes.scheme": "['implicit']",
+    "axes.step": "[100]",
+    "axes.wear_coefficient": "[1e-11]",
+    "axes.excitation_amplitude": "[10]",
+    "axes.sweep": "['up']",
+    "slow_time.cycles": "1000",
+    "slow_time.outputs": "3",
+    "solver.harmonics": "3",
+    "solver.samples": "64",
+}
+
+
+def hashes(scene: str = FACTS.digest, **changes: str) -> dict[tuple[float, ...], tuple[str, str]]:
+    """Hashes of the start state and of the history of each point, by frequency, amplitude, coefficient and step."""
+    overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
+    study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
+    plan = build_tasks(study, FACTS.n_displacements)
+    found = Identities(study, scene, hash_of_kind(record_type(study, FACTS).descr))
+    points = {}
+    for branch, line in zip(plan.branches, plan.marches, strict=True):
+        starts = found.of_starts(branch)
+        for march in line:
+            for share, history in zip(march.shares, found.of_histories(branch, march), strict=True):
+                where = (branch.frequencies[march.position], branch.excitation_amplitude)
+                points[(*where, share.wear_coefficient, share.step)] = (starts[march.position], history)
+    return points
+
+
+POINT = (155.0, 10.0, 1e-11, 100.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"scene__friction_coefficient": "0.4"},
+        {"axes__sweep": "['down']"},
+        {"solver__harmonics": "5"},
+        {"solver__harmonics": "auto"},
+        {"solver__samples": "128"},
+        {"solver__tolerance": "1e-9"},
+        {"solver__rtol": "1e-3"},
+        {"axes__frequency": "[151, 155, 160]"},
+        {"axes__frequency": "[155, 160]"},
+        {"axes__frequency": "[150, 152, 155, 160]"},
+        {"axes__frequency": "[150, 155, 161]"},
+        {"scene": "1" * 64},
+    ],
+    ids=str,
+)
+def test_what_changes_a_start_state_changes_all_that_follows(changes: dict[str, str]) -> None:
+    before, after = hashes()[POINT], hashes(**changes)[POINT]
+    assert before[0] != after[0]
+    assert before[1] != after[1]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"axes__scheme": "['explicit']"},
+        {"axes__scheme": "['adaptive']"},
+        {"axes__scheme": "['explicit']", "slow_time__largest_depth": "1e-6"},
+        {"slow_time__cycles": "2000"},
+        {"slow_time__outputs": "4"},
+        {"slow_time__outputs": "[0, 400, 1000]"},
+        {"outputs__variables": "['worn_volume']"},
+        {"outputs__loops": "[0]"},
+    ],
+    ids=str,
+)
+def test_what_changes_a_history_only_leaves_its_start_state(changes: dict[str, str]) -> None:
+    before, after = hashes()[POINT], hashes(**changes)[POINT]
+    assert before[0] == after[0]
+    assert before[1] != after[1]
+
+
+def test_loops_of_another_pair_are_not_those() -> None:
+    """As many of them, so the records look the same."""
+    assert hashes(outputs__loops="[0]")[POINT][1] != hashes(outputs__loops="[1]")[POINT][1]
+
+
+@pytest.mark.parametrize(
+    ("point", "changes"),
+    [
+        ((155.0, 10.0, 2e-11, 100.0), {"axes__wear_coefficient": "[2e-11]"}),
+        ((155.0, 10.0, 1e-11, 50.0), {"axes__step": "[50]"}),
+        ((155.0, 11.0, 1e-11, 100.0), {"axes__excitation_amplitude": "[11]"}),
+    ],
+)
+def test_values_of_a_point_are_in_its_hash(point: tuple[float, ...], changes: dict[str, str]) -> None:
+    assert hashes(**changes)[point][1] != hashes()[POINT][1]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"solver__time_limit": "3"},
+        {"study__title": "another"},
+        {"axes__frequency": "[160, 150, 155]"},
+        {"axes__frequency": "[150, 155, 158, 160]"},
+        {"axes__excitation_amplitude": "[9, 10]"},
+        {"axes__wear_coefficient": "[3e-11, 1e-11]"},
+        {"axes__step": "[10, 100]"},
+        {"axes__sweep": "['down', 'up']"},
+        {"axes__scheme": "['implicit', 'explicit']"},
+        {"axes__harmonics": "[5, 3]"},
+    ],
+    ids=str,
+)
+def test_what_does_not_change_a_result_does_not_change_its_hash(changes: dict[str, str]) -> None:
+    found = set(hashes_of_all(**changes))
+    assert hashes()[POINT] in found
+
+
+def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
+    """Of all points, also where several have the same frequency, amplitude, coefficient and step."""
+    overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
+    study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
+    plan = build_tasks(study, FACTS.n_displacements)
+    own = Identities(study, FACTS.digest, hash_of_kind(record_type(study, FACTS).descr))
+    return [
+        (own.of_starts(branch)[march.position], history)
+        for branch, line in zip(plan.branches, plan.marches, strict=True)
+        for march in line
+        for history in own.of_histories(branch, march)
+    ]
+
+
+def test_all_points_have_hashes_of_their_own() -> None:
+    changes = {
+        "axes__excitation_amplitude": "[9, 10]",
+        "axes__wear_coefficient": "[0, 1e-12, 1e-11]",
+        "axes__step": "[10, 100]",
+        "axes__scheme": "['implicit', 'explicit', 'adaptive']",
+        "axes__sweep": "['up', 'down']",
+        "axes__harmonics": "[3, 5]",
+    }
+    found = hashes_of_all(**changes)
+    assert len({history for _, history in found}) == len(found) > 100
+    starts = {start for start, _ in found}
+    assert len(starts) == 3 * 2 * 2 * 2
+
+
+def test_a_history_that_is_read_from_another_one_is_not_one_of_its_own() -> None:
+    """It differs in the last bits."""
+    changes = {"axes__scheme": "['adaptive']", "axes__wear_coefficient": "[1e-12, 1e-11]"}
+    both = hashes(**changes)
+    alone = hashes(**changes, solver__shortcuts="false")
+    read, own = (155.0, 10.0, 1e-12, 100.0), (155.0, 10.0, 1e-11, 100.0)
+    assert both[own] == alone[own]
+    assert both[read][0] == alone[read][0]
+    assert both[read][1] != alone[read][1]
+
+
+def test_the_step_matters_to_those_who_take_it_only() -> None:
+    for scheme, largest, matters in (
+        ("implicit", None, True),
+        ("explicit", None, True),
+        ("explicit", "1e-6", False),
+        ("adaptive", None, False),
+    ):
+        more = {"axes__scheme": f"['{scheme}']", **({"slow_time__largest_depth": largest} if largest else {})}
+        one, other = (hashes_of_all(**more, axes__step=step) for step in ("[100]", "[200]"))
+        assert (one != other) is matters
+
+
+def plan_and_identities() -> tuple[TaskPlan, Identities]:
+    study = read_study("sdof_slider", [f"{name}={value}" for name, value in BASE.items()])
+    return build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
+
+
+def test_progress_is_known_by_all_that_its_task_gives() -> None:
+    plan, own = plan_and_identities()
+    branch = plan.branches[0]
+    histories = [own.of_histories(branch, march) for march in plan.marches[0]]
+    names = [own.of_branch(branch), *map(own.of_march, histories), *own.of_starts(branch), *itertools.chain(*histories)]
+    assert len(set(names)) == len(names)
+    assert all(len(name) == 32 and set(name) <= set("0123456789abcdef") for name in names)
+
+
+def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = hashes()
+    identity.solver_digest.cache_clear()
+    assert hashes() == before
+    monkeypatch.setattr(identity.metadata, "version", lambda _: "0.0.0")
+    identity.solver_digest.cache_clear()
+    try:
+        assert hashes()[POINT][0] != before[POINT][0]
+    finally:
+        identity.solver_digest.cache_clear()

@@ -1,0 +1,53 @@
+"""The record of a history: all that its result says, and what stands there without one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studyrunner.records import empty_record, failed_result, pack, record_type
+from studyrunner.store import KEY
+from studyrunner.study_file import read_study
+from studyrunner.tasks import build_tasks
+from studyrunner.variables import KEPT
+from tests.studyrunner.fakes import FACTS, fake_histories
+
+OVERRIDES = (
+    "axes.frequency=[160, 150]",
+    "slow_time.outputs=3",
+    "axes.sweep=['up', 'down']",
+    "axes.scheme=adaptive",
+    "axes.wear_coefficient=[1e-12, 1e-11]",
+)
+
+
+@pytest.mark.parametrize("more", [(), ("outputs.loops=[1]",), ("outputs.variables=['worn_volume']",)])
+def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
+    study = read_study("sdof_slider", (*OVERRIDES, *more))
+    pairs = list(fake_histories(build_tasks(study, FACTS.n_displacements)))
+    assert [(task.number, result.share) for task, result in pairs] == [
+        (march, share) for march in (0, 1, 3, 2) for share in range(2)
+    ]
+    kind = record_type(study, FACTS)
+    for task, result in pairs:
+        (record,) = pack(kind, "f" * 32, result)
+        assert record[KEY] == b"f" * 32
+        for name in KEPT:
+            np.testing.assert_equal(record[name], getattr(result, name))
+        for name in task.variables:
+            np.testing.assert_equal(record[name], result.values[name])
+
+
+def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None:
+    study = read_study("sdof_slider", OVERRIDES)
+    kind = record_type(study, FACTS)
+    task = build_tasks(study, FACTS.n_displacements).marches[0][0]
+    failed = failed_result(task, 1, 11, "what went wrong")
+    assert (failed.points, failed.share) == (task.shares[1].points, 1)
+    (record,) = pack(kind, "0" * 32, failed)
+    assert (record["outcome"], record["message"]) == (11, "what went wrong")
+    (nothing,) = empty_record(kind)
+    for found in (record, nothing):
+        for name in set(kind.names or ()) - {KEY, "outcome", "message"}:
+            there = found[name]
+            assert np.all(np.isnan(there) if there.dtype.kind == "f" else there == 0), name
