@@ -38,11 +38,8 @@ def march_wear(
     settings: SolverSettings,
     largest_depth: float | None = None,
     loops: tuple[int, ...] = (),
-<<<<<<< HEAD
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
-=======
->>>>>>> main
 ) -> WearHistory:
     """Wear history of one point of a study.
 
@@ -50,11 +47,8 @@ def march_wear(
     counts to report, the first 0; between two steps they are interpolated, and the last step is shortened to end on the
     last of them. largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
     loops: pairs whose fretting loops are kept at every count.
-<<<<<<< HEAD
     keep: called now and then with the progress of the march. resume: such progress of a march with the same arguments,
         from which this one goes on: its history is the same to the last bit, but for `run_time`.
-=======
->>>>>>> main
     """
     started = time.thread_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
@@ -63,11 +57,8 @@ def march_wear(
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = Trajectory(case, start, wear_coefficient, scheme, loops)
-<<<<<<< HEAD
     spent_before, message = 0.0, ""
     march.effort.deadline = started + settings.time_limit
-=======
->>>>>>> main
     try:
         outcome, n_steps, end = Outcome.CONVERGED, 0, float(cycles[-1])
         if resume is None:

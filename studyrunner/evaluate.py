@@ -119,11 +119,8 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         _solver_settings(task.settings),
         largest_depth=task.largest_depth,
         loops=task.loops,
-<<<<<<< HEAD
         keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
-=======
->>>>>>> main
     )
 
 

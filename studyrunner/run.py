@@ -17,7 +17,7 @@ from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
 from studyrunner.records import record_type
 from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
+from studyrunner.scene import describe_scene, scene_to_keep
 from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
 from studyrunner.store import Store, StoreInUseError
@@ -87,8 +87,10 @@ def run_study(
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
-<<<<<<< HEAD
+    if "natural_frequency" in study.outputs.variables:
+        progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
+    kept_scene = scene_to_keep(study, model)
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind, fresh=fresh)
     with contextlib.closing(store):
@@ -104,7 +106,7 @@ def run_study(
             from studyrunner.gather import gather
 
             store.flush()
-            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene))
+            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene, kept_scene))
 
         try:
             job = Job(model, study.friction_coefficient)
@@ -129,25 +131,6 @@ def _open_store(folder: Path, kind: np.dtype[np.void], *, fresh: bool) -> Store:
 
 def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
     outcomes = gathered.outcomes
-=======
-    if "natural_frequency" in study.outputs.variables:
-        progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model)
-    parts = Parts(parts_folder(path), record_type(study, facts))
-    try:
-        job = Job(model, study.friction_coefficient)
-        for rank in range(1, ranks.size):
-            ranks.send(job, rank)
-        run_tasks(ranks, plan, build_evaluator(model, study.friction_coefficient), parts, progress)
-        progress.say("writing the result")
-        # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.gather import gather
-
-        gathered = gather(study, facts, plan, parts, path, of_scene)
-    finally:
-        # Nothing goes on from an interrupted run.
-        parts.remove()
->>>>>>> main
     return RunSummary(
         n_points=plan.n_points,
         n_converged=outcomes[CONVERGED],

@@ -103,11 +103,7 @@ class MarchTask:
     cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
     cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
         those planned for and something moves.
-<<<<<<< HEAD
     start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
-=======
-    start: start state, None until its branch has reached it.
->>>>>>> main
     number: of the march in the study.
     """
 

@@ -38,6 +38,7 @@ def build_dataset(
     }
     for name in loops:
         arrays[name][:] = np.nan
+    arrays["message"] = arrays["message"].astype(object)
     for result in results:
         for point in result.points:
             for name in asked:
@@ -68,11 +69,14 @@ def build_dataset(
             "long_name": entry.long_name,
             "coverage_content_type": content,
         }
+        if entry.comment:
+            dataset[name].attrs["comment"] = entry.comment
         if entry.flags:
             dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
             dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
         if name in asked and not entry.dtype.startswith("float"):
-            dataset[name].attrs["comment"] = "0 where the point failed, see outcome"
+            failed = "0 where the point failed, see outcome."
+            dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
@@ -84,6 +88,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """The file as xarray writes it."""
     encoding: dict[str, dict[str, object]] = {}
     for name in dataset.data_vars:
+        if dataset[name].dtype.kind in "OU":
+            # texts of any length cannot be compressed
+            continue
         encoding[str(name)] = {"zlib": True, "complevel": 1, "shuffle": True}
         if name in LOOPS:
             sizes = dataset[name].sizes
