@@ -78,11 +78,13 @@ def check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
 def _check_names(names: tuple[str, ...], key: str) -> None:
     if not names:
         raise SceneError(key, "no name", "give at least one response")
+    seen: set[str] = set()
     for name in names:
         if not name:
             raise SceneError(key, "an empty name", "name every response")
-        if names.count(name) > 1:
+        if name in seen:
             raise SceneError(key, f'"{name}" stands there more than once', "give every response a name of its own")
+        seen.add(name)
 
 
 def _check_contact(contact: ContactInterface, n: int) -> None:
@@ -139,13 +141,16 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
     if n == 0 or linear.stiffness.shape != (n, n):
         raise SceneError(f"{prefix}stiffness", f"shape {linear.stiffness.shape}", "give a square matrix")
     matrices = {"stiffness": linear.stiffness, "mass": linear.mass, "damping": linear.damping}
+    vectors = {"load/static": linear.load_static, "load/harmonic": linear.load_harmonic}
+    # all shapes before any number: what does not fit together takes no time
     for name, matrix in matrices.items():
         _check_shape(prefix + name, matrix, (n, n))
-        _check_finite(prefix + name, matrix)
-        _check_hermitian(prefix + name, matrix)
-    vectors = {"load/static": linear.load_static, "load/harmonic": linear.load_harmonic}
     for name, vector in vectors.items():
         _check_shape(prefix + name, vector, (n,))
+    for name, matrix in matrices.items():
+        _check_finite(prefix + name, matrix)
+        _check_hermitian(prefix + name, matrix)
+    for name, vector in vectors.items():
         _check_finite(prefix + name, vector)
     if np.iscomplexobj(linear.load_static):
         raise SceneError(f"{prefix}load/static", "complex", "give real forces")
@@ -214,6 +219,8 @@ def _singular(matrix: NDArray[Any]) -> str:
     # Displacements and modal coordinates have different units: make the diagonal 1 before judging.
     scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, rows))
     balanced = matrix * np.outer(scale, scale)
+    if not np.isfinite(balanced).all():
+        return "entries next to the smallest or largest numbers there are"
     factorise, estimate = get_lapack_funcs(("getrf", "gecon"), (balanced,))
     factors, _, info = factorise(balanced)
     if info == 0:

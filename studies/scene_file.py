@@ -9,7 +9,8 @@ other than `n_sectors` and `nodal_diameter` are the user's own.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
-from studies.model_check import check_model, check_sector, is_grouped
+from studies.hdf5_guard import (
+    LARGEST_FILE,
+    LARGEST_RESULT,
+    find_datasets,
+    find_group,
+    is_number,
+    open_hdf5,
+    read_attribute,
+    read_texts,
+)
+from studies.model_check import check_model, check_sector
+from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
-
-_CONTACT = ("dofs", "area", "gap", "normal_load", "position", "surface")
-_LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
-_DEEPEST = 4  # nd/<k>/load/static
-_LARGEST = 2**31  # bytes: a dataset beyond is no reduced model
+from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, scene_attributes, scene_datasets
 
 
-def write_scene(model: ReducedModel, path: str | Path) -> None:
+def write_scene(model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None) -> None:
     """Write a model as a scene file, complete or not at all; an existing file is replaced.
 
     Reading it gives the same model bit by bit. Raises SceneError where the model is impossible, OSError where the file
@@ -38,57 +46,81 @@ def write_scene(model: ReducedModel, path: str | Path) -> None:
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with h5py.File(unfinished, "w") as file:
-            _write_model(model, file)
+            file.attrs.update(scene_attributes(model))
+            for key, values in scene_datasets(model, mesh):
+                kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
+                file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
 
 
-def read_scene(path: str | Path, n_harmonics: int = 1) -> ReducedModel:
+def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> ReducedModel:
     """Read and check a scene file.
 
-    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the file.
+    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the file. group: where the scene stands in a
+    file that holds more than one.
 
     Raises SceneError for wrong content, with the dataset as its key, and for a file that is not HDF5, with the key
     "model"; OSError where the file is missing or cannot be opened.
     """
-    with Path(path).open("rb"):  # says why, where h5py only says that a file cannot be opened
-        pass
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise SceneError("model", f"{path} is no HDF5 file, or damaged", "give a scene file in HDF5") from error
-    with file:
+    with _open_scene(Path(path), group) as (root, datasets):
+        model = _read_model(root, datasets)
+    check_model(model, n_harmonics, grouped=_is_grouped(datasets))
+    return model
+
+
+def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
+    """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
+    with _open_scene(Path(path), group) as (_, datasets):
+        return _read_mesh(datasets) if _has_mesh(datasets) else None
+
+
+def has_mesh(path: str | Path, group: str = "") -> bool:
+    """Whether a scene file has a mesh. Raises what `read_scene` raises."""
+    with _open_scene(Path(path), group) as (_, datasets):
+        return _has_mesh(datasets)
+
+
+def read_through(path: str | Path, group: str = "") -> None:
+    """Reads all that a scene file holds and forgets it, dataset by dataset. Raises what `read_scene` raises."""
+    with _open_scene(Path(path), group) as (root, datasets):
+        for name in ATTRIBUTES:
+            read_attribute(root, name)
+        for key, dataset in datasets.items():
+            if is_number(dataset.dtype):
+                _read_numbers(datasets, key)
+            else:
+                read_texts(dataset, key)
+
+
+@contextmanager
+def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, dict[str, h5py.Dataset]]]:
+    """Group and datasets of a scene, found and looked at, but not read; damage that shows in use is a SceneError."""
+    with open_hdf5(path, LARGEST_RESULT if group else LARGEST_FILE) as file:
         try:
-            return _read_model(file, n_harmonics)
-        except (OSError, RuntimeError) as error:
-            raise SceneError("model", f"{path} is damaged", "write the scene file again") from error
+            root = find_group(file, group) if group else file
+            datasets = find_datasets(root, path.stat().st_size)
+            _refuse_unknown(datasets, _is_grouped(datasets))
+            yield root, datasets
+        except SceneError:
+            raise
+        except (OSError, RuntimeError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
+            # the library has no one way to say that bytes make no sense
+            raise SceneError("model", f"{path.name} is damaged", "write the scene file again") from error
 
 
-def _write_model(model: ReducedModel, file: h5py.File) -> None:
-    if model.n_sectors > 0:
-        file.attrs["n_sectors"] = model.n_sectors
-        file.attrs["nodal_diameter"] = model.nodal_diameter
-    contact = model.contact
-    for name in _CONTACT[:-1]:
-        file[f"contact/{name}"] = getattr(contact, name)
-    text = h5py.string_dtype("utf-8")
-    file.create_dataset("contact/surface", data=list(contact.surface), dtype=text)
-    for k, linear in model.linear.items():
-        group = file.create_group(f"nd/{k}") if is_grouped(model) else file
-        for name in ("mass", "damping", "stiffness"):
-            group[name] = getattr(linear, name)
-        group["load/static"] = linear.load_static
-        group["load/harmonic"] = linear.load_harmonic
-        group["response/dofs"] = linear.response
-        group.create_dataset("response/names", data=list(model.response_names), dtype=text)
+def _is_grouped(datasets: Iterable[str]) -> bool:
+    return any(key.startswith("nd/") for key in datasets)
 
 
-def _read_model(file: h5py.File, n_harmonics: int) -> ReducedModel:
-    datasets = dict(_walk(file, ""))
-    grouped = any(key.startswith("nd/") for key in datasets)
-    _refuse_unknown(datasets, grouped)
-    n_sectors, nodal_diameter = (_read_count(file, name, required=grouped) for name in ("n_sectors", "nodal_diameter"))
+def _has_mesh(datasets: Iterable[str]) -> bool:
+    return any(key.startswith("mesh/") for key in datasets)
+
+
+def _read_model(root: h5py.Group, datasets: Mapping[str, h5py.Dataset]) -> ReducedModel:
+    grouped = _is_grouped(datasets)
+    n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
     check_sector(n_sectors, nodal_diameter)
 
     prefixes = {0: ""}
@@ -101,46 +133,40 @@ def _read_model(file: h5py.File, n_harmonics: int) -> ReducedModel:
     for prefix, others in names.items():
         if others != first:
             raise SceneError(f"{prefix}response/names", ", ".join(others), f"give the same names as elsewhere: {first}")
-    model = ReducedModel(
+    return ReducedModel(
         linear=linear,
         contact=_read_contact(datasets),
         response_names=first,
         n_sectors=n_sectors,
         nodal_diameter=nodal_diameter,
     )
-    check_model(model, n_harmonics, grouped=grouped)
-    return model
 
 
-def _walk(group: h5py.Group, prefix: str) -> Iterable[tuple[str, h5py.Dataset]]:
-    for name in group:
-        key = f"{prefix}{name}"
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise SceneError(key, "a link", "store the data itself under this name")
-        item = _open(group, name, key)
-        if isinstance(item, h5py.Group) and key.count("/") < _DEEPEST - 1:
-            yield from _walk(item, f"{key}/")
-        elif isinstance(item, h5py.Dataset):
-            if item.external or item.is_virtual:
-                raise SceneError(key, "data in another file", "store the data in this file")
-            yield key, item
-        else:
-            raise SceneError(key, "unknown", "remove it")
-
-
-def _open(group: h5py.Group, name: str | bytes, key: str) -> h5py.HLObject:
-    try:
-        item = group[name]
-        # A type without equivalent in NumPy only shows when it is asked for.
-        return item if isinstance(item, h5py.Group) or item.dtype is not None else None
-    except (KeyError, TypeError, ValueError) as error:
-        raise SceneError(key, "damaged or of an unknown type", "write it again as numbers or text") from error
+def _read_mesh(datasets: Mapping[str, h5py.Dataset]) -> SurfaceMesh:
+    axes = [_read_real(datasets, f"mesh/{axis}") for axis in "xyz"]
+    n_nodes = axes[0].size
+    for axis, values in zip("xyz", axes, strict=True):
+        if values.shape != (n_nodes,):
+            raise SceneError(f"mesh/{axis}", f"shape {values.shape}", f"give shape ({n_nodes},), as mesh/x has")
+        if not np.isfinite(values).all():
+            raise SceneError(f"mesh/{axis}", "not finite", "give finite numbers")
+    quads = _whole("mesh/quad", _read_numbers(datasets, "mesh/quad"))
+    if quads.ndim != 2 or quads.shape[1] != 4:
+        raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
+    outside = quads[(quads < 0) | (quads >= n_nodes)]
+    if len(outside):
+        raise SceneError("mesh/quad", str(outside[0]), f"give nodes from 0 to {n_nodes - 1}")
+    parts = _read_text(datasets, "mesh/part")
+    if len(parts) != len(quads):
+        raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
+    return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
 def _refuse_unknown(datasets: Iterable[str], grouped: bool) -> None:
-    contact = {f"contact/{name}" for name in _CONTACT}
+    contact = {f"contact/{name}" for name in CONTACT}
+    mesh = {f"mesh/{name}" for name in MESH}
     for key in datasets:
-        if key in contact or (grouped and key == "response/names"):
+        if key in contact or key in mesh or (grouped and key == "response/names"):
             continue
         dataset = key
         if grouped:
@@ -148,19 +174,22 @@ def _refuse_unknown(datasets: Iterable[str], grouped: bool) -> None:
             if group != "nd" or not number.isdecimal() or str(int(number)) != number:
                 raise SceneError(key, "unknown dataset", "remove it, or move it into nd/<nodal diameter>/")
             dataset = "/".join(below[:-1])
-        if dataset not in _LINEAR:
-            raise SceneError(key, "unknown dataset", f"remove it, known are {', '.join([*sorted(contact), *_LINEAR])}")
+        if dataset not in LINEAR:
+            raise SceneError(
+                key, "unknown dataset", f"remove it, known are {', '.join([*sorted(contact | mesh), *LINEAR])}"
+            )
 
 
-def _read_count(file: h5py.File, name: str, *, required: bool) -> int:
-    if name not in file.attrs:
+def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
+    value = read_attribute(root, name)
+    if value is None:
         if required:
             raise SceneError(name, "missing", f"give the attribute {name} to a file with groups nd/<k>")
         return 0
-    value = np.asarray(file.attrs[name])
-    if value.size != 1 or value.dtype.kind not in "iuf" or value.item() != np.floor(value.item()):
-        raise SceneError(name, str(value), "give a whole number as the attribute")
-    return int(value.item())
+    number = value.item()
+    if value.dtype.kind not in "iuf" or not abs(number) < 2**31 or number != np.floor(number):
+        raise SceneError(name, str(number), "give a whole number as the attribute")
+    return int(number)
 
 
 def _read_linear(datasets: Mapping[str, h5py.Dataset], prefix: str, *, real: bool) -> LinearModel:
@@ -243,26 +272,19 @@ def _read_real(datasets: Mapping[str, h5py.Dataset], key: str) -> FloatArray:
 def _read_numbers(datasets: Mapping[str, h5py.Dataset], key: str) -> Any:
     """Values as float64 or complex128."""
     dataset = _dataset(datasets, key)
-    names = dataset.dtype.names
-    if names in (("r", "i"), ("real", "imag")):
-        parts = dataset[()]
-        if all(parts.dtype[name].kind in "iuf" for name in names):
-            values = np.empty(dataset.shape, dtype=np.complex128)
-            values.real, values.imag = parts[names[0]], parts[names[1]]
-            return values
-    if dataset.dtype.kind not in "iufc":
+    if not is_number(dataset.dtype):
         raise SceneError(key, f"type {dataset.dtype}", "give numbers")
+    names = dataset.dtype.names
+    if names is not None:
+        parts = dataset[()]
+        values = np.empty(dataset.shape, dtype=np.complex128)
+        values.real, values.imag = parts[names[0]], parts[names[1]]
+        return values
     return dataset[()].astype(np.complex128 if dataset.dtype.kind == "c" else np.float64)
 
 
 def _read_text(datasets: Mapping[str, h5py.Dataset], key: str) -> tuple[str, ...]:
-    dataset = _dataset(datasets, key)
-    if h5py.check_string_dtype(dataset.dtype) is None or len(dataset.shape) != 1:
-        raise SceneError(key, f"type {dataset.dtype} of shape {dataset.shape}", "give a row of text")
-    try:
-        return tuple(str(text) for text in dataset.asstr("utf-8")[()])
-    except UnicodeDecodeError as error:
-        raise SceneError(key, "text that is not UTF-8", "write it in UTF-8") from error
+    return read_texts(_dataset(datasets, key), key)
 
 
 def _dataset(datasets: Mapping[str, h5py.Dataset], key: str) -> h5py.Dataset:
@@ -271,6 +293,4 @@ def _dataset(datasets: Mapping[str, h5py.Dataset], key: str) -> h5py.Dataset:
     dataset = datasets[key]
     if not dataset.shape:
         raise SceneError(key, "a single value or nothing", "give an array")
-    if dataset.size * dataset.dtype.itemsize > _LARGEST:
-        raise SceneError(key, f"shape {dataset.shape}", "reduce the model: the dataset has more than 2 GiB")
     return dataset

@@ -15,7 +15,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from studyrunner.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
-from studyrunner.user_error import StorageError, UserError
+from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
     from studyrunner.study import Study
@@ -38,6 +38,7 @@ examples:
   run-study                                              the bundled study "dovetail" -> dovetail.nc
   run-study --plan                                       what that would compute, and how long it takes
   mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
+  run-study worn.nc -o again.nc                          the study of a result file again
   run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
 
 exit status:
@@ -81,7 +82,11 @@ def parse_options(arguments: Sequence[str]) -> Options:
         allow_abbrev=False,
     )
     parser.add_argument(
-        "study", nargs="?", default="dovetail", metavar="STUDY", help="TOML file or bundled study (default: dovetail)"
+        "study",
+        nargs="?",
+        default="dovetail",
+        metavar="STUDY",
+        help="TOML file, result file or bundled study (default: dovetail)",
     )
     parser.add_argument("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)")
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
@@ -240,6 +245,7 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.output import check_output
     from studyrunner.progress import RunProgress, format_seconds
+    from studyrunner.provenance import compare_with_archived
     from studyrunner.run import Interrupted, run_study
     from studyrunner.scene import build_study_scene
 
@@ -248,6 +254,8 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     progress = RunProgress()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
     model = build_study_scene(study)
+    for line in compare_with_archived(study, model):
+        print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:
         with progress:
             summary = run_study(

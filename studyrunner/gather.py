@@ -8,11 +8,9 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import platform
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +22,16 @@ from studyrunner.certificates import CertificateTable
 from studyrunner.evaluate import NOT_COMPUTED, endings
 from studyrunner.ledger import Ledger
 from studyrunner.output import partial_path
+from studyrunner.provenance import describe_run
 from studyrunner.records import empty_record, variable_sizes
-from studyrunner.scene import SceneFacts
+from studyrunner.scene import KeptScene, SceneFacts
+from studyrunner.scene_group import write_scene_group
 from studyrunner.scene_variables import SceneVariable
 from studyrunner.store import Store
 from studyrunner.study import Study
-from studyrunner.study_file import format_study
 from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
-_PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4")
 _BYTES_A_SLAB = 16e6
 _ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
 
@@ -60,11 +58,17 @@ class _Index:
 
 
 def gather(
-    study: Study, facts: SceneFacts, ledger: Ledger, path: Path, of_scene: Sequence[SceneVariable] = ()
+    study: Study,
+    facts: SceneFacts,
+    ledger: Ledger,
+    path: Path,
+    of_scene: Sequence[SceneVariable] = (),
+    scene: KeptScene | None = None,
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
-    of_scene: what no task computes. Points that are not computed yet say so in their outcome. Raises StorageError.
+    of_scene: what no task computes. scene: what goes into the group of the scene, None for none. Points that are not
+    computed yet say so in their outcome. Raises StorageError.
     """
     index, gathered = _read_through(study, ledger)
     temporary = partial_path(path)
@@ -74,6 +78,8 @@ def gather(
             _write_values(file, study, facts, ledger.store, index)
             _write_scene(file, study, ledger.store, of_scene)
             _write_coordinates(file, study, facts)
+            if scene is not None:
+                write_scene_group(file, scene)
         os.replace(temporary, path)
     except (OSError, RuntimeError) as error:
         # the library says the one or the other where the disk is full
@@ -246,6 +252,8 @@ def _attributes(name: str, entry: Variable) -> dict[str, object]:
         "long_name": entry.long_name,
         "coverage_content_type": content,
     }
+    if entry.comment:
+        found["comment"] = entry.comment
     if entry.flags:
         found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(entry.flags)
@@ -254,7 +262,7 @@ def _attributes(name: str, entry: Variable) -> dict[str, object]:
         found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
         found["sentences"] = "\n".join(flag.sentence for flag in endings())
     if name in ASKED and not entry.dtype.startswith("float"):
-        found["comment"] = "0 where the point failed, see outcome"
+        found["comment"] = " ".join(filter(None, (entry.comment, "0 where the point failed, see outcome.")))
     return found
 
 
@@ -281,20 +289,3 @@ def _labels(values: Sequence[object]) -> NDArray[np.generic]:
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
     return array.astype(np.int32) if array.dtype.kind == "i" else array
-
-
-def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
-    """Attributes of the file. None of them depends on when, where or on how many ranks the study ran."""
-    versions = {name: metadata.version(name) for name in _PACKAGES}
-    own = f"{_PACKAGES[0]} {versions[_PACKAGES[0]]}"
-    return {
-        "Conventions": "CF-1.11, ACDD-1.3",
-        "title": study.study.title or study.study.name,
-        "summary": "Fretting wear of a joint under vibration: wear histories over the axes of a parameter study.",
-        "keywords": "fretting wear, contact, dry friction, vibration, harmonic balance",
-        "source": f"{own}: multiscale harmonic balance with wear on a slow time scale",
-        "history": f"computed by run-study of {own} from the study in the attribute study",
-        "study": format_study(study),
-        "versions": ", ".join([f"Python {platform.python_version()}", *(f"{k} {v}" for k, v in versions.items())]),
-        "scene_sha256": facts.digest,
-    }

@@ -31,7 +31,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
             if not os.access(target, os.W_OK):
                 raise wrong("give a file that may be written: this one is write-protected")
             if any(source.exists() and target.samefile(source) for source in inputs):
-                raise wrong("give another file: this one is read by the run")
+                raise wrong(f"give another file with {option}: this one is read by the run")
         if parts_folder(target).exists() and not parts_folder(target).is_dir():
             raise wrong(f"give another name: {parts_folder(target).name}, which the run needs, is a file")
         trial = partial_path(target)

@@ -18,6 +18,7 @@ from studyrunner.scene import SceneFacts
 from studyrunner.scene_variables import loop_numbers
 from studyrunner.study import AUTO, Study
 from studyrunner.tasks import TaskPlan
+from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE
 
 
@@ -53,7 +54,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
         ("assumed", _assumed(study, plan)),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
-    return "\n".join(f"{label:<10} {text}" for label, text in rows)
+    return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
 
 
 def _assumed(study: Study, plan: TaskPlan) -> str:

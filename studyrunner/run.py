@@ -25,7 +25,7 @@ from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
 from studyrunner.records import record_type
 from studyrunner.results import MarchResult, StartResult
-from studyrunner.scene import describe_scene
+from studyrunner.scene import describe_scene, scene_to_keep
 from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
 from studyrunner.store import Store, StoreInUseError
@@ -97,6 +97,7 @@ def run_study(
     if "natural_frequency" in study.outputs.variables:
         progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
+    kept_scene = scene_to_keep(study, model)
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind, fresh=fresh)
     with contextlib.closing(store):
@@ -113,7 +114,7 @@ def run_study(
             from studyrunner.gather import gather
 
             store.flush()
-            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene))
+            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene, kept_scene))
 
         try:
             job = Job(model, study.friction_coefficient, store.folder)

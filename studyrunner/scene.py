@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from studies.scene_error import SceneError
 from studies.scenes import build_scene
-from studyrunner.scene_variables import check_outputs
+from studyrunner.scene_errors import scene_errors
+from studyrunner.scene_variables import build_mesh, check_outputs
 from studyrunner.study import AUTO, Study
-from studyrunner.user_error import UserError, Verbatim
+from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -59,25 +60,59 @@ def build_study_scene(study: Study) -> ReducedModel:
 def _build(study: Study) -> ReducedModel:
     given = max(study.given_harmonics, default=1)
     built = max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
-    place, prefix = (str(study.scene_path), "") if study.scene.is_file else (study.source, "scene.")
-    try:
-        if not study.scene.is_file:
-            return build_scene(study.scene.model, study.scene.parameters, built)
+    scene = study.scene
+    # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
+    with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
+        if scene.path is None:
+            return _build_bundled(study, built)
         # h5py is loaded for scene files only: the bundled scenes do without it.
         from studies.scene_file import read_scene
 
-        return read_scene(study.scene_path, given)
-    except SceneError as error:
-        raise UserError(place, prefix + error.key, Verbatim(error.value), error.remedy) from None
-    except OSError as error:
-        raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None
+        return read_scene(scene.path, given, scene.group)
+
+
+def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:
+    try:
+        return build_scene(study.scene.model, study.scene.parameters, n_harmonics)
+    except SceneError:
+        raise
+    except (ArithmeticError, ValueError, MemoryError) as error:
+        # what a parameter alone does not show: LinAlgError is a ValueError, too
+        raise SceneError(
+            "model", f"{study.scene.model} cannot be built: {error}", "give parameters of a possible structure"
+        ) from None
 
 
 def write_study_scene(study: Study, path: Path) -> None:
     """Writes the scene of a study as a scene file, whole or not at all. Raises UserError where the scene is wrong."""
     from studies.scene_file import write_scene
 
-    write_scene(build_study_scene(study), path)
+    model = build_study_scene(study)
+    with scene_errors(study.source, study.scene.path):
+        mesh = build_mesh(study)
+    try:
+        write_scene(model, path, mesh)
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror or error}"
+        raise UserError("command line", "--write-scene", str(path), remedy) from None
+
+
+@dataclass(frozen=True)
+class KeptScene:
+    """What a result file keeps of a scene file: its attributes, and its datasets by name with groups."""
+
+    attributes: Mapping[str, int]
+    datasets: tuple[tuple[str, NDArray[np.generic]], ...]
+
+
+def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
+    """The whole content of a scene file; None of a bundled scene, which its parameters give again."""
+    if study.scene.path is None:
+        return None
+    from studies.scene_layout import scene_attributes, scene_datasets
+
+    with scene_errors(study.source, study.scene.path):
+        return KeptScene(scene_attributes(model), tuple(scene_datasets(model, build_mesh(study))))
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

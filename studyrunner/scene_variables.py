@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,10 +16,11 @@ from studies.scenes import scene_answer, scene_frequencies, scene_has, scene_mes
 from studies.stuck_modes import stuck_frequencies
 from studyrunner.study import Study
 from studyrunner.user_error import UserError, Verbatim
-from studyrunner.variables import COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
+from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+    from studies.scene_answers import SurfaceMesh
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,12 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
     if size > _LARGEST_HISTORY:
         remedy = f"give fewer pairs or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         raise UserError(study.source, "outputs.loops", list(loops), remedy)
+    sizes = {"cycle": len(study.cycles_kept), "contact": n_contact, "response": len(model.response_names)}
+    # the variables of the certificate are there whether they are asked for or not
+    size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in ASKED.values())
+    if size > _LARGEST_HISTORY:
+        remedy = f"give fewer: one point would take {1e-9 * size:.1f} GB"
+        raise UserError(study.source, "slow_time.outputs", len(study.cycles_kept), remedy)
     if "natural_frequency" in study.outputs.variables and not _has_frequencies(study):
         with _user_errors(study):
             stuck_frequencies(model)
@@ -87,11 +95,26 @@ def _user_errors(study: Study) -> Iterator[None]:
 
 def _has_frequencies(study: Study) -> bool:
     """Whether the scene knows more natural frequencies than those of its reduced model."""
-    return not study.scene.is_file and scene_has(study.scene.model, "natural_frequencies")
+    return study.scene.path is None and scene_has(study.scene.model, "natural_frequencies")
+
+
+def build_mesh(study: Study) -> SurfaceMesh | None:
+    """Mesh of the study's scene, None where it has none. Raises SceneError."""
+    scene = study.scene
+    if "mesh" not in scene.offers:
+        return None
+    if scene.path is None:
+        return scene_mesh(scene.model, scene.parameters)
+    # h5py is loaded for scene files only
+    from studies.scene_file import read_mesh
+
+    return read_mesh(scene.path, scene.group)
 
 
 def _mesh(study: Study, _: ReducedModel) -> Iterator[SceneVariable]:
-    mesh = scene_mesh(study.scene.model, study.scene.parameters)
+    mesh = build_mesh(study)
+    if mesh is None:
+        raise SceneError("variables", "mesh", "leave it out: the scene has none")
     values: dict[str, NDArray[np.generic]] = {
         **{f"mesh_{axis}": mesh.nodes[:, column] for column, axis in enumerate("xyz")},
         "mesh_quad": mesh.quads.astype(np.int32),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -10,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
-from studies.scenes import scene_has
+from studyrunner.archive import Archived
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
     axis_of,
@@ -32,11 +33,17 @@ AUTO: Final = "auto"
 SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 
-_read_harmonics = number_or(AUTO, whole_number(1))
-_read_samples = number_or(AUTO, whole_number(4))
+_MOST_HARMONICS, _MOST_SAMPLES = 1000, 100_000
+_MOST_OUTPUTS = 1_000_000
+_MOST_POINTS = 1_000_000
+_MOST_PAIRS = 1_000_000
+
+_read_harmonics = number_or(AUTO, whole_number(1, _MOST_HARMONICS))
+_read_samples = number_or(AUTO, whole_number(4, _MOST_SAMPLES))
 _read_scheme = one_of("implicit", "explicit", "adaptive")
 
-_OF_THE_SCENE = {"mesh": "describe_mesh", "exact": "exact_answer"}
+DEFAULT: Final = "default"
+"""In a list of variables: those that cost little, which is what a study without such a list asks for."""
 
 PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
 NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
@@ -63,7 +70,7 @@ def _read_text(value: object) -> str:
 
 def _read_outputs(value: object) -> int | tuple[float, ...]:
     if not isinstance(value, list | tuple):
-        return whole_number(1)(value)
+        return whole_number(1, _MOST_OUTPUTS)(value)
     counts = tuple(read_not_negative(item) for item in value)
     if not counts or any(later <= earlier for earlier, later in pairwise(counts)):
         raise WrongValueError(value, "give a number of outputs or an ascending list of cycle counts")
@@ -74,22 +81,24 @@ def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
     known = (*ASKED, *SCENE, *KEPT)
+    seen: list[str] = []
     for name in value:
-        if name not in known:
-            raise WrongValueError(name, f"give names out of {', '.join(known)}")
-        if list(value).count(name) > 1:
+        if name in seen or (name == DEFAULT and list(value).count(DEFAULT) > 1):
             raise WrongValueError(name, "give every name once")
+        if name not in known:
+            raise WrongValueError(name, f'give "{DEFAULT}" or names out of {", ".join(known)}')
+        seen.append(name)
     return tuple(name for name in (*ASKED, *SCENE) if name in value)
 
 
 def _read_loops(value: object) -> tuple[int, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of contact indices")
-    pairs = tuple(whole_number(0)(item) for item in value)
-    for pair in pairs:
-        if pairs.count(pair) > 1:
+    pairs = sorted(whole_number(0, _MOST_PAIRS)(item) for item in value)
+    for pair, other in pairwise(pairs):
+        if pair == other:
             raise WrongValueError(pair, "give every contact index once")
-    return tuple(sorted(pairs))
+    return tuple(pairs)
 
 
 class Section(BaseModel):
@@ -184,28 +193,22 @@ class SceneSection(Section):
     """[scene]: which model, and the parameters that this model knows.
 
     parameters: checked object of the class that the scene names, with at least `friction_coefficient`.
+    path: the file that the scene stands in, None where it is a bundled one. group: where in that file, empty where it
+    is a scene file. offers: names in `outputs.variables` of what this scene can tell and not all can.
     """
 
     model: Annotated[str, BeforeValidator(_read_text)]
     parameters: SerializeAsAny[BaseModel]
-
-    @property
-    def is_file(self) -> bool:
-        """Whether the model is a scene file rather than a bundled scene."""
-        return names_file(self.model)
-
-    @property
-    def tells(self) -> tuple[str, ...]:
-        """Names in `outputs.variables` of what a bundled scene tells at little cost."""
-        if self.is_file:
-            return ()
-        return tuple(name for name, function in _OF_THE_SCENE.items() if scene_has(self.model, function))
+    path: Path | None = Field(None, exclude=True)
+    group: str = Field("", exclude=True)
+    offers: tuple[str, ...] = Field((), exclude=True)
 
 
 class Study(Section):
     """A whole study.
 
     source: the file that it was read from, as the user named it. folder: the one that this file stands in.
+    archived: what the file says of the result that it holds, None where it is a study file.
     """
 
     study: StudySection
@@ -216,24 +219,39 @@ class Study(Section):
     outputs: OutputsSection = OutputsSection()
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
+    archived: Archived | None = Field(None, exclude=True)
 
     @model_validator(mode="before")
     @classmethod
     def _fill_variables(cls, table: object) -> object:
-        """All that cost little, unless the study names them: those of every point, and those that its scene has."""
+        """All that cost little, unless the study names others: those of every point, and the mesh if there is one."""
         if not isinstance(table, dict) or not isinstance(scene := table.get("scene"), SceneSection):
             return table
         outputs = table.get("outputs", {})
-        if not isinstance(outputs, dict) or "variables" in outputs:
+        if not isinstance(outputs, dict):
             return table
-        return {**table, "outputs": {**outputs, "variables": [*ASKED, *scene.tells]}}
+        names = outputs.get("variables", [DEFAULT])
+        if not isinstance(names, list) or names.count(DEFAULT) != 1:
+            return table
+        cheap = [*ASKED, *(name for name in scene.offers if name == "mesh")]
+        filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
+        return {**table, "outputs": {**outputs, "variables": filled}}
 
     @model_validator(mode="after")
     def _check_variables(self) -> Study:
-        for name in _OF_THE_SCENE:
-            if name in self.outputs.variables and name not in self.scene.tells:
+        for name in ("mesh", "exact"):
+            if name in self.outputs.variables and name not in self.scene.offers:
                 remedy = f"leave it out: the scene {self.scene.model} has none"
                 raise WrongValueError(name, remedy, "outputs.variables")
+        return self
+
+    @model_validator(mode="after")
+    def _check_points(self) -> Study:
+        n_points = math.prod(len(values) for values in self.dimensions.values())
+        if n_points > _MOST_POINTS:
+            longest = max(self.dimensions, key=lambda name: len(self.dimensions[name]))
+            remedy = f"give fewer values: there are {n_points:.3g} points, and a study has at most {_MOST_POINTS}"
+            raise WrongValueError(len(self.dimensions[longest]), remedy, f"axes.{longest}")
         return self
 
     @model_validator(mode="after")
@@ -258,15 +276,10 @@ class Study(Section):
         return self
 
     @property
-    def scene_path(self) -> Path:
-        """Path of the scene file; only where the scene is one."""
-        return self.folder / self.scene.model
-
-    @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
         study_file = self.folder / Path(self.source).name
-        return (study_file, self.scene_path) if self.scene.is_file else (study_file,)
+        return (study_file,) if self.scene.path is None else (study_file, self.scene.path)
 
     @property
     def friction_coefficient(self) -> float:

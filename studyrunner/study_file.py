@@ -5,45 +5,52 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from studies.scene_error import SceneError
-from studies.scenes import scene_parameters
+from studies.scenes import scene_has, scene_parameters
+from studies.vetting import is_hdf5, vet_scene
+from studyrunner.archive import SCENE_GROUP, Archived, read_archived
+from studyrunner.scene_errors import scene_errors
 from studyrunner.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file
+from studyrunner.toml_text import read_toml, read_toml_file
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 
 Checked = TypeVar("Checked", bound=BaseModel)
 Table = dict[str, object]
 
+_OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
-_SECTIONS = tuple(name for name in Study.model_fields if name not in ("source", "folder"))
+_SECTIONS = tuple(name for name in Study.model_fields if name not in ("source", "folder", "archived"))
 
 
 def read_study(argument: str, overrides: Sequence[str] = ()) -> Study:
-    """The study that `argument` names: a path of a TOML file or the name of a bundled study.
+    """The study that `argument` names: a path of a TOML file or of a result file, or the name of a bundled study.
 
     overrides: texts KEY=VALUE; KEY is dotted, VALUE is TOML or a bare word.
     Raises UserError.
     """
     path = _study_path(argument)
+    archived = None
     try:
-        table: Table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(argument, "the file", None, f"give valid TOML: {error}") from None
-    except UnicodeDecodeError:
-        raise UserError(argument, "the file", None, "give a text file in UTF-8") from None
+        if is_hdf5(path):
+            archived = read_archived(path, argument)
+            table = read_toml(archived.study.encode(), argument)
+            archived = replace(archived, model=str(_section(table, "scene").get("model")))
+        else:
+            table = read_toml_file(path, argument)
     except OSError as error:
         raise UserError(argument, "the file", None, f"give a file that can be read: {error.strerror}") from None
     for text in overrides:
         _override(table, text)
-    return check_study(table, argument, path.parent)
+    return check_study(table, argument, path, archived)
 
 
 def bundled_studies() -> tuple[str, ...]:
@@ -52,10 +59,11 @@ def bundled_studies() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in files if file.suffix == ".toml"))
 
 
-def check_study(table: Mapping[str, object], source: str, folder: Path) -> Study:
+def check_study(table: Mapping[str, object], source: str, path: Path, archived: Archived | None = None) -> Study:
     """The study in a table as TOML has it, every default filled in.
 
-    source: the file as the user named it. folder: where relative paths start. Raises UserError.
+    source: the file as the user named it. path: where it is; relative paths start in its folder. archived: what it says
+    of the result that it holds. Raises UserError.
     """
     sections = dict(table)
     for name, section in sections.items():
@@ -70,10 +78,10 @@ def check_study(table: Mapping[str, object], source: str, folder: Path) -> Study
     if twice:
         value = _section(table, "solver")[twice[0]]
         raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
-    sections["scene"] = _check_scene(_section(table, "scene"), source, folder)
+    sections["scene"] = _check_scene(_section(table, "scene"), source, path, archived)
     moved = _move_solver_axes(sections)
     try:
-        return _check(Study, {**sections, "source": source, "folder": folder}, source, "")
+        return _check(Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, "")
     except UserError as error:
         if error.key in moved:
             raise UserError(error.place, moved[error.key], error.value, error.remedy) from None
@@ -132,8 +140,8 @@ def _override(table: Table, text: str) -> None:
 
 def _override_value(key: str, text: str) -> object:
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        parsed = read_toml(f"value = {text}".encode(), "")
+    except UserError:
         if _BARE_WORD.fullmatch(text):
             return text
         raise UserError("command line", f"--set {key}", text, "give a TOML value or a bare word") from None
@@ -165,22 +173,44 @@ def _move_solver_axes(sections: Table) -> dict[str, str]:
     return moved
 
 
-def _check_scene(table: Table, source: str, folder: Path) -> SceneSection:
+def _check_scene(table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:
     parameters = dict(table)
     model = parameters.pop("model", None)
     if model is None:
         raise UserError(source, "scene.model", None, "missing: give a bundled scene or the path of a scene file")
     if not isinstance(model, str):
         raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
-    kind: type[BaseModel] = SceneFileParameters
-    if not names_file(model):
+    if names_file(model):
+        found = _find_scene(model, source, path, archived)
+        return SceneSection(model=model, parameters=_check(SceneFileParameters, parameters, source, "scene"), **found)
+    try:
+        kind = scene_parameters(model)
+        offers = tuple(name for name, function in _OFFERED.items() if scene_has(model, function))
+    except SceneError as error:
+        raise UserError(source, "scene.model", model, error.remedy) from None
+    return SceneSection(model=model, parameters=_check(kind, parameters, source, "scene"), offers=offers)
+
+
+def _find_scene(model: str, source: str, path: Path, archived: Archived | None) -> dict[str, Any]:
+    """Where the scene of a scene file stands and what it offers, once it is known that it can be read at all."""
+    from studies.scene_file import has_mesh
+
+    if archived is not None and archived.holds_scene and model == archived.model:
+        scene_path, group = path, SCENE_GROUP
+    else:
+        scene_path, group = path.parent / model, ""
         try:
-            kind = scene_parameters(model)
-        except SceneError as error:
-            raise UserError(source, "scene.model", model, error.remedy) from None
-    elif not (folder / model).is_file():
-        raise UserError(source, "scene.model", model, "there is no such file: give a path relative to the study file")
-    return SceneSection(model=model, parameters=_check(kind, parameters, source, "scene"))
+            exists = scene_path.is_file()
+        except (OSError, ValueError):
+            exists = False
+        if not exists:
+            remedy = "there is no such file: give a path relative to the study file"
+            raise UserError(source, "scene.model", model, remedy)
+    with scene_errors(source, scene_path):
+        if not group:
+            vet_scene(scene_path)
+        offers = ("mesh",) if has_mesh(scene_path, group) else ()
+    return {"path": scene_path, "group": group, "offers": offers}
 
 
 def _check(kind: type[Checked], table: Mapping[str, object], source: str, prefix: str) -> Checked:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_LONGEST_VALUE = 80
+_LONGEST_VALUE, _LONGEST_KEY, _LONGEST_REMEDY = 80, 120, 600
 
 
 class UserError(Exception):
@@ -23,8 +23,10 @@ class UserError(Exception):
 
     def __str__(self) -> str:
         """The line that the user reads."""
-        shown = self.key if self.value is None else f"{self.key} = {show_value(self.value)}"
-        return " ".join(f"{self.place}: {shown}: {self.remedy}".split())
+        key = _cut(show_text(self.key), _LONGEST_KEY)
+        shown = key if self.value is None else f"{key} = {show_value(self.value)}"
+        remedy = _cut(show_text(self.remedy), _LONGEST_REMEDY)
+        return " ".join(f"{show_text(self.place)}: {shown}: {remedy}".split())
 
 
 class StorageError(Exception):
@@ -36,8 +38,8 @@ class StorageError(Exception):
     def __init__(self, path: Path, error: Exception) -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         super().__init__(
-            f"{path}: {reason}: make room there or give another result file with -o; what was computed is kept, and the"
-            " same command goes on from it"
+            f"{show_text(str(path))}: {show_text(reason)}: make room there or give another result file with -o;"
+            " what was computed is kept, and the same command goes on from it"
         )
 
 
@@ -61,10 +63,27 @@ class WrongValueError(ValueError):
 
 def show_value(value: object) -> str:
     """`value` as it would stand in a TOML file, on one line and cut where it is long."""
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    try:
+        text = str(value).lower() if isinstance(value, bool) else repr(value)
+    except (ValueError, RecursionError):
+        # whole numbers of more digits than Python writes
+        text = "too long to be shown"
     if isinstance(value, Verbatim):
         text = str(value)
     elif isinstance(value, str):
         text = '"' + value + '"'
-    text = " ".join(text.split())
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+    return _cut(show_text(" ".join(text.split())), _LONGEST_VALUE)
+
+
+def show_text(text: str) -> str:
+    """`text` with everything escaped that a terminal would obey instead of showing it, but for line ends."""
+    return "".join(
+        letter
+        if letter.isprintable() or letter in "\n\t"
+        else letter.encode("unicode_escape", "backslashreplace").decode()
+        for letter in text
+    )
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 3] + "..."

@@ -11,7 +11,8 @@ from studyrunner.user_error import WrongValueError
 T = TypeVar("T")
 
 _RANGE_KEYS = ("start", "stop", "num")
-_LARGEST_AXIS = 1_000_000
+LONGEST_AXIS = 100_000
+"""Values of an axis: the effective study, which lists them, is to be read again."""
 
 
 def read_number(value: object) -> float:
@@ -58,13 +59,15 @@ def read_fraction(value: object) -> float:
     return number
 
 
-def whole_number(smallest: int) -> Callable[[object], int]:
-    """Check for a whole number of at least `smallest`; 5.0 and 1e4 are whole numbers, too."""
+def whole_number(smallest: int, largest: int) -> Callable[[object], int]:
+    """Check for a whole number from `smallest` to `largest`; 5.0 and 1e4 are whole numbers, too."""
 
     def read(value: object) -> int:
         number = read_number(value)
         if number != math.floor(number) or number < smallest:
             raise WrongValueError(value, f"give a whole number of at least {smallest}")
+        if number > largest:
+            raise WrongValueError(value, f"give a whole number of at most {largest}")
         return int(number)
 
     return read
@@ -122,9 +125,7 @@ def _read_range(table: dict[str, object]) -> list[float]:
     if sorted(table) != sorted(_RANGE_KEYS):
         raise WrongValueError(table, "give a number, a list or {start, stop, num}")
     start, stop = read_number(table["start"]), read_number(table["stop"])
-    num = whole_number(1)(table["num"])
-    if num > _LARGEST_AXIS:
-        raise WrongValueError(table["num"], f"give num of at most {_LARGEST_AXIS}")
+    num = whole_number(1, LONGEST_AXIS)(table["num"])
     if num == 1:
         return [start]
     width = (stop - start) / (num - 1)

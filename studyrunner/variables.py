@@ -10,7 +10,7 @@ class Variable:
     """One variable of the result: its dimensions after the axes, its unit and what it means.
 
     dtype: of numpy. Floating numbers are NaN where a point failed, whole ones 0. flags: what the values 0, 1, ... mean,
-    one word each. content: what ACDD calls its type.
+    one word each. content: what ACDD calls its type. comment: what a reader would ask next.
     """
 
     dimensions: tuple[str, ...]
@@ -19,6 +19,7 @@ class Variable:
     dtype: str = "float64"
     flags: tuple[str, ...] = ()
     content: str = "modelResult"
+    comment: str = ""
 
     @property
     def is_text(self) -> bool:
@@ -27,29 +28,109 @@ class Variable:
 
 
 ASKED = {
-    "worn_volume": Variable(("cycle",), "m3", "worn volume, sum over contact pairs of depth times area"),
-    "wear_rate": Variable(("cycle",), "m3 per cycle", "volume worn in a cycle"),
-    "wear_depth": Variable(("cycle", "contact"), "m", "wear depth"),
-    "mean_pressure": Variable(("cycle", "contact"), "Pa", "contact pressure, mean over a period"),
-    "response_amplitude": Variable(("cycle", "response"), "m", "amplitude of the first harmonic of the response"),
-    "response_phase": Variable(("cycle", "response"), "rad", "phase of the first harmonic of the response"),
-    "response_peak": Variable(("cycle", "response"), "m", "largest magnitude of the response over a period"),
-    "slip_range": Variable(("cycle", "contact"), "m", "range of the slip over a period"),
-    "open_fraction": Variable(("cycle", "contact"), "1", "fraction of the period in which the pair is open"),
-    "residual": Variable(("cycle",), "1", "scaled residual of the harmonic balance"),
-    "penetration": Variable(("cycle",), "1", "largest penetration over the largest relative motion"),
-    "tension": Variable(("cycle",), "1", "largest tension over the largest normal force"),
+    "worn_volume": Variable(
+        ("cycle",),
+        "m3",
+        "worn volume, sum over contact pairs of depth times area",
+        comment="Integrated on the slow time scale, Eqs. (21) to (26) of the reference.",
+    ),
+    "wear_rate": Variable(
+        ("cycle",),
+        "m3 per cycle",
+        "volume worn in a cycle",
+        comment="Archard's law, Eq. (2) of the reference: wear_coefficient times normal force times sliding.",
+    ),
+    "wear_depth": Variable(
+        ("cycle", "contact"), "m", "wear depth", comment="Of both surfaces of the pair together; it opens the pair."
+    ),
+    "mean_pressure": Variable(
+        ("cycle", "contact"),
+        "Pa",
+        "contact pressure, mean over a period",
+        comment="Normal contact force over contact_area, positive in compression.",
+    ),
+    "response_amplitude": Variable(
+        ("cycle", "response"),
+        "m",
+        "amplitude of the first harmonic of the response",
+        comment="Magnitude of X where x(t) = Re(X exp(i omega t)) is the first harmonic.",
+    ),
+    "response_phase": Variable(
+        ("cycle", "response"),
+        "rad",
+        "phase of the first harmonic of the response",
+        comment="Angle of X where x(t) = Re(X exp(i omega t)) is the first harmonic; above 0 it leads the excitation.",
+    ),
+    "response_peak": Variable(
+        ("cycle", "response"),
+        "m",
+        "largest magnitude of the response over a period",
+        comment="All harmonics, and the static displacement, together.",
+    ),
+    "slip_range": Variable(
+        ("cycle", "contact"),
+        "m",
+        "range of the slip over a period",
+        comment="Largest distance between two places of the pair in its tangential plane that it slips to.",
+    ),
+    "open_fraction": Variable(
+        ("cycle", "contact"),
+        "1",
+        "fraction of the period in which the pair is open",
+        comment="0 where the pair never opens, 1 where it is never closed.",
+    ),
+    "residual": Variable(
+        ("cycle",),
+        "1",
+        "scaled residual of the harmonic balance",
+        comment="What the solver had to bring below the tolerance of the study.",
+    ),
+    "penetration": Variable(
+        ("cycle",),
+        "1",
+        "largest penetration over the largest relative motion",
+        comment="Of the series of the motion, also between samples.",
+    ),
+    "tension": Variable(
+        ("cycle",),
+        "1",
+        "largest tension over the largest normal force",
+        comment="Part of the certificate: 0 where Signorini's conditions hold.",
+    ),
     "cone_violation": Variable(
-        ("cycle",), "1", "largest excess of a tangential force over its friction limit, over the largest friction limit"
+        ("cycle",),
+        "1",
+        "largest excess of a tangential force over its friction limit, over the largest friction limit",
+        comment="Part of the certificate: 0 where Coulomb's law holds.",
     ),
     "energy_error": Variable(
-        ("cycle",), "1", "imbalance of energy in a period over the work of the excitation, or of the contact if less"
+        ("cycle",),
+        "1",
+        "imbalance of energy in a period over the work of the excitation, or of the contact if less",
+        comment="Work of the excitation less what damping and friction take.",
     ),
-    "response_error": Variable(("cycle",), "1", "estimated relative truncation error of the response"),
-    "wear_rate_error": Variable(("cycle",), "1", "estimated relative truncation error of the wear rate"),
+    "response_error": Variable(
+        ("cycle",),
+        "1",
+        "estimated relative truncation error of the response",
+        comment="Of the first harmonic, by solving again with more of both; NaN where it was not estimated.",
+    ),
+    "wear_rate_error": Variable(
+        ("cycle",),
+        "1",
+        "estimated relative truncation error of the wear rate",
+        comment="By solving again with more harmonics and samples; NaN where it was not estimated.",
+    ),
     "harmonics_used": Variable(("cycle",), "1", "harmonics above the static one in the state", "int32"),
     "samples_used": Variable(("cycle",), "1", "time samples in a period of the state", "int32"),
-    "stable": Variable(("cycle",), "1", "whether the state is stable", "int8", ("unstable", "stable")),
+    "stable": Variable(
+        ("cycle",),
+        "1",
+        "whether the state is stable",
+        "int8",
+        ("unstable", "stable"),
+        comment="Of the periodic state for small disturbances on the fast time scale.",
+    ),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
 
@@ -64,6 +145,7 @@ SCENE: dict[str, dict[str, Variable]] = {
             "nodes of the outer face, anticlockwise from outside",
             "int32",
             content="auxiliaryInformation",
+            comment="Indices along mesh_node.",
         ),
         "mesh_part": Variable(
             ("mesh_quad_index",), "1", "part that the face belongs to", "str", content="auxiliaryInformation"
@@ -71,16 +153,26 @@ SCENE: dict[str, dict[str, Variable]] = {
     },
     "natural_frequency": {
         "natural_frequency": Variable(
-            ("nodal_diameter", "mode"), "Hz", "natural frequency with the joint stuck, without damping"
+            ("nodal_diameter", "mode"),
+            "Hz",
+            "natural frequency with the joint stuck, without damping",
+            comment="NaN where there are fewer modes.",
         ),
     },
     "exact": {
-        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", content="referenceInformation"),
+        "exact_worn_volume": Variable(
+            ("cycle",),
+            "m3",
+            "exact worn volume",
+            content="referenceInformation",
+            comment="NaN where no closed form holds.",
+        ),
         "exact_response_amplitude": Variable(
             ("cycle", "response"),
             "m",
             "exact amplitude of the first harmonic of the response",
             content="referenceInformation",
+            comment="NaN where no closed form holds.",
         ),
     },
 }
@@ -91,9 +183,13 @@ LOOPS = {
         ("cycle", "contact", "phase", "component"),
         "m",
         "relative displacement through a period, positive where it closes",
+        comment="In the frame of the pair; NaN for pairs that outputs.loops does not name.",
     ),
     "loop_force": Variable(
-        ("cycle", "contact", "phase", "component"), "N", "contact force through a period, positive in compression"
+        ("cycle", "contact", "phase", "component"),
+        "N",
+        "contact force through a period, positive in compression",
+        comment="In the frame of the pair; NaN for pairs that outputs.loops does not name.",
     ),
 }
 """Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
@@ -116,20 +212,53 @@ CERTIFICATE = {
 """Those of them that say how right a state is, none of them negative and 0 the best: what a short table calls them."""
 
 KEPT = {
-    "outcome": Variable((), "1", "how the computation of the point ended", "int8"),
-    "jump_cycle": Variable((), "1", "first cycle count at which the branch was lost"),
-    "newton_iterations": Variable((), "1", "Newton iterations of the point, start state included", "int32"),
-    "run_time": Variable((), "s", "CPU time of the computing thread, start state included"),
-    "error_estimate": Variable((), "1", "estimated relative error of the last worn volume"),
+    "outcome": Variable(
+        (),
+        "1",
+        "how the computation of the point ended",
+        "int8",
+        comment="The attribute sentences holds a line for each of the flags.",
+    ),
+    "jump_cycle": Variable((), "1", "first cycle count at which the branch was lost", comment="NaN if never."),
+    "newton_iterations": Variable(
+        (),
+        "1",
+        "Newton iterations of the point, start state included",
+        "int32",
+        comment="Of the march that the point was read from, where points share one.",
+    ),
+    "run_time": Variable(
+        (),
+        "s",
+        "CPU time of the computing thread, start state included",
+        comment="Of the march that the point was read from, where points share one; differs from run to run.",
+    ),
+    "error_estimate": Variable(
+        (),
+        "1",
+        "estimated relative error of the last worn volume",
+        comment="Of the steps, and of harmonics and samples in the wear rates.",
+    ),
     "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
-    "fold_frequency": Variable((), "Hz", "fold at which the sweep left its branch on the way to this frequency"),
-    "step_limit": Variable((), "1", "predicted largest stable step of the explicit scheme at cycle 0, cycles"),
+    "fold_frequency": Variable(
+        (),
+        "Hz",
+        "fold at which the sweep left its branch on the way to this frequency",
+        comment="NaN where there was none since the frequency before.",
+    ),
+    "step_limit": Variable(
+        (),
+        "1",
+        "predicted largest stable step of the explicit scheme at cycle 0, cycles",
+        comment="Infinite where there is none.",
+    ),
     "oscillates": Variable(
         (),
         "1",
         "whether the wear rate oscillates from step to step, as in an unstable explicit scheme",
         "int8",
         ("steady", "oscillating"),
+        comment="Only the explicit scheme is watched.",
     ),
     "message": Variable((), "1", "what an unexpected error said, empty where there was none", "U240"),
 }
@@ -137,26 +266,49 @@ KEPT = {
 
 COORDINATES = {
     "frequency": Variable((), "Hz", "excitation frequency"),
-    "wear_coefficient": Variable((), "1/Pa", "wear coefficient"),
+    "wear_coefficient": Variable(
+        (),
+        "1/Pa",
+        "wear coefficient",
+        comment="Worn volume over normal force times sliding distance, Archard's law, Eq. (2) of the reference.",
+    ),
     "excitation_amplitude": Variable((), "N", "excitation amplitude, factor of the unit harmonic load"),
-    "step": Variable((), "1", "step of the slow time scale, cycles"),
+    "step": Variable((), "1", "step of the slow time scale, cycles", comment="Not used by the adaptive scheme."),
     "scheme": Variable((), "1", "integration scheme of the wear"),
-    "sweep": Variable((), "1", "direction of the sweep whose branch is followed at cycle 0"),
+    "sweep": Variable(
+        (),
+        "1",
+        "direction of the sweep whose branch is followed at cycle 0",
+        comment="up: from low to high frequencies.",
+    ),
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
-    "cycle": Variable((), "1", "number of vibration cycles"),
+    "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
-    "phase": Variable((), "rad", "phase of the excitation"),
+    "phase": Variable(
+        (),
+        "rad",
+        "phase of the excitation",
+        comment="omega t, 0 where the excitation of a real harmonic load has its maximum.",
+    ),
     "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
     "nodal_diameter": Variable((), "1", "nodal diameter"),
     "mode": Variable((), "1", "number of the mode, by frequency"),
-    "contact_x": Variable(("contact",), "m", "position of the contact pair, x"),
-    "contact_y": Variable(("contact",), "m", "position of the contact pair, y"),
-    "contact_z": Variable(("contact",), "m", "position of the contact pair, z"),
-    "contact_area": Variable(("contact",), "m2", "area of the contact pair"),
+    "contact_x": Variable(
+        ("contact",), "m", "position of the contact pair, x", comment="NaN where the scene does not say."
+    ),
+    "contact_y": Variable(
+        ("contact",), "m", "position of the contact pair, y", comment="NaN where the scene does not say."
+    ),
+    "contact_z": Variable(
+        ("contact",), "m", "position of the contact pair, z", comment="NaN where the scene does not say."
+    ),
+    "contact_area": Variable(
+        ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
+    ),
     "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
 }
 """Coordinates, the axes first."""

@@ -329,7 +329,7 @@ def _response_uncertainty(best: Run, volume: float, difference: float) -> float:
     if size == 0.0:
         return difference
     changed = float(np.linalg.norm(best.response[-1] - best.response[before[-1]])) / size
-    return best.response_error + changed / grown * volume
+    return best.response_error + float(changed / grown) * volume
 
 
 def _or_inf(value: float) -> float:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from solver.model import ReducedModel
+from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scene_file import read_scene, write_scene
+from studies.scene_file import read_mesh, read_scene, write_scene
 from tests.studies.scene_models import Change, changed, drop, general_model, linear_model, plain, poke, put, sector
 
 
@@ -162,6 +163,21 @@ WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (attribute("nodal_diameter", 1), "nodal_diameter", "1"),
 ]
 
+WRONG_MESH: list[tuple[Change, str, str]] = [
+    (drop("mesh/y"), "mesh/y", "missing"),
+    (drop("mesh/quad"), "mesh/quad", "missing"),
+    (drop("mesh/part"), "mesh/part", "missing"),
+    (put("mesh/z", np.zeros(5)), "mesh/z", "shape (5,)"),
+    (put("mesh/x", np.zeros((2, 3))), "mesh/x", "shape (2, 3)"),
+    (poke("mesh/x", 1, np.nan), "mesh/x", "not finite"),
+    (put("mesh/quad", np.zeros((2, 3), dtype=int)), "mesh/quad", "shape (2, 3)"),
+    (poke("mesh/quad", (1, 2), 6), "mesh/quad", "6"),
+    (poke("mesh/quad", (0, 0), -1), "mesh/quad", "-1"),
+    (put("mesh/quad", np.full((2, 4), 0.5)), "mesh/quad", "0.5"),
+    (put("mesh/part", ["blade"]), "mesh/part", "1 labels"),
+    (put("mesh/node", np.zeros(3)), "mesh/node", "unknown dataset"),
+]
+
 WRONG_SECTOR: list[tuple[Change, str, str]] = [
     (not_hermitian, "nd/2/stiffness", "not Hermitian"),
     (drop("nd/2/mass"), "nd/2/mass", "missing"),
@@ -200,6 +216,20 @@ def test_a_wrong_file_is_named_by_its_dataset(
     assert caught.value.key == key
     assert value in caught.value.value
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("change", "key", "value"), WRONG_MESH)
+def test_a_wrong_mesh_is_named_by_its_dataset(tmp_path: Path, change: Change, key: str, value: str) -> None:
+    path = tmp_path / "scene.h5"
+    nodes = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]])
+    mesh = SurfaceMesh(nodes, np.array([[0, 1, 2, 3], [1, 4, 5, 2]]), ("blade", "disk"))
+    write_scene(plain(), path, mesh)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with pytest.raises(SceneError) as caught:
+        read_mesh(path)
+    assert caught.value.key == key
+    assert value in caught.value.value
 
 
 def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path: Path) -> None:

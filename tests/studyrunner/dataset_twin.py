@@ -69,11 +69,14 @@ def build_dataset(
             "long_name": entry.long_name,
             "coverage_content_type": content,
         }
+        if entry.comment:
+            dataset[name].attrs["comment"] = entry.comment
         if entry.flags:
             dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
             dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
         if name in asked and not entry.dtype.startswith("float"):
-            dataset[name].attrs["comment"] = "0 where the point failed, see outcome"
+            failed = "0 where the point failed, see outcome."
+            dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)

@@ -40,18 +40,30 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables
-    assert study.outputs.variables == (*ASKED, "exact")
+    assert study.outputs.variables == tuple(ASKED)
     assert study.outputs.loops == ()
 
 
 @pytest.mark.parametrize(
-    ("name", "of_scene"), [("dovetail", ("mesh",)), ("sdof_slider", ("exact",)), ("two_masses", ()), ("extremes", None)]
+    ("name", "of_scene"), [("dovetail", ("mesh",)), ("sdof_slider", ()), ("two_masses", ()), ("extremes", None)]
 )
 def test_by_default_the_scene_tells_what_costs_little(name: str, of_scene: tuple[str, ...] | None) -> None:
     study = read_study(name)
     if of_scene is not None:
         assert study.outputs.variables == (*ASKED, *of_scene)
     assert "natural_frequency" not in study.outputs.variables
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "found"),
+    [
+        ("dovetail", "['default']", (*ASKED, "mesh")),
+        ("dovetail", "['natural_frequency', 'default']", (*ASKED, "mesh", "natural_frequency")),
+        ("sdof_slider", "['default', 'exact', 'worn_volume']", (*ASKED, "exact")),
+    ],
+)
+def test_one_word_stands_for_the_default_variables(name: str, asked: str, found: tuple[str, ...]) -> None:
+    assert read_study(name, [f"outputs.variables={asked}"]).outputs.variables == found
 
 
 def test_names_are_kept_in_the_order_of_the_file(tmp_path: Path) -> None:

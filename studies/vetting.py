@@ -1,0 +1,120 @@
+"""Reads a file of unknown origin in a process of its own before this one does.
+
+The HDF5 library was not made for bytes that somebody has tampered with: some crash it, some keep it busy for ever, and
+a few unpack to any size. The process that finds out has a limit of its time and memory, and its end is the answer.
+`python -m studies.vetting PATH GROUP ATTRIBUTE ...` is that process: exit status 0 for a file that can be read, 3 with
+a reason for one that can not, anything else where it came to a bad end.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from studies.scene_error import SceneError
+
+LARGEST_MEMORY = 2**30
+"""Bytes of address space for reading a file."""
+
+LONGEST = 2
+"""CPU seconds for reading a file, and one more for every _BYTES_A_SECOND that it has."""
+
+_BYTES_A_SECOND = 2**25
+_REFUSED = 3
+_WHOLE_RESULT = "*"
+_WALL_SECONDS = 60.0  # a folder on the network may be slow, which is no fault of the file
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file begins as HDF5 files do. Raises OSError where it cannot be read."""
+    with path.open("rb") as file:
+        return file.read(8) == b"\x89HDF\r\n\x1a\n"
+
+
+def vet_scene(path: Path, group: str = "", attributes: Sequence[str] = ()) -> None:
+    """Raises SceneError where reading all of a scene fails, would crash, or take too long or too much memory.
+
+    attributes: of the file, which are read as well. Whether the numbers make a model is not found here.
+    """
+    _vet(path, [group, *attributes])
+
+
+def vet_result(path: Path) -> None:
+    """Raises SceneError where a result file would do harm to a program that opens it."""
+    _vet(path, [_WHOLE_RESULT])
+
+
+def _vet(path: Path, what: Sequence[str]) -> None:
+    status, said = run_reader([str(path.absolute()), *what])
+    if status == _REFUSED:
+        raise SceneError(*json.loads(said))
+    if status != 0:
+        found = f"{path.name} is damaged: it cannot be read in a reasonable time and {LARGEST_MEMORY / 2**30:g} GiB"
+        raise SceneError("model", found, "write the scene file again")
+
+
+def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
+    """Exit status of the process that reads a file, and what it says."""
+    # one thread: the memory that others set aside counts, too
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    environment["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
+    command = [sys.executable, "-m", __name__, *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=_WALL_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return -1, ""
+    return done.returncode, done.stdout.decode()
+
+
+def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
+    """Reads all of a scene; exit status and what is said. This process can do nothing else afterwards."""
+    # loaded before there are limits, as it is no fault of the file how long that takes
+    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute, read_result_through
+    from studies.scene_file import read_through
+
+    seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
+    if path.is_file():
+        seconds += min(path.stat().st_size, 2**30) // _BYTES_A_SECOND
+    for what, limit in (
+        (resource.RLIMIT_AS, LARGEST_MEMORY),
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        _, most = resource.getrlimit(what)
+        resource.setrlimit(what, (limit if most == resource.RLIM_INFINITY else min(limit, most), most))
+    try:
+        if group == _WHOLE_RESULT:
+            read_result_through(path)
+            return 0, ""
+        if attributes:
+            with open_hdf5(path, LARGEST_RESULT) as file:
+                for name in attributes:
+                    read_attribute(file, name)
+                if group not in file:
+                    return 0, ""
+        read_through(path, group)
+    except SceneError as error:
+        return _REFUSED, json.dumps([error.key, error.value, error.remedy])
+    except OSError:
+        # a missing file, which the process that asks finds as well
+        return 0, ""
+    return 0, ""
+
+
+if __name__ == "__main__":
+    exit_status, answer = read_within_limits(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
+    print(answer, flush=True)
+    sys.exit(exit_status)

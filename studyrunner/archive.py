@@ -1,0 +1,98 @@
+"""What a result file says of how it was made: enough to run its study again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.scene_error import SceneError
+from studies.vetting import is_hdf5, vet_result, vet_scene
+from studyrunner.user_error import UserError, Verbatim
+
+if TYPE_CHECKING:
+    import h5py
+
+SCENE_GROUP = "scene"
+"""Group of a result file that holds what a scene file holds, where the study was one of a scene file."""
+
+_ATTRIBUTES = ("study", "scene_sha256", "solver_digest", "versions")
+
+
+@dataclass(frozen=True)
+class Archived:
+    """Attributes of a result file.
+
+    study: the whole effective study, TOML. scene_sha256, solver_digest: of the scene and the solver that computed it,
+    versions: of the packages; empty where the file does not say. holds_scene: whether its scene stands in SCENE_GROUP.
+    model: what the study calls its scene.
+    """
+
+    study: str
+    scene_sha256: str
+    solver_digest: str
+    versions: str
+    holds_scene: bool
+    model: str = ""
+
+    def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
+        """A line for each reason why a result that is computed now may have other numbers."""
+        lines = []
+        if self.scene_sha256 != scene_sha256:
+            lines.append(
+                f"its scene_sha256 is {self.scene_sha256[:12] or 'missing'}, that of the scene built now"
+                f" {scene_sha256[:12]}: another scene, whose results differ"
+            )
+        if self.solver_digest != solver_digest:
+            lines.append(
+                f"computed by another solver ({self.versions or 'unknown'}; now {versions}): numbers may differ"
+            )
+        return tuple(lines)
+
+
+def read_archived(path: Path, name: str) -> Archived:
+    """Reads the attributes of a result file, called `name` by the user. Raises UserError."""
+    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5
+
+    try:
+        vet_scene(path, SCENE_GROUP, _ATTRIBUTES)
+        with open_hdf5(path, LARGEST_RESULT) as file:
+            found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
+            if not found["study"]:
+                remedy = "missing: give a study file (TOML) or a result file of run-study"
+                raise UserError(name, "the attribute study", None, remedy)
+            return Archived(**found, holds_scene=SCENE_GROUP in file)
+    except SceneError as error:
+        where = "the file" if error.key == "model" else f"the attribute {error.key}"
+        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
+        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+
+
+def check_result_file(path: Path, name: str) -> None:
+    """Raises UserError where a result file, called `name` by the user, is none or could do harm to who opens it."""
+    try:
+        if not path.is_file() or not is_hdf5(path):
+            raise UserError(name, "the file", None, "give a result file of run-study")
+        vet_result(path)
+    except SceneError as error:
+        where = "the file" if error.key == "model" else error.key
+        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
+    except OSError as error:
+        reason = error.strerror or "unreadable"
+        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+
+
+def _read_text(file: h5py.File, name: str) -> str:
+    from studies.hdf5_guard import read_attribute
+
+    value = read_attribute(file, name)
+    if value is None:
+        return ""
+    text = value.item()
+    if isinstance(text, bytes):
+        text = text.decode("utf-8")
+    if not isinstance(text, str):
+        raise SceneError(name, str(value), "give a text")
+    return text

@@ -1,0 +1,47 @@
+"""Text of a study file -> table, also where the text was made to do harm."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from studyrunner.user_error import UserError
+
+_LARGEST = 5 * 2**19  # bytes: an axis of 100 000 values
+
+_MOST_PARTS = 32
+_PART = r"(?>[A-Za-z0-9_-]+|\"[^\"\n]*\"|'[^'\n]*')"
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?>[ \t]*\.[ \t]*{_PART}){{{_MOST_PARTS},}}")
+
+
+def read_toml_file(path: Path, source: str) -> dict[str, object]:
+    """The table in a file. Raises UserError, and OSError where it cannot be read."""
+    with path.open("rb") as file:
+        return read_toml(file.read(_LARGEST + 1), source)
+
+
+def read_toml(content: bytes, source: str) -> dict[str, object]:
+    """The table. source: the file as the user named it. Raises UserError."""
+
+    def wrong(remedy: str) -> UserError:
+        return UserError(source, "the file", None, remedy)
+
+    if len(content) > _LARGEST:
+        raise wrong(f"give a study file of at most {_LARGEST / 2**20:g} MiB; an axis can be {{start, stop, num}}")
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise wrong("give a text file in UTF-8") from None
+    # the parser takes a time that grows with the third power of the parts of a dotted key
+    if _LONG_KEY.search(text):
+        raise wrong(f"give no key of more than {_MOST_PARTS} parts with dots between them")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise wrong(f"give valid TOML: {error}") from None
+    except RecursionError:
+        raise wrong("give valid TOML: this is nested too deeply") from None
+    except ValueError as error:
+        # whole numbers of thousands of digits, dates that no calendar has
+        raise wrong(f"give valid TOML: {error}") from None

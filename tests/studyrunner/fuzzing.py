@@ -1,0 +1,162 @@
+"""Mutations of valid study, scene and result files, and what `run-study --plan` makes of them, one after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import resource
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from studies import vetting
+from studyrunner import cli
+
+NASTY = (
+    *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
+    *(
+        "{}",
+        "[[1]]",
+        '""',
+        '"auto"',
+        '"\\u001b[2J"',
+        "'../../x'",
+        "[1, 'a']",
+        "{start = 1, stop = 2, num = 1e9}",
+        '"default"',
+    ),
+    *(
+        "[" * 60 + "]" * 60,
+        "1e9",
+        '"adaptive"',
+        "[nan]",
+        "{start = nan, stop = 2, num = 3}",
+        "\x00",
+        "]",
+        "=",
+        '"',
+        "#",
+    ),
+)
+SECONDS = 5.0
+
+
+def mutate_text(text: str, chance: random.Random) -> bytes:
+    """A study file with values, lines or bytes changed."""
+    lines = text.splitlines()
+    for _ in range(chance.choice([1, 1, 2, 4])):
+        place = chance.randrange(len(lines))
+        way = chance.randrange(6)
+        if way <= 2 and "=" in lines[place]:
+            lines[place] = lines[place].split("=")[0] + "= " + chance.choice(NASTY)
+        elif way == 3:
+            lines.insert(place, chance.choice(lines))
+        elif way == 4 and len(lines) > 1:
+            del lines[place]
+        else:
+            at = chance.randrange(len(lines[place]) + 1)
+            lines[place] = lines[place][:at] + chance.choice(NASTY) + lines[place][at:]
+    content = bytearray("\n".join(lines).encode("utf-8", "surrogatepass"))
+    if chance.random() < 0.2:
+        content = bytearray(mutate_bytes(bytes(content), chance))
+    return bytes(content)
+
+
+def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
+    """A file with bits, bytes or blocks changed, most of them where the structure of the file stands; or cut."""
+    changed = bytearray(content)
+    last = len(changed) if chance.random() < 0.3 else min(len(changed), 8000)
+    way = chance.randrange(6)
+    if way == 0:
+        return bytes(changed[: chance.randrange(len(changed))])
+    for _ in range(chance.choice([1, 1, 2, 8, 64])):
+        place = chance.randrange(max(1, last))
+        length = chance.choice([1, 2, 4, 8, 64])
+        if way == 1:
+            changed[place : place + 1] = bytes([changed[place] ^ (1 << chance.randrange(8))]) if changed else b""
+        elif way == 2:
+            changed[place : place + length] = chance.randbytes(length)
+        elif way == 3:
+            changed[place : place + length] = b"\xff" * length
+        elif way == 4:
+            changed[place : place + length] = bytes(length)
+        else:
+            source = chance.randrange(max(1, last))
+            changed[place : place + length] = changed[source : source + length]
+    return bytes(changed)
+
+
+def read_in_a_fork(arguments: Sequence[str]) -> tuple[int, str]:
+    """Stands for a new process that reads the file: the same function, in a copy of this process."""
+    receive, send = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(receive)
+        with contextlib.suppress(BaseException):
+            # what this process has already is none of the file's
+            vetting.LARGEST_MEMORY += address_space()
+            status, said = vetting.read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
+            os.write(send, said.encode())
+            os._exit(status)
+        os._exit(99)
+    os.close(send)
+    with os.fdopen(receive, "rb") as pipe:
+        said = pipe.read().decode()
+    _, status, used = os.wait4(child, 0)
+    read_in_a_fork.largest = max(read_in_a_fork.largest, used.ru_maxrss)  # type: ignore[attr-defined]
+    return os.waitstatus_to_exitcode(status), said
+
+
+read_in_a_fork.largest = 0  # type: ignore[attr-defined]
+
+
+def address_space() -> int:
+    """Bytes that this process has set aside."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    return pages * resource.getpagesize()
+
+
+def run(folder: Path, seed: int, n_files: int) -> dict[str, object]:
+    """Statuses and the worst of all files; what is wrong with one is in `wrong`."""
+    os.chdir(folder)
+    vetting.run_reader = read_in_a_fork
+    vetting.LONGEST = 1
+    study, scene, result = (Path(name).read_bytes() for name in ("study", "scene.h5", "result"))
+    statuses: dict[str, int] = {}
+    wrong: list[str] = []
+    slowest = 0.0
+    began_with = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    resource.setrlimit(resource.RLIMIT_AS, (address_space() + 2**31,) * 2)
+    for number in range(n_files):
+        chance = random.Random(f"{seed} {number}")
+        kind = chance.choices(["text", "scene", "result"], [0.4, 0.4, 0.2])[0]
+        Path("study").write_bytes(mutate_text(study.decode(), chance) if kind == "text" else study)
+        Path("scene.h5").write_bytes(mutate_bytes(scene, chance) if kind == "scene" else scene)
+        Path("result").write_bytes(mutate_bytes(result, chance) if kind == "result" else result)
+        Path("number").write_text(f"{kind} {seed} {number}", encoding="ascii")
+        said, printed = io.StringIO(), io.StringIO()
+        signal.alarm(60)  # the end of this process: no hang gets past it
+        began = time.monotonic()
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
+            status = cli.main(["result" if kind == "result" else "study", "--plan"])
+        seconds = time.monotonic() - began
+        signal.alarm(0)
+        slowest = max(slowest, seconds)
+        lines = said.getvalue().splitlines()
+        right = (status == 2 and len(lines) == 1 and lines[0].isprintable()) or (status == 0 and not lines)
+        if not right or seconds > SECONDS or len("".join(lines)) > 2000 or "\x1b" in printed.getvalue():
+            wrong.append(f"{kind} {seed} {number}: status {status}, {seconds:.1f} s: {said.getvalue()[-1500:]}")
+        key = f"{kind} {status}"
+        statuses[key] = statuses.get(key, 0) + 1
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began_with
+    largest = max(grown, read_in_a_fork.largest)  # type: ignore[attr-defined]
+    return {"statuses": statuses, "wrong": wrong, "slowest": slowest, "largest": 1024 * largest}
+
+
+if __name__ == "__main__":
+    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))))

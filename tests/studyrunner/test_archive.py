@@ -1,0 +1,250 @@
+"""A scene file and a result file are each enough to have the same result again."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies.scene_file import read_mesh, read_scene
+from studyrunner import provenance
+from studyrunner.cli import main
+from studyrunner.scene import build_study_scene, describe_scene
+from studyrunner.study_file import read_study
+
+COARSE = ("scene.mesh=1", "axes.frequency=[211.5, 212.0]", "axes.scheme=implicit", "slow_time.cycles=500")
+OUTPUTS = ("slow_time.outputs=2", "outputs.loops=[3]", "solver.rtol=0.1")
+WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20", "solver.harmonics=2", "solver.samples=64")
+
+STUDY = """
+[study]
+name = "dovetail"
+title = "Fretting wear of a dovetail root around the first bending mode"
+[scene]
+model = "files/scene.h5"
+friction_coefficient = 0.5
+[axes]
+frequency = [211.5, 212.0]
+excitation_amplitude = 0.5
+[slow_time]
+cycles = 500
+outputs = 2
+[solver]
+rtol = 0.1
+[outputs]
+loops = [3]
+"""
+SLIDER = """
+[study]
+name = "slider"
+[scene]
+model = "slider.h5"
+friction_coefficient = 0.5
+[axes]
+frequency = [150, 160]
+excitation_amplitude = 10
+[slow_time]
+cycles = 2000
+outputs = 3
+[outputs]
+variables = ["default", "outcome"]
+"""
+
+
+def options(*overrides: str) -> list[str]:
+    return [part for text in overrides for part in ("--set", text)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def slider(folder: Path) -> Path:
+    """A result of a scene file, which is gone."""
+    assert main(["sdof_slider", "--write-scene", "slider.h5"]) == 0
+    Path("slider.toml").write_text(SLIDER, encoding="utf-8")
+    assert main(["slider.toml"]) == 0
+    Path("slider.h5").unlink()
+    Path("slider.toml").unlink()
+    return folder / "slider.nc"
+
+
+def contents(path: Path | str) -> xr.Dataset:
+    """All that the file holds but what differs from run to run."""
+    with xr.open_dataset(path) as result:
+        return result.load().drop_vars("run_time")
+
+
+def groups(path: Path | str) -> dict[str, object]:
+    """What the group of the scene holds."""
+    found: dict[str, object] = {}
+    with h5py.File(path) as file:
+
+        def note(name: str, item: h5py.HLObject) -> None:
+            if isinstance(item, h5py.Dataset) and not item.is_scale:
+                found[name] = item[()].tolist()
+
+        file["scene"].visititems(note)
+        found |= {
+            name: file["scene"].attrs[name] for name in ("n_sectors", "nodal_diameter") if name in file["scene"].attrs
+        }
+    return found
+
+
+@pytest.mark.parametrize("wave", [(), WAVE], ids=["standing", "travelling"])
+def test_a_written_scene_gives_the_same_result(wave: tuple[str, ...], folder: Path) -> None:
+    assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS, *wave)]) == 0
+    Path("files").mkdir()
+    assert main(["dovetail", "--write-scene", "files/scene.h5", *options(*COARSE, *OUTPUTS, *wave)]) == 0
+    Path("s.toml").write_text(STUDY, encoding="utf-8")
+    solver = [text for text in wave if text.startswith("solver")]
+    assert main(["s.toml", "-o", "file.nc", *options(*solver)]) == 0
+    own, file = contents("own.nc"), contents("file.nc")
+    assert "mesh_quad" in own
+    assert list(own.variables) == list(file.variables)
+    differing = {name for name in own.attrs if own.attrs[name] != file.attrs[name]}
+    assert differing == {"study", "id"}
+    own.attrs = file.attrs = {}
+    xr.testing.assert_identical(own, file)
+
+    # and the result alone is enough, wherever it is
+    Path("elsewhere").mkdir()
+    shutil.move("file.nc", "elsewhere/moved.nc")
+    shutil.rmtree("files")
+    assert main(["elsewhere/moved.nc", "-o", "again.nc"]) == 0
+    xr.testing.assert_identical(contents("again.nc"), contents("elsewhere/moved.nc"))
+    assert groups("again.nc") == groups("elsewhere/moved.nc")
+
+
+def test_mesh_and_model_come_back_bit_by_bit(folder: Path) -> None:
+    study = read_study("dovetail", (*COARSE, *WAVE))
+    assert main(["dovetail", "--write-scene", "wave.h5", *options(*COARSE, *WAVE)]) == 0
+    mesh = read_mesh("wave.h5")
+    assert mesh is not None
+    Path("wave.toml").write_text(STUDY.replace("files/scene.h5", "wave.h5"), encoding="utf-8")
+    assert main(["wave.toml", "-o", "out.nc", *options("slow_time.cycles=0", "slow_time.outputs=1", *WAVE[2:])]) == 0
+    kept = read_mesh("out.nc", "scene")
+    assert kept is not None
+    assert np.array_equal(kept.nodes, mesh.nodes)
+    assert np.array_equal(kept.quads, mesh.quads)
+    assert kept.parts == mesh.parts
+    digest = describe_scene(build_study_scene(study)).digest
+    assert describe_scene(read_scene("wave.h5", 2)).digest == digest
+    assert describe_scene(read_scene("out.nc", 2, "scene")).digest == digest
+    with netCDF4.Dataset("out.nc") as file:
+        assert file["scene/nd/3/stiffness"].datatype.name == "complex"
+        assert file["scene/contact/dofs"].long_name.startswith("closing")
+    assert main(["out.nc", "--write-scene", "again.h5"]) == 0
+    assert describe_scene(read_scene("again.h5", 2)).digest == digest
+    assert main(["out.nc", "--plan"]) == 0
+
+
+def test_a_result_of_a_bundled_scene_runs_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also one that holds what is asked for by name, sweeps and axes of words."""
+    overrides = ("axes.frequency=[160, 150]", "axes.harmonics=['auto', 3]", "outputs.variables=['default', 'exact']")
+    assert main(["sdof_slider", *options(*overrides, "slow_time.outputs=3", "slow_time.cycles=2000")]) == 0
+    Path("sdof_slider.nc").rename("renamed.nc")
+    shutil.rmtree("sdof_slider.nc.parts")
+    capsys.readouterr()
+    assert main(["renamed.nc"]) == 0
+    assert "scene_sha256" not in capsys.readouterr().err
+    xr.testing.assert_identical(contents("sdof_slider.nc"), contents("renamed.nc"))
+
+
+def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = slider.read_bytes()
+    capsys.readouterr()
+    for arguments in (["slider.nc"], ["slider.nc", "-o", "./slider.nc"], ["slider.nc", "--write-scene", "slider.nc"]):
+        assert main(arguments) == 2
+        said = capsys.readouterr().err
+        option = "--write-scene" if "--write-scene" in arguments else "-o"
+        assert f"give another file with {option}: this one is read by the run" in said
+        assert len(said.splitlines()) == 1
+    Path("link.nc").symlink_to("slider.nc")
+    assert main(["link.nc", "-o", "slider.nc"]) == 2
+    assert slider.read_bytes() == before
+
+
+def test_a_result_of_an_interrupted_run_is_enough(slider: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It opens like any other, holds its scene, and its study runs to its end."""
+    from studyrunner import run
+
+    def ended(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run, "run_tasks", ended)
+        patch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
+        assert main(["slider.nc", "-o", "part.nc"]) == 130
+    assert set(np.ravel(contents("part.nc").outcome)) != {0}
+    assert main(["part.nc", "-o", "whole.nc"]) == 0
+    xr.testing.assert_identical(contents("whole.nc"), contents(slider))
+
+
+def test_overrides_apply_and_another_scene_takes_the_place_of_the_kept_one(
+    slider: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["slider.nc", "-o", "less.nc", *options("axes.frequency=150", "slow_time.cycles=0")]) == 0
+    assert contents("less.nc").sizes["frequency"] == 1
+    assert main(["slider.nc", "-o", "x.nc", *options("scene.model=none.h5")]) == 2
+    assert "scene.model" in capsys.readouterr().err
+    assert main(["sdof_slider", "--write-scene", "heavy.h5", *options("scene.mass=0.11")]) == 0
+    capsys.readouterr()
+    assert main(["slider.nc", "-o", "heavy.nc", *options("scene.model=heavy.h5")]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
+    assert len(warned) == 1
+    assert "slider.nc: its scene_sha256 is" in warned[0]
+    assert contents("heavy.nc").attrs["scene_sha256"] != contents(slider).attrs["scene_sha256"]
+
+
+def change(path: Path, work: Callable[[h5py.File], None]) -> None:
+    with h5py.File(path, "r+") as file:
+        work(file)
+
+
+def test_another_scene_or_solver_is_said_and_computed_all_the_same(
+    slider: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capsys.readouterr()
+    monkeypatch.setattr(provenance, "solver_digest", lambda: "another")
+    change(slider, lambda file: file["scene/contact/area"].write_direct(np.array([1.1e-4])))
+    assert main(["slider.nc", "-o", "again.nc"]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
+    assert len(warned) == 2
+    assert "another scene" in warned[0]
+    assert "computed by another solver" in warned[1]
+    assert "fretwear" in warned[1]
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (lambda file: file.attrs.__delitem__("study"), ("the attribute study", "missing")),
+        (lambda file: file.attrs.__setitem__("study", np.arange(3)), ("the attribute study", "shape (3,)")),
+        (lambda file: file.attrs.__setitem__("study", 3), ("the attribute study", "= 3")),
+        (lambda file: file.attrs.__setitem__("study", "[study"), ("slider.nc", "valid TOML")),
+        (lambda file: file.attrs.__setitem__("study", np.bytes_(b"\xff")), ("slider.nc", "damaged")),
+        (lambda file: file.__delitem__("scene"), ("scene.model", "no such file")),
+        (lambda file: file.__delitem__("scene/mass"), ("slider.nc: mass", "missing")),
+        (lambda file: file["scene"].__setitem__("mass2", h5py.ExternalLink("o.h5", "/")), ("mass2", "a link")),
+    ],
+)
+def test_a_result_file_that_was_tampered_with(
+    work: Callable[[h5py.File], None], words: tuple[str, ...], slider: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(slider, work)
+    capsys.readouterr()
+    assert main(["slider.nc", "-o", "x.nc"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    for word in words:
+        assert word in said[0]

@@ -1,0 +1,199 @@
+"""Files that were made to do harm: exit status 2 within 5 s and 1 GB, one line, nothing that a terminal obeys."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+
+from studyrunner.archive import check_result_file
+from studyrunner.cli import main
+from studyrunner.user_error import UserError
+from tests.studyrunner.hostile_files import ALLOWED, SCENES, STUDY, TEXTS, change_scene, sparse_file
+
+VALUES_ONLY = {
+    *("huge matrix", "huge vector", "bomb of zeros", "bomb within the limit", "huge extent without storage"),
+    *("64 bit overflow", "name with a path", "label with an escape sequence", "not a number", "infinite", "denormal"),
+    *("next to the largest", "denormal area", "wrong byte order", "huge number of sectors", "long texts", "objects"),
+    *(
+        "infinite number of sectors",
+        "attribute of text",
+        "attribute of another type",
+        "fixed texts",
+        "circle of groups",
+    ),
+    "name with an escape sequence",
+}
+"""No harm to a program that reads parts of what it knows."""
+
+SECONDS = 5.0
+LARGEST = 2**30
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The slider's scene file, and a result of it."""
+    folder = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
+        Path("study").write_text(STUDY, encoding="utf-8")
+        assert main(["study"]) == 0
+        shutil.rmtree("s.nc.parts")
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name in ("scene.h5", "study", "s.nc"):
+        shutil.copy(made / name, tmp_path / name)
+    (tmp_path / "s.nc").rename(tmp_path / "result")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], allowed: bool = False) -> str:
+    """The one line; time and memory of this process and those that it started are within the limits."""
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.monotonic()
+    status = main(arguments)
+    seconds = time.monotonic() - began
+    captured = capsys.readouterr()
+    grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own)
+    assert status == 2 or (allowed and status == 0)
+    assert seconds < SECONDS
+    assert grown < LARGEST
+    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < LARGEST
+    if status == 0:
+        return ""
+    assert captured.out == ""
+    said = captured.err.splitlines()
+    assert len(said) == 1
+    assert said[0].isprintable()
+    assert len(said[0]) < 2000
+    assert said[0].startswith("run-study: ")
+    return said[0]
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_scene_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change_scene(folder / "scene.h5", SCENES[case])
+    line = refused(["study", "--plan"], capsys, allowed=case in ALLOWED)
+    assert not line or line.startswith("run-study: scene.h5: ")
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_scene_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change_scene(folder / "scene.h5", SCENES[case])
+    with h5py.File("result", "r+") as result, h5py.File("scene.h5") as scene:
+        del result["scene"]
+        try:
+            scene.copy(scene["/"], result, "scene", expand_soft=False, expand_external=False)
+        except (OSError, RuntimeError, ValueError, KeyError):
+            pytest.skip("the library cannot copy it")
+    line = refused(["result", "--plan"], capsys, allowed=case in ALLOWED)
+    assert not line or "result: " in line
+
+
+@pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
+def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
+    check_result_file(folder / "result", "result")
+    change_scene(folder / "scene.h5", SCENES[case])
+    with h5py.File("result", "r+") as result, h5py.File("scene.h5") as scene:
+        del result["scene"]
+        try:
+            scene.copy(scene["/"], result, "scene", expand_soft=False, expand_external=False)
+        except (OSError, RuntimeError, ValueError, KeyError):
+            pytest.skip("the library cannot copy it")
+    with pytest.raises(UserError) as caught:
+        check_result_file(folder / "result", "result")
+    assert str(caught.value).startswith("result: ")
+    assert str(caught.value).isprintable()
+
+
+def test_damaged_result_file_for_those_who_open_it(folder: Path) -> None:
+    content = (folder / "result").read_bytes()
+    for share in (0.0, 0.01, 0.5, 0.99):
+        (folder / "result").write_bytes(content[: int(share * len(content))])
+        with pytest.raises(UserError, match="give a result file"):
+            check_result_file(folder / "result", "result")
+
+
+@pytest.mark.parametrize("case", TEXTS)
+def test_study_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "study").write_bytes(TEXTS[case])
+    refused(["study", "--plan"], capsys)
+
+
+@pytest.mark.parametrize(
+    "case",
+    # an attribute is no text with a null; where the scene stands in the result, its name does not matter
+    [case for case in TEXTS if len(TEXTS[case]) < 2**22 and b"\0" not in TEXTS[case] and not case.startswith("scene ")],
+)
+def test_study_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File("result", "r+", libver="latest") as result:
+        del result.attrs["study"]
+        result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))
+    (folder / "scene.h5").unlink()
+    refused(["result", "--plan"], capsys)
+
+
+@pytest.mark.parametrize("place", ["study", "scene.h5", "result"])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.999])
+def test_truncated(place: str, share: float, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = (folder / place).read_bytes()
+    (folder / place).write_bytes(content[: int(share * len(content))])
+    # the last byte of a study is the end of its last line
+    refused(["result" if place == "result" else "study", "--plan"], capsys, allowed=place == "study" and share > 0.99)
+
+
+@pytest.mark.parametrize("place", ["study", "scene.h5"])
+def test_sparse_terabyte(place: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sparse_file(folder / place)
+    refused(["study", "--plan"], capsys)
+
+
+@pytest.mark.parametrize("place", ["study", "scene.h5"])
+def test_files_that_are_none(place: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder / place
+    path.unlink()
+    os.mkfifo(path)
+    refused(["study", "--plan"], capsys)
+    path.unlink()
+    path.symlink_to(place)
+    refused(["study", "--plan"], capsys)
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    refused(["study", "--plan"], capsys)
+
+
+def test_names_of_files_do_not_reach_the_terminal_raw(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = "\x1b[2J\udcff.toml"
+    Path(name).write_text("[study", encoding="utf-8")
+    assert r"\x1b[2J\udcff.toml" in refused([name], capsys)
+    assert r"\x1b[2J" in refused(["study", "--set", "axes.step=\x1b[2J"], capsys)
+    (folder / "study").write_text(STUDY.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
+    assert main(["study", "--plan"]) == 0
+    assert "\x1b" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("case", ["inflating chunk", "bomb within the limit", "next to the largest"])
+def test_the_command_alone(case: str, folder: Path) -> None:
+    """Time and memory of the whole command, its start included."""
+    change_scene(folder / "scene.h5", SCENES[case])
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "studyrunner.cli", "study", "--plan"], capture_output=True, text=True, check=False
+    )
+    assert time.monotonic() - began < 2 * SECONDS
+    assert done.returncode == 2 or case in ALLOWED
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) == (done.returncode == 2)
+    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < LARGEST

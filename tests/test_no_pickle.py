@@ -1,0 +1,56 @@
+"""No file on disk is a pickle: nothing that reads or writes one can run what somebody has put into it."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted(path for package in ("solver", "studies", "studyrunner") for path in (ROOT / package).rglob("*.py"))
+UNSAFE = {"pickle", "_pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+"""Modules whose files can run code when they are read."""
+
+READERS = {"load", "save", "savez", "savez_compressed"}
+"""Of numpy: they write objects as pickles unless they are told not to."""
+
+
+def offences(source: str) -> list[str]:
+    """What a module does that has to do with pickles."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found.extend(alias.name for alias in node.names if alias.name.split(".")[0] in UNSAFE)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in UNSAFE:
+            found.append(f"from {node.module}")
+        elif isinstance(node, ast.Call):
+            allowed = [key.value for key in node.keywords if key.arg == "allow_pickle"]
+            if any(not (isinstance(value, ast.Constant) and value.value is False) for value in allowed):
+                found.append(f"allow_pickle in line {node.lineno}")
+            name = node.func
+            of_numpy = isinstance(name, ast.Attribute) and isinstance(name.value, ast.Name) and name.value.id == "np"
+            if of_numpy and isinstance(name, ast.Attribute) and name.attr in READERS and not allowed:
+                found.append(f"np.{name.attr} in line {node.lineno}")
+    return found
+
+
+def test_no_module_reads_or_writes_pickles() -> None:
+    assert len(SOURCES) > 80
+    assert {str(path): found for path in SOURCES if (found := offences(path.read_text(encoding="utf-8")))} == {}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import pickle",
+        "from pickle import loads",
+        "import a, shelve",
+        "np.load(f, allow_pickle=True)",
+        "np.load(f, allow_pickle=x)",
+        "np.load(f)",
+        "def f():\n    np.savez(a, b=1)",
+    ],
+)
+def test_the_search_finds_them(source: str) -> None:
+    assert len(offences(source)) == 1
