@@ -93,11 +93,13 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
+        from studyrunner.archive import check_result_file
         from studyrunner.progress import count, format_seconds
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page import write_page
         from studyrunner.report.result import open_result
 
+        check_result_file(options.result, str(options.result))
         result = open_result(options.result)
         with result.dataset:
             _make_folder(options.folder)
