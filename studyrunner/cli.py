@@ -228,7 +228,7 @@ def _show_plan(study: Study) -> int:
     from studyrunner.tasks import build_tasks
 
     facts = describe_scene(build_study_scene(study))
-    print(format_plan(study, facts, build_tasks(study, facts.n_displacements)))
+    _say(format_plan(study, facts, build_tasks(study, facts.n_displacements)))
     return CONVERGED
 
 
@@ -238,7 +238,7 @@ def _write_scene(study: Study, path: Path) -> int:
 
     target = check_output("--write-scene", path, study.files)
     write_study_scene(study, target)
-    print(f"{path}: the scene of study {study.study.name}")
+    _say(f"{path}: the scene of study {study.study.name}")
     return CONVERGED
 
 
@@ -267,14 +267,22 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
             f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
         ) from None
     failed = summary.n_points - summary.n_converged
-    print(
+    _say(
         f"{path}: {summary.n_points} points, {summary.n_converged} computed to tolerance, {failed} failed,"
-        f" {format_seconds(progress.seconds)}"
+        f" {format_seconds(progress.seconds)}",
+        *(f"  {line}" for line in summary.failures),
+        summary.certificates,
     )
-    for line in summary.failures:
-        print(f"  {line}")
-    print(summary.certificates)
     return SOME_FAILED if failed else CONVERGED
+
+
+def _say(*lines: str) -> None:
+    """Prints lines. A reader that has gone, as `head` does, is no failure of a run whose results are saved."""
+    try:
+        print(*lines, sep="\n", flush=True)
+    except BrokenPipeError:
+        # what is left in the buffer would be tried once more at the end of the process
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":
