@@ -14,7 +14,15 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks, wait_for_message
+from studyrunner.ranks import (
+    POLL_SECONDS,
+    LauncherError,
+    Ranks,
+    job_size,
+    launcher_rank,
+    start_ranks,
+    wait_for_message,
+)
 from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
@@ -27,6 +35,8 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 _SECONDS_FOR_RANK_0 = 60.0
 """Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
+
+_SECONDS_FOR_A_LINE = 2.0
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -130,6 +140,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LauncherError as error:
         if launcher_rank() == 0:
             print(f"run-study: launcher: {error}", file=sys.stderr)
+        else:
+            # a launcher may pass nothing on once another process has failed
+            time.sleep(_SECONDS_FOR_A_LINE)
         return BAD_INPUT
     except KeyboardInterrupt:
         if launcher_rank() == 0:
@@ -190,6 +203,9 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
     try:
+        from studyrunner.roll_call import call_roll
+
+        call_roll(ranks)
         options = parse_options(arguments)
         from studyrunner.study_file import read_study
 
@@ -203,6 +219,9 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     except UserError as error:
         print(f"run-study: {error}", file=sys.stderr)
         status = BAD_INPUT
+    except LauncherError as error:
+        print(f"run-study: launcher: {error}", file=sys.stderr)
+        status = BAD_INPUT
     except SystemExit:
         status = CONVERGED
     for rank in range(1, ranks.size):
@@ -212,6 +231,9 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
+    from studyrunner.roll_call import answer_roll_call
+
+    answer_roll_call(ranks)
     job = wait_for_message(ranks)
     if job is not None:
         from studyrunner.run import Job, work_on_job
@@ -258,6 +280,8 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:
         with progress:
+            if ranks.size == 1 and (announced := job_size()) > 1:
+                progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
             summary = run_study(
                 ranks, study, model, target, progress, fresh=options.fresh, retry_failed=options.retry_failed
             )

@@ -81,6 +81,11 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
         path.unlink(missing_ok=True)
 
 
+def forget_crash(folder: Path, rank: int) -> None:
+    """Removes what a rank that is lost has left."""
+    (folder / f"rank-{rank}.crash").unlink(missing_ok=True)
+
+
 def read_crashes(folder: Path) -> tuple[Crash, ...]:
     """The crashes of an earlier run."""
     return tuple(found for path in crash_files(folder) if (found := _read_crash(path)) is not None)

@@ -176,6 +176,20 @@ class Dispatcher(Generic[Task]):
                 self._free[rank] = None
         return task
 
+    def lose(self, rank: int) -> list[tuple[Task, int]]:
+        """A rank is there no more. The tasks that it had, and how many results each still had to give."""
+        lost = []
+        for number in self._held_by[rank]:
+            held = self._held.pop(number)
+            if held.lesson is not None:
+                self._costs.forget(held.lesson)
+            lost.append((held.task, held.n_left))
+        self._held_by[rank] = []
+        self._free.pop(rank, None)
+        self._ahead.pop(rank, None)
+        self._n_ranks -= 1
+        return lost
+
     def task(self, number: int) -> Task:
         """A task that is computed."""
         return self._held[number].task

@@ -80,6 +80,15 @@ class Ledger:
             if not self.is_finished(march)
         )
 
+    def renew(self, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+        """A task of this run that is to be done again, with what has come of it."""
+        self.store.flush()
+        resume = self.store.read_progress(self.key(task))
+        if isinstance(task, MarchTask):
+            return replace(task, resume=resume)
+        given = {place for place, key in enumerate(self._starts[task.number]) if self.store.has_start(key)}
+        return replace(task, resume=resume, known=task.known | given)
+
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
         """A start state has come."""
         self.store.add_start(self._starts[branch.number][result.position], result.keep())

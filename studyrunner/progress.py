@@ -51,6 +51,13 @@ class RunProgress:
         else:
             self._show()
 
+    def note(self, happened: str) -> None:
+        """Something that the user has to know; what is done stays the same."""
+        if self._bar is None:
+            print(f"{self._clock()} {happened}", file=sys.stderr, flush=True)
+        else:
+            self._bar.console.print(happened)
+
     def report(self, done_cost: float, total_cost: float, done_points: int, n_points: int) -> None:
         """How far the tasks are, in estimated seconds and in points."""
         self._done_cost, self._total_cost, self._points = done_cost, total_cost, (done_points, n_points)

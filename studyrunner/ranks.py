@@ -8,13 +8,20 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import faulthandler
 import os
+import signal
 import sys
 import time
 import warnings
 from collections.abc import Mapping
 from importlib import metadata
-from typing import Protocol
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn, Protocol
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 POLL_SECONDS = 1e-3
 """How long a rank sleeps between two looks for a message: a blocking receive would keep a core busy."""
@@ -22,8 +29,15 @@ POLL_SECONDS = 1e-3
 _SECONDS_TO_PRINT = 1.0
 _MANY_SENT = 64
 
+_TOLERANT = "OMPI_MCA_mpi_ft_enable"
+"""Set by the launcher of Open MPI where it was told --with-ft ulfm."""
+
+_SECONDS_TO_START = 600.0
+_SECONDS_TO_MISS_RANK_0 = 0.5
+
 _SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
+_JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
 _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _REMEDY = (
     "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
@@ -51,7 +65,11 @@ class Ranks(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of processes."""
+        """Number of processes, those that are lost included."""
+
+    @property
+    def lost(self) -> frozenset[int]:
+        """Processes that have ended before their time, as far as known here. Where that ends all, there are none."""
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
@@ -77,6 +95,7 @@ class Alone:
 
     rank = 0
     size = 1
+    lost: frozenset[int] = frozenset()
 
     def send(self, message: object, rank: int) -> None:
         """There is nobody to send to: a call is a bug."""
@@ -98,6 +117,8 @@ class Alone:
 
 class MpiRanks:
     """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
+
+    lost: frozenset[int] = frozenset()
 
     def __init__(self) -> None:
         import mpi4py
@@ -125,15 +146,16 @@ class MpiRanks:
         """As in Ranks."""
         if len(self._sent) >= self._many:
             # Not at every message: with thousands of ranks as many may be on their way.
-            self._sent = [request for request in self._sent if not request.Test()]
+            self._forget_sent()
             self._many = max(_MANY_SENT, 2 * len(self._sent))
         self._sent.append(self._world.isend(message, dest=rank))
 
     def flush(self) -> None:
         """As in Ranks."""
-        while not self._mpi.Request.Testall(self._sent):
+        self._forget_sent()
+        while self._sent:
             time.sleep(POLL_SECONDS)
-        self._sent = []
+            self._forget_sent()
 
     def receive(self) -> tuple[int, object] | None:
         """As in Ranks."""
@@ -144,7 +166,7 @@ class MpiRanks:
 
     def close(self) -> None:
         """As in Ranks."""
-        self._mpi.Request.Waitall(self._sent)
+        self.flush()
         self._mpi.Finalize()
 
     def abort(self, status: int) -> None:
@@ -153,6 +175,103 @@ class MpiRanks:
         sys.stderr.flush()
         time.sleep(_SECONDS_TO_PRINT)
         self._world.Abort(status)
+
+    def _forget_sent(self) -> None:
+        self._sent = [request for request in self._sent if not self._is_through(request)]
+
+    def _is_through(self, request: MPI.Request) -> bool:
+        return request.Test()
+
+
+class TolerantRanks(MpiRanks):
+    """MPI's world where the end of one process is not that of all: Open MPI 5 under `mpiexec --with-ft ulfm`.
+
+    MPI says that a process is lost where it is asked for messages (ULFM, MPI 5); they are then taken note of, and what
+    goes to them goes nowhere. Without rank 0 there is nobody to go on for: the others end all.
+    """
+
+    def __init__(self) -> None:
+        # The library waits for ever for a process that is lost while it starts, and lets no other thread run.
+        speaks = launcher_rank() == 0
+        patience = _SECONDS_TO_START if speaks else _SECONDS_TO_START + 2.0 * _SECONDS_TO_PRINT
+        with Path(os.devnull).open("w", encoding="utf-8") as nobody:
+            faulthandler.dump_traceback_later(patience, exit=True, file=2 if speaks else nobody)
+            try:
+                super().__init__()
+            finally:
+                faulthandler.cancel_dump_traceback_later()
+        if self.rank > 0:
+            # In the midst of a long task as well, and in the main thread, as all calls of MPI.
+            signal.signal(signal.SIGALRM, self._look_after_rank_0)
+            signal.siginterrupt(signal.SIGALRM, False)
+            signal.setitimer(signal.ITIMER_REAL, _SECONDS_TO_MISS_RANK_0, _SECONDS_TO_MISS_RANK_0)
+
+    def send(self, message: object, rank: int) -> None:
+        """As in Ranks; a message to a process that is lost is as good as sent."""
+        if rank not in self.lost:
+            try:
+                super().send(message, rank)
+            except self._mpi.Exception as error:
+                self._note_lost(error)
+
+    def receive(self) -> tuple[int, object] | None:
+        """As in Ranks."""
+        try:
+            return super().receive()
+        except self._mpi.Exception as error:
+            self._note_lost(error)
+            return None
+
+    def close(self) -> None:
+        """As in Ranks."""
+        # Rank 0 may still write the result. The launcher has no status for its loss, if the others are gone by then.
+        if self.rank == 0:
+            for rank in range(1, self.size):
+                self.send(None, rank)
+        else:
+            wait_for_message(self)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        # MPI_Finalize sometimes waits for ever where a process is lost, of which not all need know. The launcher takes
+        # the exit status from processes that end without it as well.
+        self.flush()
+
+    def _is_through(self, request: MPI.Request) -> bool:
+        try:
+            return request.Test()
+        except self._mpi.Exception as error:
+            self._note_lost(error)
+            return True
+
+    def _look_after_rank_0(self, _number: int, _frame: FrameType | None) -> None:
+        try:
+            self._world.iprobe()
+        except self._mpi.Exception as error:
+            self._note_lost(error)
+
+    def _note_lost(self, error: MPI.Exception) -> None:
+        """Takes note of the processes whose loss an error tells of. Raises any other error."""
+        if error.Get_error_class() not in (self._mpi.ERR_PROC_FAILED, self._mpi.ERR_PROC_FAILED_PENDING):
+            raise error
+        failed = self._world.Get_failed()
+        # Until then every look for a message tells of them again.
+        self._world.Ack_failed(failed.Get_size())
+        numbers = range(failed.Get_size())
+        self.lost |= set(self._mpi.Group.Translate_ranks(failed, numbers, self._world.Get_group()))
+        if 0 in self.lost:
+            self._end_without_rank_0()
+
+    def _end_without_rank_0(self) -> NoReturn:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if any(rank not in self.lost for rank in range(self.rank)):
+            # One speaks for all; the launcher passes nothing on once another one has ended.
+            time.sleep(2.0 * _SECONDS_TO_MISS_RANK_0)
+        else:
+            line = (
+                "run-study: rank 0 is lost, which the others cannot do without: the same command goes on where it was"
+            )
+            print(line, file=sys.stderr, flush=True)
+        # Each by itself: MPI_Abort leaves processes behind here, and its status is not always that of the launcher.
+        os._exit(1)
 
 
 def start_ranks() -> Ranks:
@@ -164,7 +283,7 @@ def start_ranks() -> Ranks:
         return Alone()
     announced = launcher_size()
     try:
-        ranks = MpiRanks()
+        ranks = TolerantRanks() if _survives_losses() else MpiRanks()
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
             return Alone()
@@ -173,6 +292,14 @@ def start_ranks() -> Ranks:
         ranks.close()
         raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
     return ranks
+
+
+def _survives_losses() -> bool:
+    """Whether the launcher lets the others go on when a process is lost, and mpi4py can tell of it."""
+    if os.environ.get(_TOLERANT, "0").lower() not in ("1", "true"):
+        return False
+    version = tuple(int(part) for part in metadata.version("mpi4py").split(".")[:2])
+    return version >= (4, 1)
 
 
 def _load_packaged_library() -> None:
@@ -210,6 +337,11 @@ def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
 def launcher_size(environment: Mapping[str, str] = os.environ) -> int:
     """Number of processes that the launcher says it started, 0 where none says so."""
     return max(_count(environment, name) for name in _SIZES)
+
+
+def job_size(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of processes that a batch system has room for, where no launcher has started them; 0 if unknown."""
+    return 0 if launcher_size(environment) else max(_count(environment, name) for name in _JOBS)
 
 
 def _count(environment: Mapping[str, str], name: str) -> int:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.costs import LearnedCosts
-from studyrunner.crashes import Evaluate, Keep, crash_files, note_tasks, read_crashes
+from studyrunner.crashes import Crash, Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
 from studyrunner.evaluate import (
     CONVERGED,
     CRASHED,
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 
     from solver.model import ReducedModel
     from studyrunner.gather import Gathered
+
+_RANKS_A_TASK = 2
+"""A task that as many ranks were at when they were lost is not given to another one."""
 
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
@@ -203,6 +207,7 @@ class Course:
         self.n_points = ledger.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
         self._ledger = ledger
+        self._n_lost: Counter[str] = Counter()
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
         lines = ledger.plan.marches
@@ -226,6 +231,42 @@ class Course:
             self._ledger.add_history(task, result)
             self.n_points += len(result.points)
         return ()
+
+    def take_back(
+        self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
+    ) -> list[BranchTask | MarchTask]:
+        """What is to be done in place of the tasks of a lost rank, each with the number of results still to be given.
+
+        The rank was at the first of them. crashes: by the key of the task. A task that crashes is not tried again, and
+        neither is one with which several ranks were lost, as it may need more memory than there is.
+        """
+        left: list[BranchTask | MarchTask] = []
+        for task, n_left in lost:
+            self._n_lost[task.key] += task is lost[0][0]
+            again = self._ledger.renew(task)
+            crash = crashes.get(task.key)
+            if crash is None and self._n_lost[task.key] >= _RANKS_A_TASK:
+                position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
+                crash = Crash(task.key, position, f"{_RANKS_A_TASK} ranks were lost while they were at it")
+            if crash is not None:
+                self.n_points += self._ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+            if isinstance(again, BranchTask):
+                if crash is not None and crash.position is not None:
+                    behind = again.order[again.order.index(crash.position) :]
+                    again = replace(again, known=again.known.union(behind))
+                again = replace(again, cost=task.cost * again.n_results / task.n_results)
+                self._left[task.kind] -= task.cost * n_left / task.n_results - again.cost
+                self.n_starts_left -= n_left - again.n_results
+                left += [again] if again.n_results else []
+            elif crash is not None:
+                self._left[task.kind] -= task.cost * n_left / task.n_results
+            else:
+                # it gives all of its histories again
+                n_given = task.n_results - n_left
+                self.n_points -= sum(len(share.points) for share in again.shares[:n_given])
+                self._left[task.kind] += task.cost * n_given / task.n_results
+                left.append(again)
+        return left
 
     def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
         planned = self._ledger.marches_from(branch.number, result.position)
@@ -253,6 +294,13 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
             progress.say("marching through the remaining wear histories")
         return new
 
+    def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
+        had = f", which had {count(len(lost), 'task')}" if lost else ""
+        progress.note(f"rank {rank} is lost{had}: the others go on without it")
+        crashes = {crash.key: crash for crash in read_crashes(ledger.store.folder)}
+        forget_crash(ledger.store.folder, rank)
+        return course.take_back(lost, crashes)
+
     def tick() -> None:
         ledger.store.tick()
         progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
@@ -262,7 +310,7 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
         n_frequencies = count(len(course.branches[0].frequencies), "frequency", "frequencies")
         progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
     progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
-    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep)
+    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back)
     ledger.store.flush()
 
 

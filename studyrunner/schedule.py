@@ -11,7 +11,7 @@ import itertools
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -137,6 +137,15 @@ class _LocalWorker(Generic[Task, Result]):
         self._sent.put(message)
 
 
+TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
+"""What is to be done in place of the tasks of a rank that is lost; the number is that of results still to be given."""
+
+
+def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
+    """Tasks that begin anew on another rank."""
+    return [task for task, _ in lost]
+
+
 def serve_tasks(
     ranks: Ranks,
     tasks: Iterable[Task],
@@ -145,19 +154,21 @@ def serve_tasks(
     costs: LearnedCosts,
     tick: Callable[[], None] = lambda: None,
     keep: Callable[[Task, object], None] = lambda *_: None,
+    take_back: TakeBack[Task] = give_again,
 ) -> None:
     """Rank 0: has all tasks done, its own share by `run`, and hands every result to `take`.
 
     run: gives the results of a task one by one. take: called in the main thread, in the order in which results arrive;
         returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
         second. keep: called with how far a task is; never after its last result. tasks: are taken one by one, as
-        there is use for them.
+        there is use for them. take_back: called with a rank that is lost and the tasks that it had.
     Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
     another rank ends that rank's process.
     """
     dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
     local = _LocalWorker(run, _seconds_to_progress(ranks))
     known = iter(tasks)
+    lost: frozenset[int] = frozenset()
 
     def hand_out() -> None:
         while dispatcher.wants_more and (more := list(itertools.islice(known, _AT_ONCE))):
@@ -168,7 +179,16 @@ def serve_tasks(
             else:
                 ranks.send(assignment, rank)
 
+    def do_without_the_lost() -> None:
+        nonlocal lost
+        new, lost = ranks.lost - lost, ranks.lost
+        for rank in sorted(new):
+            dispatcher.add(take_back(rank, dispatcher.lose(rank)))
+
     def accept(rank: int, message: object) -> None:
+        if rank in lost:
+            # sent before it was lost; its task is done again
+            return
         if isinstance(message, _Progress):
             keep(dispatcher.task(message.number), message.progress)
             return
@@ -181,8 +201,12 @@ def serve_tasks(
         hand_out()
 
     try:
+        do_without_the_lost()
         hand_out()
         while not dispatcher.done:
+            if ranks.lost != lost:
+                do_without_the_lost()
+                hand_out()
             quiet = False
             for _ in range(_LOOKS_A_TICK):
                 received, message = ranks.receive(), local.receive(0.0)

@@ -75,6 +75,11 @@ class BranchTask:
         return tuple(places if self.sweep == "up" else reversed(places))
 
     @property
+    def order_left(self) -> tuple[int, ...]:
+        """Those whose results are asked for."""
+        return tuple(place for place in self.order if place not in self.known)
+
+    @property
     def n_results(self) -> int:
         """Start states that it gives."""
         return len(self.frequencies) - len(self.known)

@@ -201,3 +201,44 @@ def test_forgetting_takes_everything_back() -> None:
     before = costs.correction(kin)
     costs.forget(costs.learn(kin, 2.0, 70.0))
     assert costs.correction(kin) == pytest.approx(before)
+
+
+def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
+    jobs = [Job(str(place % 7), 0.01 if place % 3 else 1.0, 1 + place % 2) for place in range(100)]
+    dispatcher, clock = make(4, *jobs)
+    holds: dict[int, list[int]] = {rank: [] for rank in range(4)}
+    given = dict.fromkeys(range(100), 0)
+    n_done = 0
+    while not dispatcher.done:
+        for rank, number in handed_out(dispatcher):
+            holds[rank].append(number)
+            given.setdefault(number, 0)
+        clock.now += 0.1
+        rank = max(holds, key=lambda rank: len(holds[rank]))
+        number = holds[rank][0]
+        job = dispatcher.deliver(rank, number, 0.01)
+        given[number] += 1
+        if given[number] == job.n_results:
+            holds[rank].pop(0)
+            n_done += 1
+        if n_done in (20, 50) and len(holds) > 2:
+            gone = max(holds)
+            lost = dispatcher.lose(gone)
+            assert [n_left for _, n_left in lost] == [
+                task.n_results - given[number] for number, (task, _) in zip(holds.pop(gone), lost, strict=True)
+            ]
+            dispatcher.add([task for task, _ in lost])
+    assert n_done == 100
+    assert len(holds) == 2
+
+
+def test_what_a_lost_rank_has_taught_by_being_late_is_forgotten() -> None:
+    jobs = [Job("a", 1.0), *[Job("b", 0.9)] * 20]
+    dispatcher, clock = make(1, *jobs)
+    handed_out(dispatcher)
+    costs = dispatcher._costs
+    clock.now += 1000.0 * WATCH_SECONDS
+    dispatcher.watch()
+    assert costs.correction(jobs[0].kin) > 10.0
+    dispatcher.lose(0)
+    assert costs.correction(jobs[0].kin) == 1.0

@@ -5,14 +5,15 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import pytest
 
 from studyrunner.costs import LearnedCosts
+from studyrunner.dispatch import Assignment
 from studyrunner.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
-from studyrunner.schedule import serve_tasks
+from studyrunner.schedule import _Delivery, serve_tasks
 
 
 @dataclass(frozen=True)
@@ -131,3 +132,58 @@ def test_one_process_of_a_launcher_needs_no_mpi(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setenv("PMI_SIZE", "1")
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     assert isinstance(start_ranks(), Alone)
+
+
+class Losing:
+    """Ranks of which the last is lost as soon as it has a task; another one does at once what it gets."""
+
+    rank = 0
+    size = 3
+    lost: frozenset[int] = frozenset()
+
+    def __init__(self) -> None:
+        self._replies: list[tuple[int, object]] = []
+
+    def send(self, message: object, rank: int) -> None:
+        if rank == 2 and isinstance(message, Assignment):
+            # its first result is on its way
+            self._replies.append((2, _Delivery(message.number, "of a lost rank", 0.1)))
+            self.lost = frozenset([2])
+        elif isinstance(message, Assignment):
+            self._replies += [(1, _Delivery(message.number, "done", 0.1))] * message.task.n_results
+
+    def flush(self) -> None: ...
+
+    def receive(self) -> tuple[int, object] | None:
+        return self._replies.pop(0) if self._replies else None
+
+    def close(self) -> None: ...
+
+    def abort(self, status: int) -> None: ...
+
+
+def test_tasks_of_a_lost_rank_are_given_to_others() -> None:
+    """What it has sent is not taken any more, as the task is done again; the rest is as if it had not been there."""
+    taken: list[tuple[str, object]] = []
+    backs: list[tuple[int, list[tuple[str, int]]]] = []
+
+    def take(job: Job, result: object) -> list[Job]:
+        taken.append((job.name, result))
+        return []
+
+    def take_back(rank: int, lost: Sequence[tuple[Job, int]]) -> list[Job]:
+        backs.append((rank, [(job.name, n_left) for job, n_left in lost]))
+        return [Job(f"{job.name} again", job.cost, n_left) for job, n_left in lost]
+
+    def run(job: Job, keep: object) -> Iterator[str]:
+        for _ in range(job.n_results):
+            time.sleep(0.01)
+            yield "done"
+
+    jobs = [Job(name, 1.0, 2) for name in "abcdef"]
+    serve_tasks(Losing(), jobs, run, take, LearnedCosts(), take_back=take_back)
+    ((rank, [(name, n_left)]),) = backs
+    assert (rank, n_left) == (2, 2)
+    assert sorted(taken) == sorted(
+        [(job.name, "done") for job in jobs if job.name != name for _ in range(2)] + [(f"{name} again", "done")] * 2
+    )

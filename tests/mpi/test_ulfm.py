@@ -1,0 +1,161 @@
+"""Open MPI under `mpiexec --with-ft ulfm`: the others finish the study when a rank is killed, all but rank 0."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from studyrunner.evaluate import CRASHED
+from tests.mpi.conftest import OpenMpi
+from tests.mpi.launching import FAKED, ROOT, is_alive, processes_of, results
+
+N_RANKS = 3
+STUDY = [
+    *("sdof_slider", "-o", "out.nc"),
+    *("--set", "axes.frequency={start = 100, stop = 160, num = 13}"),
+    *("--set", "axes.sweep=['up', 'down']"),
+    *("--set", "axes.step=[500, 1000]"),
+    *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
+    *("--set", "axes.scheme=['implicit', 'adaptive']"),
+]
+SECONDS = {"FAKE_SECONDS": "0.06"}
+
+
+@dataclass(frozen=True)
+class Killed:
+    """A run of which a rank was killed. seconds: from then to the end of its last process."""
+
+    status: int
+    said: str
+    seconds: float
+
+
+def run_and_kill(
+    open_mpi: OpenMpi,
+    folder: Path,
+    rank: int | None = None,
+    n_noted: int = 0,
+    n_ranks: int = N_RANKS,
+    study: list[str] = STUDY,
+    faked: dict[str, str] = SECONDS,
+) -> Killed:
+    """A run of which a rank is killed after so many histories; no process outlives it, and it never hangs."""
+    with subprocess.Popen(
+        [*open_mpi.launcher(n_ranks, "--with-ft", "ulfm"), open_mpi.python, FAKED, *study],
+        cwd=folder,
+        env={**os.environ, **open_mpi.environment, **faked, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+    ) as process:
+        others: set[int] = set()
+        try:
+            assert process.stderr is not None
+            first = process.stderr.readline()
+            others = processes_of(process.pid)
+            if rank is not None:
+                (victim,) = [pid for pid in others if rank_of(pid) == rank]
+                while count_noted(folder) < n_noted and process.poll() is None:
+                    time.sleep(1e-3)
+                os.kill(victim, signal.SIGKILL)
+            began = time.monotonic()
+            _, said = process.communicate(timeout=40)
+            while any(map(is_alive, others)):
+                assert time.monotonic() < began + 40.0, "processes outlive their run"
+                time.sleep(0.01)
+            seconds = time.monotonic() - began
+        finally:
+            for pid in (process.pid, *others):
+                if is_alive(pid):
+                    os.kill(pid, signal.SIGKILL)
+    return Killed(process.returncode, first + said, seconds)
+
+
+def count_noted(folder: Path) -> int:
+    """Histories that the ranks have computed."""
+    return sum(len(path.read_text(encoding="ascii").splitlines()) for path in folder.glob("rank*.txt"))
+
+
+def rank_of(pid: int) -> int | None:
+    variables = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    found = [int(text.partition(b"=")[2]) for text in variables if text.startswith(b"OMPI_COMM_WORLD_RANK=")]
+    return found[0] if found else None
+
+
+@pytest.fixture(scope="module")
+def whole(open_mpi: OpenMpi, tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, int]:
+    """The result of a run of which no rank is killed, and the number of its histories."""
+    folder = tmp_path_factory.mktemp("whole")
+    done = run_and_kill(open_mpi, folder)
+    assert done.status == 0, done.said
+    assert "lost" not in done.said
+    return results(folder / "out.nc"), count_noted(folder)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_others_finish_when_a_rank_is_killed(
+    seed: int, open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+) -> None:
+    expected, n_histories = whole
+    drawn = random.Random(seed)
+    rank, n_noted = drawn.randrange(1, N_RANKS), drawn.randrange(n_histories * 4 // 5)
+    done = run_and_kill(open_mpi, tmp_path, rank, n_noted)
+    assert done.status == 0, done.said
+    (line,) = [line for line in done.said.splitlines() if "lost" in line]
+    assert f"rank {rank} is lost, which had " in line
+    assert "Traceback" not in done.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
+
+
+def test_without_rank_0_all_end_and_the_next_run_goes_on(
+    open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+) -> None:
+    expected, n_histories = whole
+    done = run_and_kill(open_mpi, tmp_path, rank=0, n_noted=n_histories // 2)
+    assert done.status == 1
+    assert done.seconds < 5.0
+    assert done.said.count("run-study: rank 0 is lost, which the others cannot do without") == 1
+    assert not (tmp_path / "out.nc").exists()
+    done = run_and_kill(open_mpi, tmp_path)
+    assert done.status == 0, done.said
+    assert "points are there from an earlier run" in done.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
+
+
+def test_a_march_that_crashes_takes_one_rank_with_it(open_mpi: OpenMpi, tmp_path: Path) -> None:
+    """It is not given to the others; the branch, which rank 0 follows, gives the marches to ranks that are free."""
+    study = ["two_masses", "-o", "out.nc", "--set", "axes.frequency=[0.1, 0.11, 0.12]"]
+    done = run_and_kill(open_mpi, tmp_path, n_ranks=4, study=study, faked={"FAKE_CRASH": "abort"})
+    assert done.status == 3, done.said
+    assert done.said.count(" is lost, which had 1 task: ") == 1
+    found = results(tmp_path / "out.nc").squeeze()
+    assert found.outcome.values.tolist() == [0, CRASHED, 0]
+    assert str(found.message.values[1]).startswith("Aborted (run_faked.py, line ")
+
+
+def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi: OpenMpi, tmp_path: Path) -> None:
+    """The library waits for it for ever."""
+    program = (
+        "import os; from studyrunner import ranks; ranks._SECONDS_TO_START = 2.0;"
+        "os.environ['OMPI_COMM_WORLD_RANK'] == '2' and os.kill(os.getpid(), 9); ranks.start_ranks()"
+    )
+    done = subprocess.run(
+        [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, "-c", program],
+        cwd=tmp_path,
+        env={**os.environ, **open_mpi.environment, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        timeout=40,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count(b"Timeout (0:00:02)!") == 1
+    assert b"in start_ranks" in done.stderr
