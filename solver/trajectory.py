@@ -38,7 +38,7 @@ SMALLEST_RESOLUTION = 2.0**-10  # of a step
 JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
 MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
-ROUND_OFF = 1e-9  # of the wear rate if everything slipped all the time: less is no wear
+ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 _CARRIED = (
@@ -259,7 +259,8 @@ class Trajectory:
         rate = self.rate()
         volumes = rate * self.joint.contact.area
         self.rates.add(np.append(volumes, volumes.sum()))
-        motion = self.point.evaluation.displacement_h[:, 1:, 1:]
+        # with the static slip: where all pairs stick the vibration of the joint itself is round-off
+        motion = self.point.evaluation.displacement_h[:, 1:]
         pressed = np.abs(self.point.evaluation.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
         self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
