@@ -21,7 +21,7 @@ REPEATS = 2
 
 def run(n_ranks: int, arguments: list[str], folder: Path) -> float:
     """Wall time of one run, s."""
-    command = [str(MPIEXEC), "-n", str(n_ranks), str(RUN_STUDY), *arguments, "-o", str(folder / "out.nc")]
+    command = [str(MPIEXEC), "-n", str(n_ranks), str(RUN_STUDY), *arguments, "--fresh", "-o", str(folder / "out.nc")]
     started = time.perf_counter()
     subprocess.run(command, check=True, capture_output=True)
     return time.perf_counter() - started
