@@ -94,15 +94,20 @@ def test_scene_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str])
     assert not line or line.startswith("run-study: scene.h5: ")
 
 
-@pytest.mark.parametrize("case", SCENES)
-def test_scene_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    change_scene(folder / "scene.h5", SCENES[case])
+def put_scene_into_result() -> None:
+    """The scene file takes the place of the scene in the result; the test is skipped where it cannot be copied."""
     with h5py.File("result", "r+") as result, h5py.File("scene.h5") as scene:
         del result["scene"]
         try:
             scene.copy(scene["/"], result, "scene", expand_soft=False, expand_external=False)
         except (OSError, RuntimeError, ValueError, KeyError):
             pytest.skip("the library cannot copy it")
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_scene_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change_scene(folder / "scene.h5", SCENES[case])
+    put_scene_into_result()
     line = refused(["result", "--plan"], capsys, allowed=case in ALLOWED)
     assert not line or "result: " in line
 
@@ -111,12 +116,7 @@ def test_scene_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureF
 def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     check_result_file(folder / "result", "result")
     change_scene(folder / "scene.h5", SCENES[case])
-    with h5py.File("result", "r+") as result, h5py.File("scene.h5") as scene:
-        del result["scene"]
-        try:
-            scene.copy(scene["/"], result, "scene", expand_soft=False, expand_external=False)
-        except (OSError, RuntimeError, ValueError, KeyError):
-            pytest.skip("the library cannot copy it")
+    put_scene_into_result()
     with pytest.raises(UserError) as caught:
         check_result_file(folder / "result", "result")
     assert str(caught.value).startswith("result: ")
