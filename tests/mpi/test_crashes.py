@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,11 @@ def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
 
 def test_a_rank_that_is_killed_has_not_crashed(tmp_path: Path) -> None:
     def kill(process: subprocess.Popen[str]) -> None:
-        assert process.stderr is not None
-        process.stderr.readline()
+        # both compute: each has the file that it would write a crash into
+        end = time.monotonic() + 60
+        while len(list(tmp_path.glob("*.parts/*.crash"))) < 2:
+            assert process.poll() is None and time.monotonic() < end, "a rank has not begun"
+            time.sleep(0.01)
         os.kill(ranks_of(process.pid)[-1], signal.SIGKILL)
 
     assert run_to_end(2, STUDY, tmp_path, {"FAKE_SECONDS": "5"}, kill).status == 9
