@@ -35,6 +35,7 @@ DATA_LIMIT = 4e6
 PAGE_LIMIT = 9.8e6
 """Bytes that a page is to stay below; its drawings and numbers make room."""
 
+_SCRIPTS = ("page_numbers.js", "page_plots.js", "page.js")  # each uses what stands in those before it
 _DRAWINGS_LIMIT = 3e6
 _FEWEST_DATA = 0.5e6
 _SVG = "http://www.w3.org/2000/svg"
@@ -140,7 +141,7 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
             body.append(table_section(part))
     body.append(missing_section([part for part in parts if isinstance(part, Missing)]))
     style = _own_file("page.css")
-    scripts = [_normal(get_plotlyjs()), _normal(_own_file("page.js"))]
+    scripts = [_normal(get_plotlyjs()), _normal("\n".join(map(_own_file, _SCRIPTS)))]
     fixed = sum(len(text.encode()) for text in (*body, style, *scripts))
     data = build_page_data(result, min(DATA_LIMIT, max(PAGE_LIMIT - fixed, _FEWEST_DATA)))
     body[1] = interactive_section(data)

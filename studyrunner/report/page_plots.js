@@ -1,0 +1,252 @@
+// The plots of what is picked: response, course of the wear, maps and loops.
+"use strict";
+
+const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
+const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "triangle-down", "cross"];
+const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: "#1a1a1a" };
+const CONFIG = { responsive: true, displayModeBar: false };
+const TOUCH = window.matchMedia("(pointer: coarse)").matches;
+
+function layout(more) {
+  return {
+    font: FONT,
+    margin: { l: 64, r: 14, t: 12, b: 46 },
+    paper_bgcolor: "#fff",
+    plot_bgcolor: "#fff",
+    hovermode: "closest",
+    separators: ".\u00a0",
+    dragmode: TOUCH ? false : "zoom",
+    ...more,
+  };
+}
+
+function axisLayout(title, more) {
+  return {
+    title: { text: plain(title), standoff: 8 },
+    gridcolor: "#e0e0e0",
+    zeroline: false,
+    linecolor: "#777",
+    ticks: "outside",
+    tickcolor: "#777",
+    exponentformat: "power",
+    minexponent: 6,
+    separatethousands: true,
+    automargin: true,
+    ...more,
+  };
+}
+
+// Beside an axis the unit stands below the name: the plots are low.
+const upright = (text, unit) => ({ title: { text: plain(text) + (unit ? `<br>(${plain(unit)})` : ""), standoff: 8 } });
+
+// Lines of the response: every combination of the axes that are drawn as lines; the others are as in the picked point.
+function responseLines() {
+  let lines = [places(state.point)];
+  for (const axis of data.lines) {
+    lines = lines.flatMap((line) => axes[axis].values.map((_, place) => line.with(axis, place)));
+  }
+  return lines.map((line, number) => {
+    const values = axes[data.horizontal].values;
+    const order = values.map((_, place) => place);
+    if (!axes[data.horizontal].words) order.sort((a, b) => values[a] - values[b]);
+    const name = data.lines.map((axis) => `${axes[axis].label} ${axisText(axis, line[axis])}`).join(", ");
+    return { name, number, points: order.map((place) => pointAt(line.with(data.horizontal, place))) };
+  });
+}
+
+function drawResponse() {
+  const axis = axes[data.horizontal];
+  const entry = courses.response_amplitude;
+  const response = data.responses.length > 1 ? ` of ${data.responses[state.response]}` : "";
+  byId("response-title").textContent = entry
+    ? `Response${response} at ${cycleText(state.cycle)}`
+    : "Points (the file holds no response_amplitude)";
+  const at = (point) => axis.values[places(point)[data.horizontal]];
+  const value = (point, cycle) => (entry ? course("response_amplitude", point, cycle, state.response) * entry.factor : 0);
+  const traces = [];
+  let ghosts = false;
+  let failures = false;
+  // The line of the picked point comes last, on top: where lines meet, a click stays on it.
+  const lines = responseLines().sort((a, b) => a.points.includes(state.point) - b.points.includes(state.point));
+  lines.forEach((line) => {
+    const number = line.number;
+    const colour = data.colours[number % data.colours.length];
+    const good = line.points.filter(converged);
+    const bad = line.points.filter((point) => !converged(point));
+    if (entry && cycles.length > 1 && good.length) {
+      traces.push({
+        x: line.points.map(at), y: line.points.map((point) => value(point, 0)),
+        mode: line.points.length > 1 ? "lines" : "markers", hoverinfo: "skip", name: plain(cycleText(0)),
+        line: { color: "#8c8c8c", width: 1.5, dash: DASHES[number % DASHES.length] },
+        marker: { color: "#8c8c8c", size: 6 }, showlegend: !ghosts, legendrank: 2000, meta: "first",
+      });
+      ghosts = true;
+    }
+    traces.push({
+      x: line.points.map(at), y: line.points.map((point) => value(point, state.cycle)), customdata: line.points,
+      text: line.points.map((point) => plain(pointText(point))), hovertemplate: "%{text}<br>%{y:.5~g}<extra></extra>",
+      mode: line.points.length > 1 ? "lines+markers" : "markers", name: plain(line.name || cycleText(state.cycle)),
+      line: { color: colour, width: 2, dash: DASHES[number % DASHES.length] },
+      marker: { color: colour, size: good.length > 60 ? 5 : 8, symbol: SYMBOLS[number % SYMBOLS.length] },
+      showlegend: good.length > 0, legendrank: 1000 + number, meta: "response",
+    });
+    if (bad.length) {
+      traces.push({
+        x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "failed",
+        text: bad.map((point) => plain(`${pointText(point)}: ${sentence(point)}`).replace(/(.{50,}?) /g, "$1<br>")),
+        hovertemplate: "%{text}<extra></extra>", showlegend: !failures, legendrank: 3000, cliponaxis: false,
+        marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } }, meta: "failed",
+      });
+      failures = true;
+    }
+  });
+  traces.push({
+    x: [at(state.point)], y: [converged(state.point) ? value(state.point, state.cycle) : 0], mode: "markers",
+    hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
+    marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
+  });
+  const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values } : {};
+  byId("response-hint").textContent = varying.length
+    ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points that failed." : "")
+    : "The study has a single point.";
+  Plotly.react("response-plot", traces, layout({
+    height: 380, uirevision: `${state.response}`, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    xaxis: axisLayout(titled(axis.label, axis.unit), words),
+    yaxis: axisLayout("", { ...(entry ? upright("amplitude", entry.unit) : {}), rangemode: "tozero" }),
+  }), CONFIG);
+}
+
+function drawCourse() {
+  const panels = [["worn_volume", "worn volume"], ["wear_rate", "wear rate"]].filter(([name]) => courses[name]);
+  if (byId("course-part").hidden) return;
+  if (!converged(state.point)) {
+    sayInstead("course-plot", sentence(state.point));
+    return;
+  }
+  const beside = byId("course-plot").clientWidth > 800;
+  const domains = panels.length === 1 ? [[0, 1]] : beside ? [[0, 0.46], [0.54, 1]] : [[0.54, 1], [0, 0.46]];
+  const traces = [];
+  const shape = layout({
+    height: beside ? 300 : 380, showlegend: Boolean(courses.exact_worn_volume), uirevision: "course",
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+  });
+  panels.forEach(([name, title], i) => {
+    const entry = courses[name];
+    const suffix = i ? "2" : "";
+    const place = { xaxis: `x${suffix}`, yaxis: `y${suffix}` };
+    const scaled = (kind) => Array.from(cycles, (_, cycle) => course(kind, state.point, cycle) * entry.factor);
+    const values = scaled(name);
+    traces.push({
+      ...place, x: cycles, y: values, mode: cycles.length > 1 ? "lines" : "markers", showlegend: false, meta: name, name: title,
+      line: { color: data.colours[0], width: 2 }, hovertemplate: "cycle %{x}<br>%{y:.5~g}<extra></extra>",
+    });
+    if (name === "worn_volume" && courses.exact_worn_volume) {
+      traces.push({ ...place, x: cycles, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
+        line: { color: "#000", width: 1.5, dash: "dot" }, hoverinfo: "skip" });
+    }
+    traces.push({
+      ...place, x: [cycles[state.cycle]], y: [values[state.cycle]], mode: "markers", hoverinfo: "skip", showlegend: false,
+      marker: { symbol: "circle-open", size: 13, color: "#000", line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
+    });
+    const alone = beside || i === panels.length - 1;
+    shape[`xaxis${suffix}`] = axisLayout(alone ? "cycles" : "", {
+      anchor: `y${suffix}`, domain: beside ? domains[i] : [0, 1], showticklabels: alone, ...(i && !beside ? { matches: "x" } : {}),
+    });
+    shape[`yaxis${suffix}`] = axisLayout("", {
+      ...upright(title, entry.unit), anchor: `x${suffix}`, domain: beside ? [0, 1] : domains[i], rangemode: "tozero",
+    });
+  });
+  Plotly.react("course-plot", traces, shape, CONFIG);
+}
+
+// What stands in the place of a plot that there are no numbers for.
+function sayInstead(id, text) {
+  Plotly.react(id, [], layout({
+    height: 120, xaxis: { visible: false }, yaxis: { visible: false },
+    annotations: [{ text: plain(text).replace(/(.{40,}?) /g, "$1<br>"), showarrow: false, xref: "paper", yref: "paper", x: 0, y: 0.5, align: "left" }],
+  }), CONFIG);
+}
+
+function drawMaps() {
+  if (!maps) return;
+  const entry = maps.variables[state.map];
+  const found = held(maps, state.point, state.cycle);
+  byId("map-title").textContent = `Contact pairs at ${cycleText(found ? found.cycle : state.cycle)}`;
+  if (!found) {
+    sayInstead("map-plot", converged(state.point) ? "The maps of this point are not on this page." : sentence(state.point));
+    return;
+  }
+  const nPairs = entry.values.length / (maps.points.length * maps.cycles.length);
+  const start = found.row * maps.cycles.length * nPairs;
+  let largest = 0;
+  for (let i = start; i < start + maps.cycles.length * nPairs; i++) {
+    if (entry.values[i] > largest) largest = entry.values[i];
+  }
+  // One scale for all cycles of the point, so that the slider shows what changes.
+  largest = state.map === "open_fraction" ? 1 : largest * entry.factor || 1;
+  const value = (pair) => (pair === null ? NaN : entry.values[start + found.column * nPairs + pair] * entry.factor);
+  const hover = `pair %{customdata}<br>%{PLACE:.5~g} ${plain(entry.unit)}<extra></extra>`;
+  const gap = 0.17 / Math.max(maps.panels.length - 1, 1);
+  const height = (1 - gap * (maps.panels.length - 1)) / maps.panels.length;
+  const bars = maps.panels.every((panel) => panel.kind === "bars");
+  const shape = layout({ height: 60 + 160 * Math.max(maps.panels.length, 2), annotations: [], showlegend: false, uirevision: "map" });
+  if (!bars) {
+    shape.coloraxis = { colorscale: "Cividis", cmin: 0, cmax: largest,
+      colorbar: { title: { text: plain(entry.unit), side: "top" }, thickness: 14, outlinewidth: 0 } };
+  }
+  shape.margin.t = 28;
+  const traces = maps.panels.map((panel, i) => {
+    const suffix = i ? String(i + 1) : "";
+    const top = 1 - i * (height + gap);
+    const domain = [Math.max(top - height, 0), top];
+    const place = { xaxis: `x${suffix}`, yaxis: `y${suffix}`, name: plain(panel.title), meta: "map" };
+    const last = i === maps.panels.length - 1;
+    const milli = (values) => values.map((metres) => metres * 1e3);
+    shape.annotations.push({ text: plain(panel.title), showarrow: false, xref: "paper", yref: "paper", x: 0, y: top,
+      xanchor: "left", yanchor: "bottom", font: { ...FONT, size: 13 } });
+    shape[`xaxis${suffix}`] = axisLayout(last ? "along (mm)" : "", { anchor: `y${suffix}`, showgrid: false });
+    shape[`yaxis${suffix}`] = axisLayout("", { ...upright("across", "mm"), anchor: `x${suffix}`, domain, showgrid: false });
+    if (panel.kind === "grid") {
+      shape[`yaxis${suffix}`].autorange = "reversed";
+      return { ...place, type: "heatmap", x: milli(panel.x), y: milli(panel.y), coloraxis: "coloraxis", customdata: panel.pairs,
+        z: panel.pairs.map((row) => row.map(value)), hovertemplate: hover.replace("PLACE", "z"), xgap: 1, ygap: 1 };
+    }
+    if (panel.kind === "scatter") {
+      return { ...place, mode: "markers", x: milli(panel.x), y: milli(panel.y), customdata: panel.pairs,
+        marker: { size: 15, color: panel.pairs.map(value), coloraxis: "coloraxis" }, hovertemplate: hover.replace("PLACE", "marker.color") };
+    }
+    Object.assign(shape[`xaxis${suffix}`], { title: { text: last ? "contact pair" : "" }, type: "category" });
+    Object.assign(shape[`yaxis${suffix}`], { title: { text: plain(entry.unit) }, range: [0, 1.05 * largest] });
+    return { ...place, type: "bar", x: panel.pairs.map(String), y: panel.pairs.map(value), customdata: panel.pairs,
+      marker: { color: data.colours[0] }, hovertemplate: hover.replace("PLACE", "y"), width: panel.pairs.length < 4 ? 0.3 : 0.8 };
+  });
+  Plotly.react("map-plot", traces, shape, CONFIG);
+}
+
+function drawLoop() {
+  if (!loops) return;
+  const { loop_displacement: displacement, loop_force: force } = loops.variables;
+  const found = held(loops, state.point, state.cycle);
+  byId("loop-title").textContent = `Loop of pair ${loops.contacts[state.loop]} at ${cycleText(found ? found.cycle : state.cycle)}`;
+  if (!found) {
+    sayInstead("loop-plot", converged(state.point) ? "The loops of this point are not on this page." : sentence(state.point));
+    return;
+  }
+  const parts = loops.components.length;
+  const closed = (entry, column) => {
+    const start = ((found.row * loops.cycles.length + column) * loops.contacts.length + state.loop) * loops.phases;
+    const values = Array.from({ length: loops.phases }, (_, phase) => entry.values[(start + phase) * parts + state.component] * entry.factor);
+    return values.concat(values.slice(0, 1));
+  };
+  const traces = [found.column ? 0 : null, found.column].filter((column) => column !== null).map((column) => {
+    const now = column === found.column;
+    return { x: closed(displacement, column), y: closed(force, column), mode: "lines", name: cycleText(loops.cycles[column]),
+      line: { color: now ? data.colours[0] : "#8c8c8c", width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
+      hovertemplate: "%{x:.4~g}, %{y:.4~g}<extra></extra>" };
+  });
+  const name = loops.components[state.component].replace("_", " ");
+  Plotly.react("loop-plot", traces, layout({
+    height: 340, uirevision: `${state.loop} ${state.component}`, showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    xaxis: axisLayout(titled(`${name} displacement`, displacement.unit)), yaxis: axisLayout("", upright(`${name} force`, force.unit)),
+  }), CONFIG);
+}
