@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ from solver.adapt import UNKNOWN, Refined, lighter, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.certificate import certify
+from solver.clock import computing_time
 from solver.history import StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
@@ -75,7 +75,7 @@ def follow_branch(
         n_done, carried = unpack(resume)
         line.take_up(carried)
         refreshed = line.effort.iterations
-    started = time.thread_time()
+    started = computing_time()
     for place in range(n_done, order.size):
         index = order[place]
         spent = line.effort.iterations
@@ -89,7 +89,7 @@ def follow_branch(
         except Exception as error:
             # one bad point is one bad point: the sweep goes on from the state before
             outcome, refined, message = Outcome.EXCEPTION, None, describe_error(error)
-        now = time.thread_time()
+        now = computing_time()
         state, estimate = None, UNKNOWN
         if refined is not None:
             joint = refined.case.joint(float(omegas[index]), excitation_amplitude)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from solver.adaptive import AdaptiveSteps
+from solver.clock import computing_time
 from solver.history import StartState, WearHistory
 from solver.joint import build_case
 from solver.model import FloatArray, ReducedModel
@@ -50,7 +50,7 @@ def march_wear(
     keep: called now and then with the progress of the march. resume: such progress of a march with the same arguments,
         from which this one goes on: its history is the same to the last bit, but for `run_time`.
     """
-    started = time.thread_time()
+    started = computing_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
@@ -98,7 +98,7 @@ def march_wear(
             outcome = march.check()
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
             if outcome is Outcome.CONVERGED and march.effort.iterations >= refreshed + REFRESH:
-                spent = spent_before + time.thread_time() - started
+                spent = spent_before + computing_time() - started
                 parts = (march, recorder, steps)
                 progress = pack([n_steps, spent, *(part.carried() for part in parts)])
                 # with or without anybody who keeps it, so that all marches take the same way
@@ -116,7 +116,7 @@ def march_wear(
     except Exception as error:
         # one bad point is one bad point: the study goes on
         outcome, message = Outcome.EXCEPTION, describe_error(error)
-    spent = spent_before + time.thread_time() - started
+    spent = spent_before + computing_time() - started
     # adaptive steps go beyond the end
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
     history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent)

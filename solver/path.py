@@ -6,13 +6,13 @@ belongs to a value of it. The work is bounded: `MOST_STEPS` steps, `MOST_FAILURE
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver.balance import Balance, Evaluation
+from solver.clock import computing_time
 from solver.kernels import STICK
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
@@ -54,7 +54,7 @@ class Effort:
 
     def check_time(self) -> None:
         """Raises OutOfTimeError behind the deadline."""
-        if self.deadline < np.inf and time.thread_time() > self.deadline:
+        if self.deadline < np.inf and computing_time() > self.deadline:
             raise OutOfTimeError
 
 

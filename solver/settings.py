@@ -17,7 +17,8 @@ class SolverSettings:
     samples: N, equally spaced time samples in a period, at which the contact law is applied, more than 2 H; or "auto".
     tolerance: largest accepted scaled residual of the harmonic balance.
     rtol: relative error of response and wear rate that automatic harmonics and samples aim at.
-    time_limit: CPU seconds that the way to a start state may take, or a march, before it is given up.
+    time_limit: CPU seconds that the way to a start state may take, or a march, before it is given up; without those
+        that kernels are compiled in.
     """
 
     harmonics: int | Automatic = "auto"

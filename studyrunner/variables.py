@@ -230,7 +230,7 @@ KEPT = {
     "run_time": Variable(
         (),
         "s",
-        "CPU time of the computing thread, start state included",
+        "CPU time of the computing thread, start state included, compiling left out",
         comment="Of the march that the point was read from, where points share one; differs from run to run.",
     ),
     "error_estimate": Variable(

@@ -62,7 +62,8 @@ def test_a_rank_that_is_killed_has_not_crashed(tmp_path: Path) -> None:
         # both compute: each has the file that it would write a crash into
         end = time.monotonic() + 60
         while len(list(tmp_path.glob("*.parts/*.crash"))) < 2:
-            assert process.poll() is None and time.monotonic() < end, "a rank has not begun"
+            assert process.poll() is None
+            assert time.monotonic() < end, "a rank has not begun"
             time.sleep(0.01)
         os.kill(ranks_of(process.pid)[-1], signal.SIGKILL)
 

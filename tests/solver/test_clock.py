@@ -1,0 +1,67 @@
+"""Run time and time limit are those of computing: a first run compiles for longer than many states take."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from numba import njit
+
+from solver import response
+from solver.clock import computing_time
+from solver.continuation import follow_branch
+from solver.march import march_wear
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from tests.solver.models import scene
+
+
+def fresh_kernel() -> None:
+    """A kernel that calls another one: neither is compiled yet."""
+
+    @njit
+    def inner(values: np.ndarray) -> float:
+        return values.sum()
+
+    @njit
+    def outer(values: np.ndarray) -> float:
+        return inner(values) + inner(values[::-1])
+
+    outer(np.arange(3.0))
+
+
+def test_compiling_takes_no_computing_time() -> None:
+    cpu, computing = time.thread_time(), computing_time()
+    fresh_kernel()
+    cpu, computing = time.thread_time() - cpu, computing_time() - computing
+    assert cpu > 0.05
+    assert 0.0 <= computing < 0.2 * cpu
+
+
+def test_computing_takes_computing_time() -> None:
+    cpu, computing = time.thread_time(), computing_time()
+    while time.thread_time() - cpu < 0.05:
+        pass
+    assert computing_time() - computing == pytest.approx(time.thread_time() - cpu, rel=0.05)
+
+
+def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = SolverSettings(harmonics=3, samples=64)
+    model = scene("sdof_slider", 3)
+    _, start = next(follow_branch(model, 0.5, 10.0, np.array([160.0]), "up", settings))
+
+    def march() -> tuple[float, float]:
+        """CPU time of a march and what it says that it took."""
+        began = time.thread_time()
+        history = march_wear(model, 0.5, start, 1e-11, 1e4, "explicit", np.array([0.0, 1e4]), settings)
+        assert history.outcome is Outcome.CONVERGED
+        return time.thread_time() - began, history.run_time - start.run_time
+
+    march()
+    compiled, says = march()
+    assert 0.5 * compiled < says <= compiled
+    monkeypatch.setattr(response, "largest_distance", njit(response.largest_distance.py_func))
+    fresh, says = march()
+    assert fresh > 0.1 + compiled
+    assert says < 0.3 * fresh
