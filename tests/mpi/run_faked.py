@@ -1,9 +1,11 @@
 """run-study with a stand-in for the solver, to be started by the tests under mpiexec.
 
 FAKE_SECONDS: longest time of a march; each rank then notes those that it took in a file.
-FAKE_FAILURE: rank whose first march gives more results than it should: a bug, which raises.
+FAKE_FAILURE: rank whose first march gives more results than it should: a bug, which raises. The marches of the
+others wait for that.
+FAKE_TOGETHER: no march goes on before as many ranks have had one.
 FAKE_STEPS: every march takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
-takes two. What was gone on from is noted in a file.
+takes two. Each step is noted in a file, and what was gone on from in another one.
 FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
 to the fourth one where "in branch" stands behind.
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
@@ -36,6 +38,9 @@ from tests.studyrunner.fakes import fake_branch, fake_evaluate
 BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)
 """Goes with every start state: larger than what MPI sends off at once."""
 
+PATIENCE = 200.0
+"""Seconds: less than the tests have."""
+
 
 def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
     facts = describe_scene(model)
@@ -56,13 +61,14 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
                     continue
                 if n_steps:
                     time.sleep(2.0 * seconds)
+                    note_step()
                 if started.position in left:
                     left.remove(started.position)
                     yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
                 if n_steps:
                     keep(Kept("branch", (np.array([place + 1.0]),)))
                 if "FAKE_PATIENCE" in os.environ:
-                    wait_for(Path(f"branch{task.number}.txt"), float(os.environ["FAKE_PATIENCE"]))
+                    wait_until(Path(f"branch{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
         else:
             yield from march(task, keep)
 
@@ -72,6 +78,10 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
         if launcher_rank() == failing:
             # not the task, but what is around it
             yield from fake_evaluate(task, facts=facts)
+        elif failing >= 0:
+            time.sleep(PATIENCE)
+        if "FAKE_TOGETHER" in os.environ:
+            meet(int(os.environ["FAKE_TOGETHER"]))
         carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
         for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
             assert isinstance(result, MarchResult)
@@ -100,17 +110,34 @@ def walk(task: MarchTask, n_steps: int, seconds: float, keep: Callable[[Kept], N
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
         time.sleep(seconds)
+        note_step()
         keep(Kept("march", (np.array([step + 1.0, carried]),)))
     return carried
+
+
+def note_step() -> None:
+    """A line for every step of any rank."""
+    with Path("steps.txt").open("a", encoding="ascii") as file:
+        file.write("step\n")
+
+
+def meet(n_ranks: int) -> None:
+    """Returns when so many ranks have been here."""
+    Path(f"met{launcher_rank()}.txt").touch()
+    wait_until(lambda: len(list(Path().glob("met*.txt"))) >= n_ranks, PATIENCE)
 
 
 def watch_memory(samples: list[int]) -> None:
     """Memory of this process, KiB, that is not that of files: those that it reads are in memory as long as there is
     room only."""
     while True:
-        (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon")]
-        samples.append(int(line.split()[1]))
+        samples.append(own_memory())
         time.sleep(0.02)
+
+
+def own_memory() -> int:
+    (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon")]
+    return int(line.split()[1])
 
 
 def end_process(how: str) -> None:
@@ -121,12 +148,12 @@ def end_process(how: str) -> None:
         os.abort()
 
 
-def wait_for(file: Path, patience: float) -> None:
-    """Returns when there is such a file; raises TimeoutError after a while."""
+def wait_until(condition: Callable[[], bool], patience: float) -> None:
+    """Returns when the condition holds; raises TimeoutError after a while."""
     latest = time.monotonic() + patience
-    while not file.exists():
+    while not condition():
         if time.monotonic() > latest:
-            raise TimeoutError(f"there is no {file}")
+            raise TimeoutError
         time.sleep(0.01)
 
 
@@ -134,9 +161,10 @@ if __name__ == "__main__":
     run.build_evaluator = build_fake
     schedule.SECONDS_TO_PROGRESS = 0.03
     if "FAKE_NOTHING" in os.environ and launcher_rank() == 0:
-        samples = [0]
+        samples = [own_memory()]
         threading.Thread(target=watch_memory, args=(samples,), daemon=True).start()
         status = main()
+        samples.append(own_memory())
         print(f"rank 0: {max(samples)} KiB, {time.process_time()} s", file=sys.stderr)
     else:
         status = main()

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from studyrunner.evaluate import CRASHED
-from tests.mpi.launching import FAKED, ranks_of, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, Running, results, run_to_end
 
 STUDY = [
     FAKED,
-    "sdof_slider",
+    *CHEAP,
     *("--set", "axes.frequency=[100, 110, 120, 130, 140]"),
     *("--set", "axes.scheme=implicit"),
     *("-o", "out.nc"),
@@ -24,9 +23,17 @@ STUDY = [
 MESSAGES = {"segfault": "Segmentation fault (__init__.py, line ", "abort": "Aborted (run_faked.py, line "}
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """The result of a run that does not crash."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert run_to_end(0, STUDY, folder).status == 0
+    return results(folder / "out.nc")
+
+
 @pytest.mark.parametrize("n_ranks", [0, 2])
 @pytest.mark.parametrize("how", ["segfault", "abort"])
-def test_a_march_that_crashes_is_one_bad_point(how: str, n_ranks: int, tmp_path: Path) -> None:
+def test_a_march_that_crashes_is_one_bad_point(how: str, n_ranks: int, whole: xr.Dataset, tmp_path: Path) -> None:
     crash = {"FAKE_CRASH": how, "FAKE_SECONDS": "0.01", "UCX_HANDLE_ERRORS": "none"}
     assert run_to_end(n_ranks, STUDY, tmp_path, crash).status not in (0, 1, 2, 3, 130)
     assert not (tmp_path / "out.nc").exists()
@@ -40,9 +47,7 @@ def test_a_march_that_crashes_is_one_bad_point(how: str, n_ranks: int, tmp_path:
     assert run_to_end(n_ranks, [*STUDY, "--retry-failed"], tmp_path, crash).status not in (0, 1, 2, 3)
     assert run_to_end(n_ranks, STUDY, tmp_path).status == 3
     assert run_to_end(n_ranks, [*STUDY, "--retry-failed"], tmp_path).status == 0
-    assert run_to_end(0, [*STUDY[:-1], "whole.nc"], tmp_path).status == 0
-    whole, again = results(tmp_path / "whole.nc"), results(tmp_path / "out.nc")
-    assert again.identical(whole)
+    assert results(tmp_path / "out.nc").identical(whole)
     assert list(tmp_path.glob("*.parts/*.crash")) == []
 
 
@@ -58,16 +63,12 @@ def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
 
 
 def test_a_rank_that_is_killed_has_not_crashed(tmp_path: Path) -> None:
-    def kill(process: subprocess.Popen[str]) -> None:
+    def kill(running: Running) -> None:
         # both compute: each has the file that it would write a crash into
-        end = time.monotonic() + 60
-        while len(list(tmp_path.glob("*.parts/*.crash"))) < 2:
-            assert process.poll() is None
-            assert time.monotonic() < end, "a rank has not begun"
-            time.sleep(0.01)
-        os.kill(ranks_of(process.pid)[-1], signal.SIGKILL)
+        assert running.reaches(lambda: len(list(tmp_path.glob("*.parts/*.crash"))) == 2), running.said
+        os.kill(running.ranks()[1], signal.SIGKILL)
 
-    assert run_to_end(2, STUDY, tmp_path, {"FAKE_SECONDS": "5"}, kill).status == 9
+    assert run_to_end(2, STUDY, tmp_path, {"FAKE_SECONDS": "100"}, kill).status == 9
     assert len(list(tmp_path.glob("*.parts/*.crash"))) == 2
     assert run_to_end(2, STUDY, tmp_path).status == 0
     assert np.all(results(tmp_path / "out.nc").outcome == 0)

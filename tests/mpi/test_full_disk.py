@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import FAKED, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, results, run_to_end
 
 STUDY = [
     FAKED,
-    "sdof_slider",
+    *CHEAP,
     *("--set", "axes.frequency={start = 100, stop = 139, num = 40}"),
     *("--set", "axes.scheme=implicit"),
 ]
@@ -36,7 +36,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 @pytest.mark.parametrize("n_ranks", [0, 2])
 def test_a_full_disk_costs_nothing_that_was_finished(n_ranks: int, small_disk: Path, tmp_path: Path) -> None:
-    environment = {"FAKE_SECONDS": "0.02", "FAKE_STEPS": "2"}
+    environment = {"FAKE_SECONDS": "0.005", "FAKE_STEPS": "2"}
     target = str(small_disk / "out.nc")
     ended = run_to_end(n_ranks, [*STUDY, "-o", target], tmp_path, environment)
     assert ended.status == 1

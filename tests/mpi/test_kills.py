@@ -2,136 +2,176 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
+import shutil
 import signal
-import subprocess
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
 from studyrunner.evaluate import NOT_COMPUTED
-from tests.mpi.launching import FAKED, Ended, ranks_of, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, Ended, Running, results, run_to_end
 
-AT_ONCE = 4  # runs side by side: they sleep more than they compute
+AT_ONCE = 4  # runs side by side: they sleep as long as they compute
 MOST_RUNS = 8
 N_POINTS = 24
 
-FAKED_STUDY = [
-    FAKED,
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110, 120, 130]"),
-    *("--set", "axes.sweep=['up', 'down']"),
-    *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
-    *("--set", "axes.scheme=['implicit']"),
-]
-SLOW = {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.025"}
 
-REAL_STUDY = [
-    *("-m", "studyrunner.cli", "sdof_slider"),
-    *("--set", "axes.frequency=[100, 160]"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=['implicit', 'adaptive']"),
-    *("--set", "axes.step=[100]"),
-    *("--set", "solver.harmonics=5"),
-    *("--set", "solver.samples=64"),
-]
+@dataclass(frozen=True)
+class Disturbed:
+    """A study that is disturbed on its way.
+
+    n_steps: that the stand-in takes, which notes each of them; 0 for the solver itself. latest: s from the start of
+    the run, or of what is computed, to the signal where that is not given by a step.
+    """
+
+    arguments: tuple[str, ...]
+    environment: dict[str, str]
+    n_steps: int
+    latest: float
 
 
-def kill_one(chance: random.Random, longest: float) -> Callable[[subprocess.Popen[str]], None]:
-    """After a while one of the ranks or the launcher is killed: mostly while they compute, now and then before."""
+FAKED_STUDY = Disturbed(
+    (
+        *(FAKED, *CHEAP),
+        *("--set", "axes.frequency=[100, 110, 120, 130]"),
+        *("--set", "axes.sweep=['up', 'down']"),
+        *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
+        *("--set", "axes.scheme=['implicit']"),
+    ),
+    {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.025"},
+    n_steps=2 * 4 + 4 * N_POINTS,
+    latest=2.0,
+)
+REAL_STUDY = Disturbed(
+    (
+        *("-m", "studyrunner.cli", "sdof_slider"),
+        *("--set", "axes.frequency=[100, 160]"),
+        *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
+        *("--set", "axes.scheme=['implicit', 'adaptive']"),
+        *("--set", "axes.step=[100]"),
+        *("--set", "solver.harmonics=5"),
+        *("--set", "solver.samples=64"),
+    ),
+    {},
+    n_steps=0,
+    latest=2.0,
+)
 
-    def disturb(process: subprocess.Popen[str]) -> None:
-        assert process.stderr is not None
+
+def wait_a_while(running: Running, study: Disturbed, folder: Path, chance: random.Random, share: float = 1.0) -> None:
+    """Until some time after the run has begun to compute. share: of the steps left that it has taken then at most."""
+    before = count_steps(folder)
+    # a line of its progress
+    running.reaches(lambda: "] " in running.said)
+    if study.n_steps:
+        wanted = before + chance.randrange(max(1, int(share * (study.n_steps - before))))
+        running.reaches(lambda: count_steps(folder) >= wanted)
+        time.sleep(chance.uniform(0.0, 0.05))
+    else:
+        time.sleep(chance.uniform(0.0, study.latest))
+
+
+def count_steps(folder: Path) -> int:
+    """Those that all runs of the stand-in in this folder have noted."""
+    path = folder / "steps.txt"
+    return path.stat().st_size // len("step\n") if path.exists() else 0
+
+
+def kill_one(study: Disturbed, folder: Path, chance: random.Random) -> Callable[[Running], None]:
+    """One of the ranks or the launcher is killed: mostly while they compute, now and then before."""
+
+    def disturb(running: Running) -> None:
         if chance.random() < 0.8:
-            process.stderr.readline()
-            time.sleep(chance.uniform(0.0, longest))
+            wait_a_while(running, study, folder, chance)
         else:
-            time.sleep(chance.uniform(0.0, 2.0))
-        if process.poll() is None:
-            victims = [process.pid, *ranks_of(process.pid)]
-            try:
+            time.sleep(chance.uniform(0.0, study.latest))
+        victims = [running.process.pid, *running.ranks().values()]
+        if running.process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
                 os.kill(chance.choice(victims), signal.SIGKILL)
-            except ProcessLookupError:
-                return
 
     return disturb
 
 
-def kill_and_go_on(study: list[str], environment: dict[str, str], longest: float, folder: Path, seed: int) -> str:
+def kill_and_go_on(study: Disturbed, folder: Path, seed: int) -> str:
     """What the run that ended by itself was like, after one that was killed, or several."""
-    folder.mkdir()
     chance = random.Random(seed)
+    n_killed = 0
     for attempt in range(MOST_RUNS):
+        folder.mkdir(exist_ok=True)
         # one in four is killed twice
-        kills = attempt == 0 or (attempt == 1 and seed % 4 == 0)
-        disturb = kill_one(chance, longest) if kills else lambda _: None
+        kills = n_killed == 0 or (attempt == 1 and seed % 4 == 0)
+        disturb = kill_one(study, folder, chance) if kills else lambda _: None
         n_ranks = chance.choice([2, 2, 3]) if attempt == 0 else chance.choice([0, 2])
-        ended = run_to_end(n_ranks, [*study, "-o", "out.nc"], folder, environment, disturb)
-        if ended.status == 0:
-            return f"killed {attempt} times"
-        if not kills:
+        ended = run_to_end(n_ranks, [*study.arguments, "-o", "out.nc"], folder, study.environment, disturb)
+        if ended.status == 0 and n_killed == 0:
+            # it was faster than the one that was to kill it
+            shutil.rmtree(folder)
+        elif ended.status == 0:
+            return f"killed {n_killed} times"
+        elif not kills:
             return f"ended with {ended.status}: {ended.said}"
+        else:
+            n_killed += 1
     return "did not end"
 
 
-@pytest.mark.parametrize(
-    ("study", "environment", "longest", "n_trials"),
-    [(FAKED_STUDY, SLOW, 1.5, 46), (REAL_STUDY, {}, 2.0, 4)],
-    ids=["faked", "real"],
-)
-def test_a_run_that_is_killed_goes_on_to_the_same_result(
-    study: list[str], environment: dict[str, str], longest: float, n_trials: int, tmp_path: Path
-) -> None:
-    assert run_to_end(0, [*study, "-o", "whole.nc"], tmp_path, environment).status == 0
+@pytest.mark.parametrize(("study", "n_trials"), [(FAKED_STUDY, 46), (REAL_STUDY, 4)], ids=["faked", "real"])
+def test_a_run_that_is_killed_goes_on_to_the_same_result(study: Disturbed, n_trials: int, tmp_path: Path) -> None:
+    assert run_to_end(0, [*study.arguments, "-o", "whole.nc"], tmp_path, study.environment).status == 0
+    assert count_steps(tmp_path) == study.n_steps
     expected = results(tmp_path / "whole.nc")
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = list(
-            pool.map(
-                lambda seed: kill_and_go_on(study, environment, longest, tmp_path / str(seed), seed), range(n_trials)
-            )
-        )
+        found = list(pool.map(lambda seed: kill_and_go_on(study, tmp_path / str(seed), seed), range(n_trials)))
     same = 0
     for seed, how in enumerate(found):
         assert how.startswith("killed"), how
         xr.testing.assert_identical(results(tmp_path / str(seed) / "out.nc"), expected)
         same += 1
-    n_killed = sum(not how.startswith("killed 0") for how in found)
+    n_kills = sum(int(how.split()[1]) for how in found)
     resumed = "".join(path.read_text(encoding="utf-8") for path in tmp_path.glob("*/resumed.txt")).splitlines()
-    gone_on = f"; {len(resumed)} tasks were gone on from" if environment else ""
-    print(f"{same} of {n_trials} identical; {n_killed} were killed on their way{gone_on}")
+    gone_on = f"; {len(resumed)} tasks were gone on from" if study.n_steps else ""
+    print(f"{same} of {n_trials} identical after {n_kills} kills{gone_on}")
     assert same == n_trials
-    # otherwise it would show nothing
-    assert n_killed > 0.6 * n_trials
-    if environment:
+    assert n_kills >= n_trials
+    if study.n_steps:
         assert {line.split()[0] for line in resumed} == {"march", "branch"}
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """The result of the stand-in where it is not disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    arguments = [*FAKED_STUDY.arguments, "-o", "whole.nc"]
+    assert run_to_end(0, arguments, folder, FAKED_STUDY.environment).status == 0
+    return results(folder / "whole.nc")
+
+
 @pytest.mark.parametrize("n_ranks", [0, 2])
-def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, tmp_path: Path) -> None:
-    assert run_to_end(0, [*FAKED_STUDY, "-o", "whole.nc"], tmp_path, SLOW).status == 0
-    expected = results(tmp_path / "whole.nc")
-
-    def terminate(when: float) -> Callable[[subprocess.Popen[str]], None]:
-        def disturb(process: subprocess.Popen[str]) -> None:
-            assert process.stderr is not None
-            assert "following 2 branches" in process.stderr.readline()
-            time.sleep(when)
-            process.send_signal(signal.SIGTERM)
-
-        return disturb
+def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, whole: xr.Dataset, tmp_path: Path) -> None:
+    study = FAKED_STUDY
 
     def end_and_go_on(seed: int) -> Ended:
         folder = tmp_path / str(seed)
         folder.mkdir()
-        arguments = [*FAKED_STUDY, "-o", "out.nc"]
-        ended = run_to_end(n_ranks, arguments, folder, SLOW, terminate(random.Random(seed).uniform(0.0, 1.2)))
+        arguments = [*study.arguments, "-o", "out.nc"]
+
+        def terminate(running: Running) -> None:
+            # not so late that it may be through when the signal arrives
+            wait_a_while(running, study, folder, random.Random(seed), share=0.75)
+            running.process.send_signal(signal.SIGTERM)
+
+        ended = run_to_end(n_ranks, arguments, folder, study.environment, terminate)
         (folder / "out.nc").rename(folder / "left.nc")
-        assert run_to_end(0, arguments, folder, SLOW).status == 0
+        assert run_to_end(0, arguments, folder, study.environment).status == 0
         return ended
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -140,7 +180,7 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, tmp_path:
     for seed, ended in enumerate(found):
         # netCDF does not like threads: the files are opened here
         left = results(tmp_path / str(seed) / "left.nc")
-        xr.testing.assert_identical(results(tmp_path / str(seed) / "out.nc"), expected)
+        xr.testing.assert_identical(results(tmp_path / str(seed) / "out.nc"), whole)
         assert ended.status == 130, ended.said
         assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
         assert "Traceback" not in ended.said
@@ -148,7 +188,7 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, tmp_path:
         assert f"holds {N_POINTS - n_left} of {N_POINTS} points" in ended.said
         there = left.outcome != NOT_COMPUTED
         for name in set(left.data_vars) - {"message", "outcome"}:
-            xr.testing.assert_equal(left[name].where(there), expected[name].where(there))
+            xr.testing.assert_equal(left[name].where(there), whole[name].where(there))
         n_partial += 0 < n_left < N_POINTS
         slowest = max(slowest, ended.seconds)
         opened += 1
@@ -160,14 +200,13 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, tmp_path:
 
 def test_a_rank_that_is_ended_ends_the_run_in_good_order(tmp_path: Path) -> None:
     """The launcher tells all ranks; some other program may tell one."""
+    study = FAKED_STUDY
 
-    def terminate_one(process: subprocess.Popen[str]) -> None:
-        assert process.stderr is not None
-        assert "following 2 branches" in process.stderr.readline()
-        time.sleep(0.5)
-        os.kill(ranks_of(process.pid)[-1], signal.SIGTERM)
+    def terminate_one(running: Running) -> None:
+        assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 4), running.said
+        os.kill(running.ranks()[2], signal.SIGTERM)
 
-    ended = run_to_end(3, [*FAKED_STUDY, "-o", "out.nc"], tmp_path, SLOW, terminate_one)
+    ended = run_to_end(3, [*study.arguments, "-o", "out.nc"], tmp_path, study.environment, terminate_one)
     assert ended.status == 130
     assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
     assert ended.seconds < 10.0

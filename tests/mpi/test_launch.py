@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from tests.mpi.conftest import OpenMpi
-from tests.mpi.launching import FAKED, ROOT, launcher, mpiexec, results
+from tests.mpi.launching import FAKED, PATIENCE, ROOT, launcher, mpiexec, results
 
 STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, stop = 160, num = 5}"]
 OTHER_VERSION = """\
@@ -35,7 +35,14 @@ def run(
     """Never hangs."""
     variables = {**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})}
     return subprocess.run(
-        command, cwd=folder, env=variables, capture_output=True, text=True, errors="replace", timeout=60, check=False
+        command,
+        cwd=folder,
+        env=variables,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=PATIENCE,
+        check=False,
     )
 
 
@@ -193,9 +200,11 @@ def test_three_hosts_and_one_shared_folder(hosts: str, tmp_path: Path) -> None:
     starter.chmod(0o755)
     addresses = ",".join(f"10.199.77.{number}" for number in HOSTS)
     several = [mpiexec(), "-launcher", "ssh", "-launcher-exec", str(starter), "-hosts", addresses, "-n", "6"]
+    # all have something to do, however slow one of them is
+    faked = {"FAKE_SECONDS": "0.02", "FAKE_TOGETHER": "6"}
     # hydra starts the processes of its own host without that command: it is already there
     command = " ".join(f"'{word}'" for word in [*several, sys.executable, FAKED, *STUDY])
-    done = run([str(starter), "10.199.77.1", f"cd '{tmp_path}' && exec {command}"], tmp_path, {"FAKE_SECONDS": "0.02"})
+    done = run([str(starter), "10.199.77.1", f"cd '{tmp_path}' && exec {command}"], tmp_path, faked)
     assert done.returncode == 0, done.stderr
     for number in HOSTS[1:]:
         sent = Path(f"/sys/class/net/{hosts}w{number}/statistics/rx_bytes").read_text(encoding="ascii")

@@ -6,8 +6,7 @@ import os
 import random
 import signal
 import subprocess
-import time
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -15,11 +14,12 @@ import xarray as xr
 
 from studyrunner.evaluate import CRASHED
 from tests.mpi.conftest import OpenMpi
-from tests.mpi.launching import FAKED, ROOT, is_alive, processes_of, results
+from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Ended, Running, results, watch_to_end
 
 N_RANKS = 3
+AT_ONCE = 3  # runs side by side: they sleep more than they compute
 STUDY = [
-    *("sdof_slider", "-o", "out.nc"),
+    *(*CHEAP, "-o", "out.nc"),
     *("--set", "axes.frequency={start = 100, stop = 160, num = 13}"),
     *("--set", "axes.sweep=['up', 'down']"),
     *("--set", "axes.step=[500, 1000]"),
@@ -27,15 +27,6 @@ STUDY = [
     *("--set", "axes.scheme=['implicit', 'adaptive']"),
 ]
 SECONDS = {"FAKE_SECONDS": "0.06"}
-
-
-@dataclass(frozen=True)
-class Killed:
-    """A run of which a rank was killed. seconds: from then to the end of its last process."""
-
-    status: int
-    said: str
-    seconds: float
 
 
 def run_and_kill(
@@ -46,49 +37,22 @@ def run_and_kill(
     n_ranks: int = N_RANKS,
     study: list[str] = STUDY,
     faked: dict[str, str] = SECONDS,
-) -> Killed:
+) -> Ended:
     """A run of which a rank is killed after so many histories; no process outlives it, and it never hangs."""
-    with subprocess.Popen(
-        [*open_mpi.launcher(n_ranks, "--with-ft", "ulfm"), open_mpi.python, FAKED, *study],
-        cwd=folder,
-        env={**os.environ, **open_mpi.environment, **faked, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-    ) as process:
-        others: set[int] = set()
-        try:
-            assert process.stderr is not None
-            first = process.stderr.readline()
-            others = processes_of(process.pid)
-            if rank is not None:
-                (victim,) = [pid for pid in others if rank_of(pid) == rank]
-                while count_noted(folder) < n_noted and process.poll() is None:
-                    time.sleep(1e-3)
-                os.kill(victim, signal.SIGKILL)
-            began = time.monotonic()
-            _, said = process.communicate(timeout=40)
-            while any(map(is_alive, others)):
-                assert time.monotonic() < began + 40.0, "processes outlive their run"
-                time.sleep(0.01)
-            seconds = time.monotonic() - began
-        finally:
-            for pid in (process.pid, *others):
-                if is_alive(pid):
-                    os.kill(pid, signal.SIGKILL)
-    return Killed(process.returncode, first + said, seconds)
+
+    def kill(running: Running) -> None:
+        if rank is not None:
+            running.wait_for("following")
+            assert running.reaches(lambda: count_noted(folder) >= n_noted), running.said
+            os.kill(running.ranks()[rank], signal.SIGKILL)
+
+    command = [*open_mpi.launcher(n_ranks, "--with-ft", "ulfm"), open_mpi.python, FAKED, *study]
+    return watch_to_end(command, folder, {**open_mpi.environment, **faked}, kill)
 
 
 def count_noted(folder: Path) -> int:
     """Histories that the ranks have computed."""
     return sum(len(path.read_text(encoding="ascii").splitlines()) for path in folder.glob("rank*.txt"))
-
-
-def rank_of(pid: int) -> int | None:
-    variables = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
-    found = [int(text.partition(b"=")[2]) for text in variables if text.startswith(b"OMPI_COMM_WORLD_RANK=")]
-    return found[0] if found else None
 
 
 @pytest.fixture(scope="module")
@@ -101,19 +65,27 @@ def whole(open_mpi: OpenMpi, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     return results(folder / "out.nc"), count_noted(folder)
 
 
-@pytest.mark.parametrize("seed", range(10))
 def test_the_others_finish_when_a_rank_is_killed(
-    seed: int, open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+    open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
 ) -> None:
+    """Ten times, each time another rank at another moment."""
     expected, n_histories = whole
-    drawn = random.Random(seed)
-    rank, n_noted = drawn.randrange(1, N_RANKS), drawn.randrange(n_histories * 4 // 5)
-    done = run_and_kill(open_mpi, tmp_path, rank, n_noted)
-    assert done.status == 0, done.said
-    (line,) = [line for line in done.said.splitlines() if "lost" in line]
-    assert f"rank {rank} is lost, which had " in line
-    assert "Traceback" not in done.said
-    xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
+
+    def run_without_one(seed: int) -> tuple[int, Ended]:
+        drawn = random.Random(seed)
+        rank, n_noted = drawn.randrange(1, N_RANKS), drawn.randrange(n_histories * 4 // 5)
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        return rank, run_and_kill(open_mpi, folder, rank, n_noted)
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        found = list(pool.map(run_without_one, range(10)))
+    for seed, (rank, done) in enumerate(found):
+        assert done.status == 0, done.said
+        (line,) = [line for line in done.said.splitlines() if "lost" in line]
+        assert f"rank {rank} is lost, which had " in line
+        assert "Traceback" not in done.said
+        xr.testing.assert_identical(results(tmp_path / str(seed) / "out.nc"), expected)
 
 
 def test_without_rank_0_all_end_and_the_next_run_goes_on(
@@ -153,7 +125,7 @@ def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi: OpenMpi, tmp_pat
         cwd=tmp_path,
         env={**os.environ, **open_mpi.environment, "PYTHONPATH": str(ROOT)},
         capture_output=True,
-        timeout=40,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 1

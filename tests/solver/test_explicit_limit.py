@@ -131,7 +131,7 @@ def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, osci
     assert followed.oscillate() is oscillates
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.sampled_from([0.0, 1.0, 1.0005, 1.5, 1.99, 2.0, 3.0, 1e4]), max_size=14), st.integers(0, 14))
 def test_oscillation_is_that_of_all_rates_together_also_when_carried_on(rates: list[float], cut: int) -> None:
     followed = WearRates(1)

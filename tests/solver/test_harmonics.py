@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.harmonics import build_basis, change_orders, derivative, from_complex, to_complex
@@ -12,7 +12,6 @@ from solver.harmonics import build_basis, change_orders, derivative, from_comple
 OMEGA = 37.0
 
 
-@settings(deadline=None, derandomize=True)
 @given(n_harmonics=st.integers(0, 12), extra=st.integers(1, 40), seed=st.integers(0, 2**31))
 def test_analysis_undoes_synthesis(n_harmonics: int, extra: int, seed: int) -> None:
     basis = build_basis(tuple(range(1, n_harmonics + 1)), 2 * n_harmonics + extra)
@@ -82,7 +81,6 @@ def test_harmonics_above_the_basis_alias_only_from_samples_minus_harmonics_on() 
     assert (np.cos(13 * phase) @ basis.analysis)[5] == pytest.approx(1.0, abs=1e-14)
 
 
-@settings(deadline=None, derandomize=True)
 @given(orders=st.sets(st.integers(1, 30), max_size=8), extra=st.integers(1, 20), seed=st.integers(0, 2**31))
 def test_analysis_undoes_synthesis_for_any_orders(orders: set[int], extra: int, seed: int) -> None:
     ascending = tuple(sorted(orders))

@@ -29,7 +29,6 @@ def one_step(force: float, velocity: float, limit: float) -> tuple[FloatArray, F
 # ----------------------------------------------------------------------------------------------------------- one step
 
 
-@settings(deadline=None, derandomize=True)
 @given(force=values, velocity=values, limit=values.map(abs))
 def test_a_step_along_a_line_obeys_newton_and_coulomb(force: float, velocity: float, limit: float) -> None:
     (friction, after, mean, speed), _ = one_step(force, velocity, limit)
@@ -46,7 +45,6 @@ def test_a_step_along_a_line_obeys_newton_and_coulomb(force: float, velocity: fl
         assert friction == force
 
 
-@settings(deadline=None, derandomize=True)
 @given(force=values, velocity=values, limit=values.map(abs))
 def test_a_step_is_the_same_in_either_direction(force: float, velocity: float, limit: float) -> None:
     (friction, after, mean, speed), tangent = one_step(force, velocity, limit)
@@ -80,7 +78,7 @@ def test_the_branches_of_a_step_meet(force: float, velocity: float, limit: float
             assert np.abs(there - here).max() < 30.0 * size
 
 
-@settings(deadline=None, derandomize=True, max_examples=300)
+@settings(max_examples=300)
 @given(
     force=st.floats(-20.0, 20.0), velocity=st.floats(-2.0, 2.0).filter(lambda v: abs(v) > 1e-2), limit=st.floats(0.1, 8)
 )
@@ -132,7 +130,7 @@ def test_a_pair_with_one_tangent_moves_along_it_alone(line: int) -> None:
     assert not tangent.any()
 
 
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 @given(seed=st.integers(0, 2**31), limit=st.floats(0.1, 20.0))
 def test_the_derivative_of_a_step_in_the_plane_is_that_of_differences(seed: int, limit: float) -> None:
     random = np.random.default_rng(seed)

@@ -125,7 +125,7 @@ def frequency_step(nodal_diameter: int, n_modes: int, perturbation: bool) -> lis
 def run_calculix(folder: Path, lines: list[str], executable: str = "ccx") -> str:
     """Runs a deck in a folder and returns the table file; raises RuntimeError with the end of the log on failure."""
     (folder / "sector.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
-    done = subprocess.run([executable, "-i", "sector"], cwd=folder, capture_output=True, text=True, timeout=300)
+    done = subprocess.run([executable, "-i", "sector"], cwd=folder, capture_output=True, text=True, timeout=1800)
     table = folder / "sector.dat"
     if done.returncode != 0 or "*ERROR" in done.stdout or not table.exists():
         raise RuntimeError(done.stdout[-2000:] + done.stderr[-500:])

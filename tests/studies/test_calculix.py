@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -35,39 +36,58 @@ def glued_frequencies(parameters):
     return np.sqrt(np.diag(stiffness).real[first_mode : first_mode + N_MODES]) / (2.0 * np.pi)
 
 
-def calculix_frequencies(parameters, quadratic, folder):
+def frequency_deck(nodal_diameter, stress_stiffening, quadratic):
+    parameters = Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening)
     calculix = build_calculix_mesh(build_dovetail_mesh(parameters), quadratic)
     lines = model_lines(calculix, parameters)
     if parameters.stress_stiffening:
         lines += ["*STEP", "*STATIC", *centrifugal_load(parameters), "*END STEP"]
-    lines += frequency_step(parameters.nodal_diameter, 2 * N_MODES, perturbation=parameters.stress_stiffening)
-    return read_frequencies(run_calculix(folder, lines), N_MODES)
+    return lines + frequency_step(nodal_diameter, 2 * N_MODES, perturbation=stress_stiffening)
 
 
-@pytest.mark.parametrize("nodal_diameter", [0, 3])
-def test_frequencies_within_3_percent_of_quadratic_elements(nodal_diameter, tmp_path):
-    parameters = Parameters(nodal_diameter=nodal_diameter, stress_stiffening=False)
-    reference = calculix_frequencies(parameters, quadratic=True, folder=tmp_path)
-    assert np.abs(glued_frequencies(parameters) / reference - 1.0).max() < 0.03
+def contact_deck():
+    parameters = Parameters(stress_stiffening=False)
+    mesh = build_dovetail_mesh(parameters)
+    calculix = build_calculix_mesh(mesh, quadratic=False, glued=False)
+    return [*model_lines(calculix, parameters), *contact_lines(mesh, calculix, parameters), *contact_step(parameters)]
 
 
-@pytest.mark.parametrize(("nodal_diameter", "stress_stiffening"), [(0, False), (0, True), (3, True)])
-def test_frequencies_agree_with_incompatible_elements(nodal_diameter, stress_stiffening, tmp_path):
-    parameters = Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening)
-    reference = calculix_frequencies(parameters, quadratic=False, folder=tmp_path)
-    own = glued_frequencies(parameters)
+QUADRATIC = [(0, False), (3, False)]
+INCOMPATIBLE = [(0, False), (0, True), (3, True)]
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    """What CalculiX finds, by deck. It computes on one core: two decks at a time, those that take longest first."""
+    decks = {("quadratic", *case): (frequency_deck, *case, True) for case in QUADRATIC}
+    decks |= {("incompatible", *case): (frequency_deck, *case, False) for case in INCOMPATIBLE}
+    decks |= {"contact": (contact_deck,)}
+    with ThreadPoolExecutor(2) as pool:
+        yield {
+            name: pool.submit(lambda build, *case: run_calculix(tmp_path_factory.mktemp("deck"), build(*case)), *deck)
+            for name, deck in decks.items()
+        }
+        pool.shutdown(cancel_futures=True)
+
+
+@pytest.mark.parametrize(("nodal_diameter", "stress_stiffening"), QUADRATIC)
+def test_frequencies_within_3_percent_of_quadratic_elements(nodal_diameter, stress_stiffening, tables):
+    own = glued_frequencies(Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening))
+    reference = read_frequencies(tables["quadratic", nodal_diameter, stress_stiffening].result(), N_MODES)
+    assert np.abs(own / reference - 1.0).max() < 0.03
+
+
+@pytest.mark.parametrize(("nodal_diameter", "stress_stiffening"), INCOMPATIBLE)
+def test_frequencies_agree_with_incompatible_elements(nodal_diameter, stress_stiffening, tables):
+    own = glued_frequencies(Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening))
+    reference = read_frequencies(tables["incompatible", nodal_diameter, stress_stiffening].result(), N_MODES)
     # 2 % is what the first three must reach; the two incompatible elements differ by less.
     assert np.abs(own[:3] / reference[:3] - 1.0).max() < 0.003
     assert np.abs(own / reference - 1.0).max() < 0.01
 
 
-def test_static_frictional_contact_force(tmp_path):
+def test_static_frictional_contact_force(tables):
     parameters = Parameters(stress_stiffening=False)
-    mesh = build_dovetail_mesh(parameters)
-    calculix = build_calculix_mesh(mesh, quadratic=False, glued=False)
-    lines = [*model_lines(calculix, parameters), *contact_lines(mesh, calculix, parameters), *contact_step(parameters)]
-    reference = read_contact_forces(run_calculix(tmp_path, lines))
-
     force = solve_static_contact(build(parameters, 0), parameters.friction_coefficient).reshape(2, -1, 3).sum(axis=1)
     own = np.column_stack([force[:, 0], np.hypot(force[:, 1], force[:, 2])])
-    assert own == pytest.approx(reference, rel=0.005)
+    assert own == pytest.approx(read_contact_forces(tables["contact"].result()), rel=0.005)

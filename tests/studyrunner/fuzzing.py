@@ -10,12 +10,13 @@ import random
 import resource
 import signal
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from studies import vetting
 from studyrunner import cli
+from tests.studyrunner.own_time import Stopwatch
+from tests.studyrunner.reading_process import read_in_a_fork
 
 NASTY = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
@@ -44,6 +45,7 @@ NASTY = (
     ),
 )
 SECONDS = 5.0
+PATIENCE = 240
 
 
 def mutate_text(text: str, chance: random.Random) -> bytes:
@@ -91,40 +93,25 @@ def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
     return bytes(changed)
 
 
-def read_in_a_fork(arguments: Sequence[str]) -> tuple[int, str]:
-    """Stands for a new process that reads the file: the same function, in a copy of this process."""
-    receive, send = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(receive)
-        with contextlib.suppress(BaseException):
-            # what this process has already is none of the file's
-            vetting.LARGEST_MEMORY += address_space()
-            status, said = vetting.read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
-            os.write(send, said.encode())
-            os._exit(status)
-        os._exit(99)
-    os.close(send)
-    with os.fdopen(receive, "rb") as pipe:
-        said = pipe.read().decode()
-    _, status, used = os.wait4(child, 0)
-    read_in_a_fork.largest = max(read_in_a_fork.largest, used.ru_maxrss)  # type: ignore[attr-defined]
-    return os.waitstatus_to_exitcode(status), said
-
-
-read_in_a_fork.largest = 0  # type: ignore[attr-defined]
-
-
 def address_space() -> int:
     """Bytes that this process has set aside."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     return pages * resource.getpagesize()
 
 
-def run(folder: Path, seed: int, n_files: int) -> dict[str, object]:
-    """Statuses and the worst of all files; what is wrong with one is in `wrong`."""
+def run(folder: Path, seed: int, numbers: Sequence[int]) -> dict[str, object]:
+    """Statuses and the worst of the files with these numbers; what is wrong with one is in `wrong`."""
     os.chdir(folder)
-    vetting.run_reader = read_in_a_fork
+    largest, waited = 0, 0.0
+
+    def read(arguments: Sequence[str]) -> tuple[int, str]:
+        nonlocal largest, waited
+        # what this process has already is none of the file's
+        found = read_in_a_fork(arguments, address_space())
+        largest, waited = max(largest, found.largest), waited + found.waited
+        return found.status, found.said
+
+    vetting.run_reader = read
     vetting.LONGEST = 1
     study, scene, result = (Path(name).read_bytes() for name in ("study", "scene.h5", "result"))
     statuses: dict[str, int] = {}
@@ -132,7 +119,7 @@ def run(folder: Path, seed: int, n_files: int) -> dict[str, object]:
     slowest = 0.0
     began_with = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     resource.setrlimit(resource.RLIMIT_AS, (address_space() + 2**31,) * 2)
-    for number in range(n_files):
+    for number in numbers:
         chance = random.Random(f"{seed} {number}")
         kind = chance.choices(["text", "scene", "result"], [0.4, 0.4, 0.2])[0]
         Path("study").write_bytes(mutate_text(study.decode(), chance) if kind == "text" else study)
@@ -140,11 +127,11 @@ def run(folder: Path, seed: int, n_files: int) -> dict[str, object]:
         Path("result").write_bytes(mutate_bytes(result, chance) if kind == "result" else result)
         Path("number").write_text(f"{kind} {seed} {number}", encoding="ascii")
         said, printed = io.StringIO(), io.StringIO()
-        signal.alarm(60)  # the end of this process: no hang gets past it
-        began = time.monotonic()
+        signal.alarm(PATIENCE)  # the end of this process: no hang gets past it
+        watch, waited = Stopwatch(), 0.0
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
             status = cli.main(["result" if kind == "result" else "study", "--plan"])
-        seconds = time.monotonic() - began
+        seconds = watch.seconds(waited)
         signal.alarm(0)
         slowest = max(slowest, seconds)
         lines = said.getvalue().splitlines()
@@ -154,9 +141,9 @@ def run(folder: Path, seed: int, n_files: int) -> dict[str, object]:
         key = f"{kind} {status}"
         statuses[key] = statuses.get(key, 0) + 1
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began_with
-    largest = max(grown, read_in_a_fork.largest)  # type: ignore[attr-defined]
-    return {"statuses": statuses, "wrong": wrong, "slowest": slowest, "largest": 1024 * largest}
+    return {"statuses": statuses, "wrong": wrong, "slowest": slowest, "largest": 1024 * max(grown, largest)}
 
 
 if __name__ == "__main__":
-    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))))
+    first, last = int(sys.argv[3]), int(sys.argv[4])
+    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), range(first, last))))

@@ -7,8 +7,8 @@ import resource
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
+from typing import Protocol
 
 import h5py
 import pytest
@@ -17,6 +17,11 @@ from studyrunner.archive import check_result_file
 from studyrunner.cli import main
 from studyrunner.user_error import UserError
 from tests.studyrunner.hostile_files import ALLOWED, SCENES, STUDY, TEXTS, change_scene, sparse_file
+from tests.studyrunner.own_time import Stopwatch
+from tests.studyrunner.reading_process import ReadingProcess
+
+# all files but those of the command alone
+pytestmark = pytest.mark.usefixtures("reader")
 
 VALUES_ONLY = {
     *("huge matrix", "huge vector", "bomb of zeros", "bomb within the limit", "huge extent without storage"),
@@ -37,7 +42,8 @@ MEASURED = """
 import resource, subprocess, sys
 # started by a small process: the largest size of a new one is at first that of its parent
 status = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
-print(status, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(status, used.ru_maxrss, used.ru_utime + used.ru_stime)
 """
 SECONDS = 5.0
 LARGEST = 2**30
@@ -65,32 +71,42 @@ def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], allowed: bool = False) -> str:
-    """The one line; time and memory of this process are within the limits. The one that reads has limits of its own."""
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began = time.monotonic()
-    status = main(arguments)
-    seconds = time.monotonic() - began
-    captured = capsys.readouterr()
-    grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own)
-    assert status == 2 or (allowed and status == 0)
-    assert seconds < SECONDS
-    assert grown < LARGEST
-    if status == 0:
-        return ""
-    assert captured.out == ""
-    said = captured.err.splitlines()
-    assert len(said) == 1
-    assert said[0].isprintable()
-    assert len(said[0]) < 2000
-    assert said[0].startswith("run-study: ")
-    return said[0]
+class Refused(Protocol):
+    """Runs the command and returns its one line; time and memory are within the limits."""
+
+    def __call__(self, arguments: list[str], allowed: bool = False) -> str: ...
+
+
+@pytest.fixture
+def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refused:
+    def run(arguments: list[str], allowed: bool = False) -> str:
+        # memory is that of this process: the one that reads has a limit of its own
+        own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        watch, waited = Stopwatch(), reader.waited
+        status = main(arguments)
+        seconds = watch.seconds(reader.waited - waited)
+        captured = capsys.readouterr()
+        grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own)
+        assert status == 2 or (allowed and status == 0)
+        assert seconds < SECONDS
+        assert grown < LARGEST
+        if status == 0:
+            return ""
+        assert captured.out == ""
+        said = captured.err.splitlines()
+        assert len(said) == 1
+        assert said[0].isprintable()
+        assert len(said[0]) < 2000
+        assert said[0].startswith("run-study: ")
+        return said[0]
+
+    return run
 
 
 @pytest.mark.parametrize("case", SCENES)
-def test_scene_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scene_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
-    line = refused(["study", "--plan"], capsys, allowed=case in ALLOWED)
+    line = refused(["study", "--plan"], allowed=case in ALLOWED)
     assert not line or line.startswith("run-study: scene.h5: ")
 
 
@@ -105,10 +121,10 @@ def put_scene_into_result() -> None:
 
 
 @pytest.mark.parametrize("case", SCENES)
-def test_scene_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
     put_scene_into_result()
-    line = refused(["result", "--plan"], capsys, allowed=case in ALLOWED)
+    line = refused(["result", "--plan"], allowed=case in ALLOWED)
     assert not line or "result: " in line
 
 
@@ -132,9 +148,9 @@ def test_damaged_result_file_for_those_who_open_it(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("case", TEXTS)
-def test_study_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_study_file(case: str, folder: Path, refused: Refused) -> None:
     (folder / "study").write_bytes(TEXTS[case])
-    refused(["study", "--plan"], capsys)
+    refused(["study", "--plan"])
 
 
 @pytest.mark.parametrize(
@@ -142,48 +158,50 @@ def test_study_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str])
     # an attribute is no text with a null; where the scene stands in the result, its name does not matter
     [case for case in TEXTS if len(TEXTS[case]) < 2**22 and b"\0" not in TEXTS[case] and not case.startswith("scene ")],
 )
-def test_study_in_a_result_file(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     with h5py.File("result", "r+", libver="latest") as result:
         del result.attrs["study"]
         result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))
     (folder / "scene.h5").unlink()
-    refused(["result", "--plan"], capsys)
+    refused(["result", "--plan"])
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5", "result"])
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.999])
-def test_truncated(place: str, share: float, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> None:
     content = (folder / place).read_bytes()
     (folder / place).write_bytes(content[: int(share * len(content))])
     # the last byte of a study is the end of its last line
-    refused(["result" if place == "result" else "study", "--plan"], capsys, allowed=place == "study" and share > 0.99)
+    refused(["result" if place == "result" else "study", "--plan"], allowed=place == "study" and share > 0.99)
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
-def test_sparse_terabyte(place: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_sparse_terabyte(place: str, folder: Path, refused: Refused) -> None:
     sparse_file(folder / place)
-    refused(["study", "--plan"], capsys)
+    refused(["study", "--plan"])
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
-def test_files_that_are_none(place: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_that_are_none(place: str, folder: Path, refused: Refused) -> None:
     path = folder / place
     path.unlink()
     os.mkfifo(path)
-    refused(["study", "--plan"], capsys)
+    refused(["study", "--plan"])
     path.unlink()
     path.symlink_to(place)
-    refused(["study", "--plan"], capsys)
+    refused(["study", "--plan"])
     path.unlink()
     path.symlink_to("/dev/zero")
-    refused(["study", "--plan"], capsys)
+    refused(["study", "--plan"])
 
 
-def test_names_of_files_do_not_reach_the_terminal_raw(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_of_files_do_not_reach_the_terminal_raw(
+    folder: Path, refused: Refused, capsys: pytest.CaptureFixture[str]
+) -> None:
     name = "\x1b[2J\udcff.toml"
     Path(name).write_text("[study", encoding="utf-8")
-    assert r"\x1b[2J\udcff.toml" in refused([name], capsys)
-    assert r"\x1b[2J" in refused(["study", "--set", "axes.step=\x1b[2J"], capsys)
+    assert r"\x1b[2J\udcff.toml" in refused([name])
+    assert r"\x1b[2J" in refused(["study", "--set", "axes.step=\x1b[2J"])
     (folder / "study").write_text(STUDY.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
     assert main(["study", "--plan"]) == 0
     assert "\x1b" not in capsys.readouterr().out
@@ -191,13 +209,12 @@ def test_names_of_files_do_not_reach_the_terminal_raw(folder: Path, capsys: pyte
 
 @pytest.mark.parametrize("case", ["inflating chunk", "bomb within the limit", "next to the largest"])
 def test_the_command_alone(case: str, folder: Path) -> None:
-    """Time and memory of the whole command, its start included."""
+    """Time of the processors and memory of the whole command, its start included."""
     change_scene(folder / "scene.h5", SCENES[case])
-    began = time.monotonic()
     command = [sys.executable, "-m", "studyrunner.cli", "study", "--plan"]
     done = subprocess.run([sys.executable, "-c", MEASURED, *command], capture_output=True, text=True, check=False)
-    status, largest = (int(word) for word in done.stdout.split()[-2:])
-    assert time.monotonic() - began < 2 * SECONDS
+    status, largest, seconds = (float(word) for word in done.stdout.split()[-3:])
+    assert seconds < 2 * SECONDS
     assert status == 2 or case in ALLOWED
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) == (status == 2)

@@ -25,6 +25,7 @@ FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ p
 FACTORS |= {"mPa": 1e3, "mN": 1e3, "m": 1.0, "N": 1.0, "mm³ per cycle": 1e9, "µm³ per cycle": 1e18, "": 1.0}
 FAILED = 5
 DESKTOP, PHONE = (1400, 1000), (400, 800)
+PATIENCE = 120.0  # s
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,8 @@ def browser() -> Iterator[Any]:
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    driver.set_script_timeout(PATIENCE)
+    driver.set_page_load_timeout(PATIENCE)
     yield driver
     driver.quit()
 
@@ -136,9 +139,10 @@ def wait_for_frame(page: Any) -> None:
 
 
 def click_at(page: Any, point: int) -> None:
-    """A press of the mouse on the pixel at which the plot of the response shows a point."""
+    """A press of the mouse on the pixel at which the plot of the response shows a point; it is picked afterwards."""
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.wait import WebDriverWait
 
     script = """
     const plot = document.getElementById("response-plot");
@@ -151,11 +155,30 @@ def click_at(page: Any, point: int) -> None:
       const x = xaxis._offset + xaxis.d2p(trace.x[at]), y = yaxis._offset + yaxis.d2p(trace.y[at]);
       return [x - box.width / 2, y - box.height / 2];
     }"""
-    x, y = page.execute_script(script, point)
     plot = page.find_element(By.ID, "response-plot")
-    actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
-    actions.move_by_offset(3, -2).pause(0.1).click().perform()
-    wait_for_frame(page)
+    # behind the listener of the page
+    page.execute_script(
+        """
+        const plot = arguments[0];
+        plot.clicked = null;
+        plot.listens ??= plot.on("plotly_click", (event) => { plot.clicked = event.points[0].customdata; });
+        """,
+        plot,
+    )
+
+    def hover(_: Any) -> bool:
+        # a click is one on what the plot has found under the mouse before, which it does in its own time
+        x, y = page.execute_script(script, point)
+        actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
+        actions.move_by_offset(3, -2).perform()
+        wait_for_frame(page)
+        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", plot)
+        return point in found
+
+    wait = WebDriverWait(page, PATIENCE, poll_frequency=0.1)
+    wait.until(hover)
+    ActionChains(page).click().perform()
+    wait.until(lambda _: page.execute_script("return arguments[0].clicked", plot) == point)
 
 
 def selected(page: Any) -> str:
