@@ -17,17 +17,19 @@ from solver.balance import Balance, Evaluation
 from solver.certificate import certify
 from solver.creep import creeps, rest_masses
 from solver.enrich import lead_to, start_with_tail
+from solver.estimate import NOTHING, UNKNOWN, Estimate
 from solver.factor import FEW_ROWS
 from solver.harmonics import change_orders, to_complex
 from solver.joint import Case, Joint
-from solver.kernels import SEPARATED, STICK
-from solver.ladder import LADDER, fewer, on_ladder
+from solver.ladder import LADDER, fewer, on_ladder, steps_to_see
 from solver.linear import JacobianSolver
 from solver.model import ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, final_history, solve_balance
+from solver.period import half_wave_symmetric, nothing_happens, shortest_contact
 from solver.settings import Resolution
 
 MOST_SAMPLES = 8192
+SEEN_SAMPLES = 2048  # a sine overtops a limit unseen by 1e-6 of its size then
 MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
 MOST_LEADS = 5  # ways to more harmonics in one refinement
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
@@ -35,42 +37,20 @@ MOST_REFINEMENT = 200  # iterations of one refinement in all
 FEW_ITERATIONS = 30  # where they are dear
 DEAR = 1000  # unknowns
 MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
+MOST_FAR = 200  # of a balance that is solved to see a short contact
 MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
 MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
 SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
-SMALL_WORK = 0.01  # of the work of the excitation: where normal force times slip is less, it is judged against this
+SCATTER_SAFETY = 2.0  # 1.5 to 1.1 times that to three times as many, but those of single events scatter
+SMALL_WORK = 0.001  # of the work of the excitation: where normal force times slip is less, it is judged against this
+SMALL_WORK_DEAR = 0.01  # the same where the unknowns are many
+NO_WORK = 1e-3  # of this: where even that is not reached, nothing wears
 CREEP = 0.1  # of rtol: share of the slip work that may be creep
 SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
-SYMMETRIC = 1e-9
 AIM = 0.8  # of rtol: an estimate is one within a factor
 SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Estimated relative errors of a state: of the first harmonic of its response and of its total wear rate."""
-
-    response: float
-    wear_rate: float
-
-    @property
-    def largest(self) -> float:
-        """The larger one."""
-        return max(self.response, self.wear_rate)
-
-    def __add__(self, other: Estimate) -> Estimate:
-        """Errors of two causes, at their worst."""
-        return Estimate(self.response + other.response, self.wear_rate + other.wear_rate)
-
-    def times(self, factor: float) -> Estimate:
-        """Larger errors."""
-        return Estimate(factor * self.response, factor * self.wear_rate)
-
-
-NOTHING = Estimate(0.0, 0.0)
-UNKNOWN = Estimate(np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -78,7 +58,8 @@ class Refined:
     """A state with the harmonics and samples that it needs, or as many as there may be.
 
     case: with the resolution of the state. point: the state; its parameter is that of the point refined. estimate: of
-    its errors. accurate: whether it is below rtol; for fixed settings always true. spare: whether fewer might do.
+    its errors. accurate: whether it is below rtol (that of the response, where only the finest samples show any slip);
+    for fixed settings always true. spare: whether fewer might do.
     """
 
     case: Case
@@ -96,13 +77,21 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
     here = _Level(case, case.joint(omega, excitation_amplitude), point)
     here = here.at_rest(effort)
     begun = effort.iterations
-    leads = MOST_LEADS
+    leads, faint = MOST_LEADS, False
     while True:
-        if _nothing_happens(here.point.evaluation):
+        if nothing_happens(here.point.evaluation):
             if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
                 first = here.solve_at(Resolution((1,), here.case.resolution.samples), effort)
                 here = first or here
-            return Refined(here.case, here.point, NOTHING, True)
+            missed = here.missed_event(effort)
+            if missed is None:
+                return Refined(here.case, here.point, NOTHING, True)
+            if settings.samples != "auto":
+                missing = here.difference(missed).times(SAMPLES_SAFETY)
+                accurate = not settings.automatic or missing.largest <= settings.rtol
+                return Refined(here.case, here.point, missing, accurate)
+            here, faint = missed, True
+            continue
         if settings.harmonics == "auto":
             here = here.without_even(effort) or here
         resolution = here.case.resolution
@@ -134,7 +123,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         next_level = None
         most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= DEAR else MOST_REFINEMENT)
         if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
-            if finer is not None and not more_harmonics:
+            if finer is not None and finer.case.resolution == wanted:
                 next_level = finer
             elif richer is not None and richer.case.resolution == wanted:
                 next_level = richer
@@ -143,7 +132,9 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             if next_level is None and settings.harmonics == settings.samples and richer is not None:
                 next_level = richer if _allowed(here, richer.case.resolution) else None
         if next_level is None:
-            return Refined(here.case, here.point, estimate, estimate.largest <= settings.rtol)
+            # slip that few samples see is no reason to give up a motion that is known
+            judged = estimate.response if faint else estimate.largest
+            return Refined(here.case, here.point, estimate, judged <= settings.rtol)
         here = next_level
 
 
@@ -187,6 +178,10 @@ class _Level:
         """Unknowns of the balance with other harmonics."""
         return self.joint.slots.size * (2 * len(resolution.orders) + 1)
 
+    def may_look_at(self, resolution: Resolution) -> bool:
+        """Whether a state of so many more harmonics is so cheap that it may be asked what these miss."""
+        return self.unknowns(resolution) <= MOST_FAR and self.case.model.holds(resolution.highest)
+
     def led_to(self, resolution: Resolution, effort: Effort) -> _Level | None:
         """The same state with more harmonics, these raised from nothing; None where that way ends."""
         if 2 * resolution.highest < self.case.resolution.samples:
@@ -227,27 +222,47 @@ class _Level:
         return _Level(self.case, self.joint, rested)
 
     def least_work(self) -> float:
-        """Slip work, N m, below which a relative error of it says nothing: a share of what the excitation does."""
+        """Slip work, N m, below which a relative error of it weighs less: a share of what the excitation does."""
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return SMALL_WORK * abs(self.joint.structure.input_work(motion))
+        cheap = self.unknowns(self.case.resolution) <= DEAR
+        return (SMALL_WORK if cheap else SMALL_WORK_DEAR) * abs(self.joint.structure.input_work(motion))
 
     def without_even(self, effort: Effort) -> _Level | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not _half_wave_symmetric(self.point.evaluation):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
 
-    def samples_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
-        """Estimated error for want of samples, and the state with twice as many that it comes from.
-
-        Where that is not found it is the difference to the state with half as many, which is at least as large.
+    def missed_event(self, effort: Effort) -> _Level | None:
+        """The same state with as many samples as it takes to see a pair slip or open, or the contact be made, between
+        the samples; None where nothing does. Harmonics without an event in between are exact: one look is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finer = self.solve_at(Resolution(orders, 2 * samples), effort)
+        finest = self.solve_at(Resolution(orders, max(SEEN_SAMPLES, 2 * samples)), effort)
+        if finest is None or nothing_happens(finest.point.evaluation):
+            return None
+        while (samples := 2 * samples) < finest.case.resolution.samples:
+            level = self.solve_at(Resolution(orders, samples), effort)
+            if level is not None and not nothing_happens(level.point.evaluation):
+                return level
+        return finest
+
+    def samples_error(self, effort: Effort) -> tuple[Estimate, _Level | None]:
+        """Estimated error for want of samples, and the state with more of them that it comes from.
+
+        What is wrong is where in its step an event falls. A sample next to an extreme is also among twice as many and
+        may still be the one next to it: then both states are wrong by the same. So the others lie in between: three
+        times as many and two, which have only the phases 0 and pi in common with these. Where the unknowns are many so
+        are the events, and twice as many samples, with which the refinement can go on, tell enough. Where no state is
+        found it is the difference to the one with half as many, which is at least as large.
+        """
+        orders, samples = self.case.resolution.orders, self.case.resolution.samples
+        few = self.unknowns(self.case.resolution) <= DEAR
+        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), effort)
         if finer is not None:
-            return self.difference(finer).times(SAMPLES_SAFETY), finer
+            return self.difference(finer).times(SCATTER_SAFETY if few else SAMPLES_SAFETY), finer
         coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
@@ -256,15 +271,25 @@ class _Level:
 
         It is the difference to the state two steps up the ladder; where that is not found, takes too many unknowns, or
         the scene does not hold the nodal diameters of so many, one step; where not even those, to the state one step
-        down, which is larger.
+        down, which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
+        and where none such is found the error is unknown, whatever the other states say.
         """
-        for steps, safety in ((2, HARMONICS_SAFETY), (1, NEAR_SAFETY), (-1, HARMONICS_SAFETY)):
+        contact = shortest_contact(self.point.evaluation.status_t)
+        # a whole period of the highest harmonic in the contact shows it well, half a period shows it
+        far, seeing = (steps_to_see(self.case.resolution, share * contact, 2) for share in (0.5, 1.0))
+        while far > 2 and not self.may_look_at(on_ladder(self.case.resolution, far)):
+            far -= 1
+        seeing = min(seeing, far)
+        for steps in sorted({far, seeing, 2, 1, -1}, reverse=True):
             other = on_ladder(self.case.resolution, steps)
             affordable = self.unknowns(other) <= MOST_COMPARED
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = self.solve_at(other, effort)
                 if level is not None:
-                    return self.difference(level).times(safety), level if steps > 0 else None
+                    richer = level if steps > 0 else None
+                    if steps < seeing and seeing > 2:
+                        return UNKNOWN, richer
+                    return self.difference(level).times(NEAR_SAFETY if steps == 1 else HARMONICS_SAFETY), richer
         return UNKNOWN, None
 
     def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[_Level, Estimate]:
@@ -308,27 +333,12 @@ class _Level:
         mine, its = self.response(), better.response()
         response = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), better.least_response())
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
-        least = better.least_work()
-        if max(its_slip, mine_slip) <= 1e-3 * least:
+        least = max(self.least_work(), better.least_work())
+        if max(its_slip, mine_slip) <= NO_WORK * least:
             return Estimate(response, 0.0)
         # no wear rate is surer than the motion that it comes from
-        return Estimate(response, max(response, abs(mine_slip - its_slip) / max(its_slip, least)))
-
-
-def _nothing_happens(evaluation: Evaluation) -> bool:
-    """Whether every pair sticks or is open all period long: the joint is linear."""
-    sticks, open_ = (evaluation.status_t == STICK).all(axis=1), (evaluation.status_t == SEPARATED).all(axis=1)
-    return bool((sticks | open_).all())
-
-
-def _half_wave_symmetric(evaluation: Evaluation) -> bool:
-    """Whether the contact force has no even harmonics but the static one."""
-    half = evaluation.force_t.shape[2] // 2
-    if evaluation.force_t.shape[2] % 2:
-        return False
-    total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
-    size = np.abs(evaluation.force_t).max(initial=0.0)
-    return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
+        size = max(its_slip, NO_WORK * least)
+        return Estimate(response, max(response, abs(mine_slip - its_slip) / size), size / max(size, least))
 
 
 def _allowed(here: _Level, resolution: Resolution) -> bool:

@@ -7,11 +7,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.adapt import UNKNOWN, Refined, lighter, refine
+from solver.adapt import Refined, lighter, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.certificate import certify
 from solver.clock import computing_time
+from solver.estimate import UNKNOWN
 from solver.history import StartState
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver

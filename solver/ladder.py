@@ -5,6 +5,7 @@ from __future__ import annotations
 from solver.settings import Resolution, SolverSettings, all_orders, samples_for
 
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
+RESOLVED = 0.5  # periods of the highest harmonic that the shortest contact takes, from where on harmonics see it
 
 
 def on_ladder(resolution: Resolution, steps: int) -> Resolution:
@@ -27,3 +28,14 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     if settings.samples == "auto":
         samples = max(samples // 2, samples_for(orders[-1]))
     return Resolution(orders, samples)
+
+
+def steps_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
+    """Steps up the ladder, at least `fewest`, to harmonics that see a contact which takes such a share of the period.
+
+    While a contact takes less than about half a period of the highest harmonic, its force is much the same in every
+    harmonic, and a few more of them change next to nothing, however large the error.
+    """
+    above = [step for step in LADDER if step > resolution.highest]
+    blind = sum(step * contact < RESOLVED for step in above)
+    return max(fewest, min(blind + 1, len(above)))

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.adapt import Estimate
 from solver.balance import Evaluation
 from solver.certificate import Certificate
+from solver.estimate import Estimate
 from solver.history import PeriodicState, StartState
 from solver.outcome import Outcome
 from solver.packed import Packed

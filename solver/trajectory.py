@@ -7,9 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.adapt import Estimate, refine
+from solver.adapt import refine
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
+from solver.estimate import Estimate
 from solver.explicit_limit import explicit_step_limit
 from solver.history import StartState
 from solver.joint import Case, Joint

@@ -11,6 +11,7 @@ import numpy as np
 from solver import adapt
 from solver.arc import follow_arc
 from solver.balance import Balance
+from solver.estimate import Estimate
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
 from solver.linear import JacobianSolver
@@ -86,7 +87,7 @@ class Errors:
     amplitude: float
     response: float
     wear: float
-    estimate: adapt.Estimate
+    estimate: Estimate
     accurate: bool
     orders: tuple[int, ...]
     samples: int

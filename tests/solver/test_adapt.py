@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from solver import adapt
-from solver.adapt import Estimate, Refined, refine, transfer
+from solver.adapt import Refined, refine, transfer
+from solver.estimate import Estimate
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
 from solver.kernels import SLIP, STICK

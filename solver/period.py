@@ -1,0 +1,47 @@
+"""What happens in the period of a state, as far as harmonics and samples are chosen by it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.balance import Evaluation
+from solver.kernels import SEPARATED, STICK
+from solver.model import IntArray
+
+SYMMETRIC = 1e-9
+STILL = 1e-9  # of the tangential state: less is no slip
+
+
+def nothing_happens(evaluation: Evaluation) -> bool:
+    """Whether every pair sticks or is open all period long: the joint is linear. What only touches its limit sticks."""
+    separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
+    still = (np.ptp(state_t, axis=2) <= STILL * np.abs(state_t).max(axis=2)).all(axis=1) & ~separated.any(axis=1)
+    sticks = (evaluation.status_t == STICK).all(axis=1)
+    return bool((sticks | still | separated.all(axis=1)).all())
+
+
+def half_wave_symmetric(evaluation: Evaluation) -> bool:
+    """Whether the contact force has no even harmonics but the static one."""
+    half = evaluation.force_t.shape[2] // 2
+    if evaluation.force_t.shape[2] % 2:
+        return False
+    total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
+    size = np.abs(evaluation.force_t).max(initial=0.0)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
+
+
+def shortest_contact(status_t: IntArray) -> float:
+    """Share of the period that the shortest contact of a pair takes that opens; 1 where none does.
+
+    status_t (n_contact, N): states of the pairs at the samples.
+    """
+    n_samples = status_t.shape[1]
+    shortest = n_samples
+    for closed in status_t != SEPARATED:
+        begins = np.flatnonzero(closed & ~np.roll(closed, 1))
+        ends = np.flatnonzero(~closed & np.roll(closed, 1))
+        if begins.size:
+            # the first end belongs to the last beginning where the period begins in contact
+            lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
+            shortest = min(shortest, int(lasted.min()))
+    return float(shortest / n_samples)

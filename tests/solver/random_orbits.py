@@ -1,0 +1,317 @@
+"""Random textbook scenes with one contact pair whose periodic motions are known exactly, of any size and unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.continuation import follow_branch
+from solver.harmonics import synthesis, to_complex
+from solver.history import WearHistory
+from solver.joint import build_case
+from solver.march import march_wear
+from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from tests.contact_pair import ContactPair
+
+Draw = Callable[[np.random.Generator], "Scene"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A structure with a contact pair as in `tests.contact_pair`, its harmonic load per unit of the excitation, N."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    load_static: np.ndarray
+    load_harmonic: np.ndarray
+    normal: int | None
+    tangent: int | None
+    normal_load: float
+    gap: float
+    friction: float
+    excitation: float
+    omega: float
+
+    @property
+    def pair(self) -> ContactPair:
+        """The same for the exact motion."""
+        load = self.excitation * self.load_harmonic
+        matrices = self.mass, self.damping, self.stiffness, self.load_static, load
+        return ContactPair(*matrices, self.normal, self.tangent, self.normal_load, self.gap, self.friction, self.omega)
+
+    @property
+    def model(self) -> ReducedModel:
+        """The same for the solver; its responses are those of the masses."""
+        rows = np.eye(len(self.mass))[np.diag(self.mass) > 0.0]
+        linear = LinearModel(
+            self.mass, self.damping, self.stiffness, self.load_static, self.load_harmonic.astype(complex), rows
+        )
+        dofs = [-1 if index is None else index for index in (self.normal, self.tangent, None)]
+        contact = ContactInterface(
+            dofs=np.array([dofs], np.int64),
+            area=np.ones(1),
+            gap=np.array([self.gap]),
+            normal_load=np.array([self.normal_load]),
+            position=np.full((1, 3), np.nan),
+            surface=("pair",),
+        )
+        return ReducedModel({0: linear}, contact, tuple(f"mass {index}" for index in range(len(rows))))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the solver finds, and its true errors where it says that there is a state; NaN where not.
+
+    slip_work: exact, N m.
+    """
+
+    outcome: Outcome
+    response: float = np.nan
+    wear_rate: float = np.nan
+    response_estimate: float = np.nan
+    wear_rate_estimate: float = np.nan
+    slip_work: float = np.nan
+    iterations: int = 0
+
+
+def find(scene: Scene, rtol: float, sweep: str = "up") -> Found:
+    """Solve with automatic settings and compare with the exact motion next to what is found.
+
+    Raises tests.event_driven.NoPeriodicMotionError.
+    """
+    settings, model = SolverSettings(rtol=rtol), scene.model
+    frequency = np.array([scene.omega / (2.0 * np.pi)])
+    ((_, start),) = follow_branch(model, scene.friction, scene.excitation, frequency, sweep, settings)
+    history = march_wear(model, scene.friction, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
+    if history.outcome is not Outcome.CONVERGED or start.state is None:
+        return Found(history.outcome, iterations=history.newton_iterations)
+    case = build_case(model, scene.friction, start.penalty_omega, settings, start.resolution)
+    joint = case.joint(scene.omega, scene.excitation)
+    masses = np.diag(scene.mass) > 0.0
+    motion_h = np.zeros((len(scene.mass), 2 * len(start.resolution.orders) + 1))
+    motion_h[masses] = joint.structure.response_h(joint.to_relative(start.state.displacement_h))
+    if scene.tangent is not None and not masses[scene.tangent]:
+        motion_h[scene.tangent] = start.state.displacement_h[0, 1]
+    orders = start.resolution.orders
+    displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
+    velocity = (1j * scene.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
+    pair = scene.pair
+    orbit = pair.orbit_near(displacement, velocity)
+    exact, slip_work = pair.response(orbit), pair.slip_work(orbit)
+    return Found(
+        history.outcome,
+        response=float(np.linalg.norm(history.response[0] - exact) / np.linalg.norm(exact)),
+        wear_rate=_relative(history, slip_work),
+        response_estimate=float(history.response_error[0]),
+        wear_rate_estimate=float(history.wear_rate_error[0]),
+        slip_work=slip_work,
+        iterations=history.newton_iterations,
+    )
+
+
+def _relative(history: WearHistory, slip_work: float) -> float:
+    found = float(history.wear_rate[0])
+    return abs(found - slip_work) / slip_work if slip_work else found
+
+
+def _spread(random: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def _units(random: np.random.Generator) -> tuple[float, float, float]:
+    """Stiffness, N/m, mass, kg, and excitation, N."""
+    stiffness, mass, force = (_spread(random, 1e-3, 1e3) for _ in range(3))
+    return stiffness, mass, force
+
+
+def slider(random: np.random.Generator, lowest: float = 0.5, highest: float = 1.5) -> Scene:
+    """Den Hartog's slider, pressed by a constant force or by a spring; often next to its resonance, often undamped."""
+    k, m, force = _units(random)
+    ratio = random.uniform(lowest, highest)
+    if lowest < 1.0 < highest and random.random() < 0.25:
+        ratio = 1.0 + random.choice([-1.0, 1.0]) * _spread(random, 2e-3, 0.05)
+    damping = random.choice([0.0, random.uniform(0.0, 0.2)]) * np.sqrt(k * m)
+    friction = random.choice([0.1, 0.5, 1.0])
+    load = random.uniform(0.05, 0.8) * force / friction
+    return slid(m, damping, k, load, friction, force, ratio * np.sqrt(k / m), random.choice([0.0, k]))
+
+
+def slid(
+    mass: float,
+    damping: float,
+    stiffness: float,
+    load: float,
+    friction: float,
+    force: float,
+    omega: float,
+    pressing: float = 0.0,
+    swing: complex = 0.0,
+) -> Scene:
+    """A mass on a slider. pressing: stiffness, N/m, of a spring at the pair, or 0. swing: harmonic part of the normal
+    force, N, which takes a spring.
+    """
+    normal = pressing > 0.0
+    places = slice(0 if normal else 1, None)
+    mass_, damping_, stiffness_ = (
+        np.diag(both)[places, places] for both in ((0.0, mass), (0.0, damping), (pressing, stiffness))
+    )
+    static, harmonic = np.array([load, 0.0]) if normal else np.zeros(2), np.array([swing / force, 1.0])
+    return Scene(
+        mass_,
+        damping_,
+        stiffness_,
+        static[places],
+        harmonic[places],
+        0 if normal else None,
+        1 if normal else 0,
+        0.0 if normal else load,
+        0.0,
+        friction,
+        force,
+        omega,
+    )
+
+
+def stopping_slider(random: np.random.Generator) -> Scene:
+    """So slow that it stops, or stops several times in half a period."""
+    return slider(random, 0.15, 0.5)
+
+
+def swinging_slider(random: np.random.Generator) -> Scene:
+    """Slider whose normal force swings, out of phase with the motion, and may leave it free."""
+    k, m, force = _units(random)
+    friction = random.choice([0.2, 0.6])
+    load = random.uniform(0.05, 0.7) * force / friction
+    swing = load * random.uniform(0.0, 1.5) * np.exp(2j * np.pi * random.random())
+    damping, omega = random.uniform(0.01, 0.16) * np.sqrt(k * m), random.uniform(0.4, 1.6) * np.sqrt(k / m)
+    return slid(m, damping, k, load, friction, force, omega, k * _spread(random, 0.1, 100.0), swing)
+
+
+def two_masses(random: np.random.Generator) -> Scene:
+    """Chain of two masses, friction on the second, about both of its resonances."""
+    k, m, force = _units(random)
+    share, other = _spread(random, 0.3, 3.0), _spread(random, 0.3, 3.0)
+    mass, stiffness = m * np.diag([1.0, share]), k * np.array([[1.0 + other, -other], [-other, other]])
+    natural = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real))
+    damping = 2.0 * random.uniform(0.005, 0.04) / natural[0] * stiffness
+    omega = random.choice(natural) * random.uniform(0.6, 1.3)
+    load = random.uniform(0.05, 0.8) * force / 0.5
+    return Scene(mass, damping, stiffness, np.zeros(2), np.eye(2)[0], None, 1, load, 0.0, 0.5, force, omega)
+
+
+def wall(ratio: float, gap: float, damping: float, stiffness: float, phase: float = 0.0) -> Scene:
+    """Mass before an elastic wall, all in units of the mount. gap: in static deflections. damping: share of critical.
+    phase: rad, of the excitation.
+    """
+    return Scene(
+        np.diag([0.0, 1.0]),
+        np.diag([0.0, 2.0 * damping]),
+        np.array([[stiffness, -stiffness], [-stiffness, stiffness + 1.0]]),
+        np.zeros(2),
+        np.array([0.0, np.exp(1j * phase)]),
+        0,
+        None,
+        0.0,
+        gap,
+        0.0,
+        1.0,
+        ratio,
+    )
+
+
+def impact(random: np.random.Generator) -> Scene:
+    """Vibro-impact: behind a gap, without one, or pressed on the wall."""
+    gap = random.choice([0.0, -_spread(random, 0.05, 2.0), _spread(random, 0.1, 10.0), _spread(random, 0.1, 10.0)])
+    return wall(random.uniform(0.3, 2.5), gap, _spread(random, 0.01, 0.2), _spread(random, 5.0, 300.0))
+
+
+def grazing(random: np.random.Generator) -> Scene:
+    """The mass without the wall would just touch it, or just not."""
+    ratio, damping = random.uniform(0.3, 1.8), _spread(random, 0.01, 0.2)
+    free = 1.0 / abs(1.0 - ratio**2 + 2j * damping * ratio)
+    gap = free * (1.0 - random.choice([-1.0, 1.0, 1.0, 1.0]) * _spread(random, 1e-5, 0.1))
+    return wall(ratio, gap, damping, _spread(random, 5.0, 300.0), random.uniform(0.0, 2.0 * np.pi))
+
+
+def behind_spring(
+    tangential: float, damping: float, limit: float, omega: float, force: complex = 1.0, units: float = 1.0
+) -> Scene:
+    """Jenkins' element on a mass, its mount of stiffness 1 N/m and the mass 1 kg, all forces and stiffnesses times
+    `units`. damping: N s/m. limit: of friction, N.
+    """
+    return Scene(
+        units * np.diag([0.0, 1.0]),
+        units * np.diag([0.0, damping]),
+        units * np.array([[tangential, -tangential], [-tangential, 1.0 + tangential]]),
+        np.zeros(2),
+        np.array([0.0, force]),
+        None,
+        0,
+        units * limit / 0.4,
+        0.0,
+        0.4,
+        units,
+        omega,
+    )
+
+
+def jenkins(random: np.random.Generator) -> Scene:
+    """Elastic dry friction about its two resonances."""
+    tangential = _spread(random, 0.1, 30.0)
+    omega = random.uniform(0.8, 1.2) * random.choice([1.0, np.sqrt(1.0 + tangential)])
+    return behind_spring(
+        tangential, random.uniform(0.002, 0.1), _spread(random, 0.1, 5.0), omega, 1.0, _spread(random, 1e-3, 1e3)
+    )
+
+
+def slipping_little(random: np.random.Generator) -> Scene:
+    """Elastic dry friction next to the onset of slip."""
+    tangential, damping = _spread(random, 0.1, 30.0), random.uniform(0.01, 0.1)
+    omega = random.uniform(0.3, 1.5) * np.sqrt(1.0 + tangential)
+    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
+    over = random.choice([-1.0, 1.0, 1.0, 1.0]) * _spread(random, 1e-4, 0.2)
+    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(2j * np.pi * random.random()))
+
+
+def inclined(random: np.random.Generator) -> Scene:
+    """Mass in the plane on inclined mounts, pressed on an elastic pair: slip, stick and separation at once."""
+    k, m, force = _units(random)
+    tangential, normal = k * _spread(random, 0.3, 30.0), k * _spread(random, 0.3, 30.0)
+    angle = random.uniform(0.0, np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    mount = k * turn @ np.diag([1.0, _spread(random, 0.3, 4.0)]) @ turn.T
+    stiffness, damping = np.zeros((4, 4)), np.zeros((4, 4))
+    stiffness[:2, :2], stiffness[2:, 2:] = np.diag([normal, tangential]), mount + np.diag([tangential, normal])
+    stiffness[0, 3] = stiffness[3, 0] = -normal
+    stiffness[1, 2] = stiffness[2, 1] = -tangential
+    low, high = (np.sqrt(np.linalg.eigvalsh(of / m)) for of in (mount, stiffness[2:, 2:]))
+    damping[2:, 2:] = random.uniform(0.02, 0.1) / low[0] * mount + 0.02 * np.sqrt(k * m) * np.eye(2)
+    load = np.array([0.0, 0.0, 0.0, _spread(random, 0.3, 20.0) * force])
+    share = random.uniform(0.0, 1.0)
+    harmonic = np.array([0.0, 0.0, np.sqrt(1.0 - share**2), share * np.exp(2j * np.pi * random.random())])
+    omega = random.uniform(0.5 * low[0], 1.2 * high[1])
+    mass = np.diag([0.0, 0.0, m, m])
+    return Scene(mass, damping, stiffness, load, harmonic, 0, 1, 0.0, 0.0, random.uniform(0.2, 0.6), force, omega)
+
+
+KINDS: dict[str, Draw] = {
+    "slider": slider,
+    "stopping slider": stopping_slider,
+    "swinging slider": swinging_slider,
+    "two masses": two_masses,
+    "impact": impact,
+    "grazing": grazing,
+    "jenkins": jenkins,
+    "slipping little": slipping_little,
+    "inclined": inclined,
+}
+
+
+def drawn(kind: str, seed: int) -> Scene:
+    """A scene of a kind."""
+    return KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))

@@ -1,0 +1,109 @@
+"""Automatic states of random scenes against their exact motions: as accurate as asked for, errors not played down."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.kernels import SEPARATED, SLIP, STICK
+from solver.ladder import LADDER, steps_to_see
+from solver.outcome import Outcome
+from solver.period import shortest_contact
+from solver.settings import Resolution
+from tests.references import coulomb_orbit, vibro_impact_orbit
+from tests.solver.random_orbits import KINDS, Scene, behind_spring, drawn, find, wall
+
+ROUND_OFF = 1e-10
+SEEDS = (2, 4)
+
+
+def barely_slipping(tangential: float, damping: float, omega: float, over: float) -> Scene:
+    """Elastic dry friction whose limit is exceeded by a share `over` if it sticks."""
+    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
+    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(0.7j))
+
+
+HARD = {
+    # in contact for 2 % of the period: up to nine harmonics, each next one changes less than a tenth of the error
+    "short contact": wall(0.39251, 1.17792, 0.04593, 85.95555),
+    # with three harmonics there is a state that no exact motion is like, but the one with a single harmonic is
+    "spurious state": wall(1.67268, 0.52004, 0.19517, 84.16794),
+    # the wall is touched, or the friction limit is exceeded, between two of 64 samples only
+    "touch between samples": wall(0.30277, 1.09583, 0.13481, 24.17409),
+    "slip between samples": barely_slipping(3.15541, 0.09326, 1.2, 1.3e-4),
+    "slip in one sample": barely_slipping(0.27652, 0.055, 0.8, 2.6e-4),
+    # what is next to the turns among some samples is so among twice as many
+    "nested samples": barely_slipping(0.36178, 0.032, 0.9, 3e-5),
+}
+
+
+def check(scene: Scene, rtol: float, sweep: str) -> None:
+    found = find(scene, rtol, sweep)
+    assert found.outcome is Outcome.CONVERGED
+    assert max(found.response, found.wear_rate) <= rtol, found
+    assert found.response_estimate >= 0.5 * found.response - ROUND_OFF, found
+    assert found.wear_rate_estimate >= 0.5 * found.wear_rate - ROUND_OFF, found
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_random_state_is_accurate_and_its_error_not_played_down(kind: str, seed: int, rtol: float) -> None:
+    check(drawn(kind, seed), rtol, "up" if seed % 4 else "down")
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_events_shorter_than_a_sample_or_a_harmonic_are_seen(name: str) -> None:
+    check(HARD[name], 1e-2, "up")
+
+
+def test_what_is_not_reached_is_said() -> None:
+    # so little slips that its wear rate has to be judged by more samples than there may be
+    found = find(barely_slipping(0.36178, 0.032, 0.9, 1e-5), 1e-3)
+    if found.outcome is Outcome.CONVERGED:
+        assert found.wear_rate_estimate >= 0.5 * found.wear_rate
+    else:
+        assert found.outcome is Outcome.INACCURATE
+
+
+@pytest.mark.parametrize("kind", ["slider", "stopping slider", "two masses"])
+def test_the_pair_moves_like_the_mass_on_a_slider(kind: str) -> None:
+    scene = drawn(kind, 2)
+    at = scene.tangent
+    masses = np.diag(scene.mass) > 0.0
+    parts = (part[np.ix_(masses, masses)] for part in (scene.mass, scene.damping, scene.stiffness))
+    normal = scene.normal_load or scene.load_static[scene.normal]
+    load, place = scene.excitation * scene.load_harmonic[masses], int(masses[:at].sum())
+    twin = coulomb_orbit(*parts, load, place, scene.friction * normal, scene.omega)
+    orbit = scene.pair.orbit_near(np.zeros(masses.size), np.zeros(masses.size))
+    expected = [twin.harmonic(index) for index in range(len(load))]
+    assert scene.pair.response(orbit) == pytest.approx(np.array(expected), rel=1e-8)
+    slid = twin.path(place, [name for name in twin.system.phases if name != "stick"])
+    assert scene.pair.slip_work(orbit) == pytest.approx(normal * slid, rel=1e-8)
+
+
+def test_the_pair_moves_like_the_mass_at_a_wall() -> None:
+    scene = wall(0.9, 1.5, 0.05, 50.0)
+    orbit = scene.pair.orbit_near(np.zeros(2), np.zeros(2))
+    twin = vibro_impact_orbit(1.0, 0.1, 1.0, 1.0, 50.0, 1.5, 0.9, sweep_start=0.85)
+    assert scene.pair.response(orbit) == pytest.approx(np.array([twin.harmonic(0)]), rel=1e-8)
+
+
+def test_the_shortest_contact_is_counted_around_the_period() -> None:
+    status = np.full((3, 16), STICK)
+    assert shortest_contact(status) == 1.0
+    status[1, 3:13] = SEPARATED
+    assert shortest_contact(status) == 6.0 / 16.0
+    status[2, :9] = status[2, 11:] = SEPARATED
+    status[2, 9] = SLIP
+    assert shortest_contact(status) == 2.0 / 16.0
+    status[0] = SEPARATED
+    assert shortest_contact(status) == 2.0 / 16.0
+
+
+def test_harmonics_that_see_a_short_contact_are_far_up() -> None:
+    one = Resolution((1,), 64)
+    assert steps_to_see(one, 1.0, 2) == 2
+    # half a period of the highest harmonic: 27 of them for a contact of 2 % of the period
+    assert LADDER[steps_to_see(one, 0.02, 2)] == 27
+    assert steps_to_see(one, 1e-6, 2) == len(LADDER) - 1
