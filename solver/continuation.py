@@ -12,6 +12,7 @@ from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.certificate import certify
 from solver.clock import computing_time
+from solver.doubling import doubles_period
 from solver.estimate import UNKNOWN
 from solver.history import StartState
 from solver.joint import Case, build_case
@@ -193,6 +194,8 @@ class _Line:
         certificate = certify(joint, refined.point.evaluation)
         if not certificate.holds(self.case.settings.tolerance):
             return Outcome.CERTIFICATE_FAILED, None
+        if doubles_period(self.case.model, joint, refined.point.evaluation):
+            return Outcome.PERIOD_DOUBLED, None
         return Outcome.CONVERGED, refined
 
     def _costly(self) -> bool:

@@ -107,8 +107,8 @@ def march_wear(
                 refreshed = march.effort.iterations
                 if keep is not None:
                     keep(progress)
-        if outcome is Outcome.CONVERGED and not march.stays():
-            outcome = Outcome.UNSTABLE
+        if outcome is Outcome.CONVERGED:
+            outcome = march.stability()
     except np.linalg.LinAlgError:
         outcome = Outcome.SINGULAR
     except OutOfTimeError:

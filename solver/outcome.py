@@ -24,6 +24,7 @@ class Outcome(IntEnum):
     EXCEPTION = 11
     CRASHED = 12
     NOT_COMPUTED = 13
+    PERIOD_DOUBLED = 14
 
     @property
     def meaning(self) -> str:
@@ -50,6 +51,8 @@ _SENTENCES = {
     " use more samples or a smaller tolerance.",
     Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"
     " direction, use more frequencies or start elsewhere.",
+    Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two periods of the excitation or more,"
+    " which is not computed: the state that repeats after one is unstable.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",

@@ -10,6 +10,7 @@ import numpy as np
 from solver.adapt import refine
 from solver.balance import Balance, Evaluation
 from solver.certificate import certify
+from solver.doubling import doubles_period
 from solver.estimate import Estimate
 from solver.explicit_limit import explicit_step_limit
 from solver.history import StartState
@@ -109,9 +110,9 @@ class Trajectory:
         """Whether the current state may be reported: errors below rtol and a certificate that holds."""
         now = self.point.evaluation.predicted_h[:, 1:]
         changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
-        accurate = True
+        accurate, anew = True, False
         if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
-            accurate = self._refine()
+            accurate, anew = self._refine(), True
         holds = self._certify()
         if not holds and accurate and self.case.settings.automatic:
             # more harmonics or samples may be all that it needs
@@ -119,7 +120,9 @@ class Trajectory:
             holds = self._certify()
         if not accurate:
             return Outcome.INACCURATE
-        return Outcome.CONVERGED if holds else Outcome.CERTIFICATE_FAILED
+        if not holds:
+            return Outcome.CERTIFICATE_FAILED
+        return self._doubling() if anew else Outcome.CONVERGED
 
     def _certify(self) -> bool:
         """Certificate of the current state, and whether it holds."""
@@ -228,9 +231,15 @@ class Trajectory:
             return True
         return False
 
-    def stays(self) -> bool:
-        """Whether the current state is stable."""
-        return self.is_stable(self.point.evaluation)
+    def stability(self) -> Outcome:
+        """Whether the current state is one that the vibration stays at."""
+        if not self.is_stable(self.point.evaluation):
+            return Outcome.UNSTABLE
+        return self._doubling()
+
+    def _doubling(self) -> Outcome:
+        doubled = doubles_period(self.case.model, self.joint, self.point.evaluation)
+        return Outcome.PERIOD_DOUBLED if doubled else Outcome.CONVERGED
 
     def oscillates(self) -> bool:
         """Whether the wear rate of the joint or of a pair went up and down from step to step."""
