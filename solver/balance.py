@@ -80,7 +80,7 @@ class Balance:
         surplus = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
         motion_tangent = joint.motion(surplus).reshape(-1, 3 * m, 3 * m)
         motion_tangent[:, 0, :] += self.wear_gain[:, None] * slip_tangent
-        return Linearisation(joint, force_tangent, motion_tangent)
+        return Linearisation(joint, at, force_tangent, motion_tangent)
 
 
 @dataclass(frozen=True)
@@ -120,11 +120,13 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
 class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
-    Where a pair stays stuck or closed all period long its motion does not depend on p: these unknowns stand in the
-    Jacobian as columns of the identity, are left out of the coupled system and follow from it (`active`).
+    at: what the pairs do where this is the derivative. Where a pair stays stuck or closed all period long its motion
+    does not depend on p: these unknowns stand in the Jacobian as columns of the identity, are left out of the coupled
+    system and follow from it (`active`).
     """
 
     joint: Joint
+    at: Marched
     force_tangent: FloatArray
     motion_tangent: FloatArray
 

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance import Balance, Evaluation
-from solver.linear import JacobianSolver, ritz_values
+from solver.krylov import ritz_values
+from solver.linear import JacobianSolver
 from solver.model import FloatArray
 
 PRODUCTS = 16  # products of Arnoldi's method, one linear solve each

@@ -1,6 +1,7 @@
 """A factorisation of the balance's Jacobian that GMRES on the exact one is preconditioned with.
 
-In the space in which the pairs slip or open where that is small (`slip_space`), else by groups of harmonics. The
+In the space in which the pairs slip or open where that is small (`slip_space`), else by a march through the period
+(`period_factor`). That one knows no determinant and no masses on sliders: there it is by groups of harmonics. The
 harmonics of a balance are coupled by the pairs that slip or open. That coupling is strong among the lowest ones, which
 are factorised together as far as `DENSE` unknowns go; above, each harmonic is factorised on its own with the part of
 the pairs' tangents that keeps it to itself, a complex matrix of as many rows as there are relative displacements.
@@ -17,12 +18,13 @@ import scipy.linalg
 
 from solver.balance import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.slip_space import NEUTRAL, SlipFactor, build_slip_factor, find_slip_space, sign_of
+from solver.period_factor import PeriodFactor, build_period_factor
+from solver.slip_space import NEUTRAL, SlipFactor, SlipSpace, build_slip_factor, find_slip_space, sign_of
 
 EXACT = 600  # directions of the slip space that are all kept: 48 pairs with five harmonics near a resonance
 FEW_ROWS = 40  # relative displacements up to which impacts couple most harmonics and directions
 EXACT_FEW = 2500  # directions that are all kept then
-MOST = 1000  # directions of the slip space beyond which the harmonics are grouped
+MOST = 1000  # directions of the slip space beyond which it is not factorised
 CUTOFF = 0.05  # of a pair that slips: directions that are left out where there are more than are all kept
 DENSE = 800  # unknowns of the lowest harmonics that are factorised together
 
@@ -61,14 +63,27 @@ class HarmonicFactor:
         return solved
 
 
-Factor = SlipFactor | HarmonicFactor
+SignedFactor = SlipFactor | HarmonicFactor
+Factor = SignedFactor | PeriodFactor
 
 
 def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
     """Factorisation of a Jacobian whose pairs other than `pairs` do not depend on their predicted force."""
-    few = tangent.joint.slots.size <= FEW_ROWS
-    space = find_slip_space(tangent, EXACT_FEW if few else EXACT, MOST, CUTOFF)
+    space = _slip_space(tangent)
+    if space is not None:
+        return build_slip_factor(tangent, space)
+    return build_period_factor(tangent) or build_harmonic_factor(tangent, pairs)
+
+
+def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor:
+    """The same, one that knows the sign of its determinant."""
+    space = _slip_space(tangent)
     return build_harmonic_factor(tangent, pairs) if space is None else build_slip_factor(tangent, space)
+
+
+def _slip_space(tangent: Linearisation) -> SlipSpace | None:
+    few = tangent.joint.slots.size <= FEW_ROWS
+    return find_slip_space(tangent, EXACT_FEW if few else EXACT, MOST, CUTOFF)
 
 
 def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from solver.balance import Linearisation
-from solver.factor import Factor, build_factor
+from solver.factor import Factor, SignedFactor, build_factor, build_signed_factor
+from solver.krylov import ritz_values, solve_gmres
 from solver.model import ComplexArray, FloatArray, IntArray
+from solver.period_factor import PeriodFactor
 from solver.slip_space import build_slip_factor, find_slip_space
 
 SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
 AGED = 12  # products after which a kept factorisation has aged too much: a new one takes as long
 KRYLOV = 30  # the same where a new one would not be exact either
+WIDE = 80  # the same where the march through the period preconditions: resonances are found one by one
 RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
 FORCING = 1e-3  # relative residual of an iterative solve
 ARNOLDI = 24  # products from which the sign of a determinant is taken where a kept factorisation serves
@@ -75,20 +76,28 @@ class JacobianSolver:
         apart first: where none is near or below zero k = 0, else the whole slip space is factorised. Where it is too
         large for that, k is counted among the eigenvalues found.
         """
-        if self._factor is None or self._factor.exact or not np.isin(tangent.active(), self._factor.pairs).all():
-            self._factor = build_factor(tangent, tangent.active())
-            if self._factor.exact:
-                return self._factor.sign
-        values = self._eigenvalues(self._factor, tangent, tangent.joint.basis.synthesis.shape[0])
+        factor = self._factor
+        if (
+            factor is None
+            or isinstance(factor, PeriodFactor)
+            or factor.exact
+            or not np.isin(tangent.active(), factor.pairs).all()
+        ):
+            kept, factor = factor, build_signed_factor(tangent, tangent.active())
+            # the march knows no sign, but solves better
+            self._factor = kept if isinstance(kept, PeriodFactor) else factor
+            if factor.exact:
+                return factor.sign
+        values = self._eigenvalues(factor, tangent, tangent.joint.basis.synthesis.shape[0])
         if np.all(np.isfinite(values)) and values.real.min() > CERTAIN:
-            return self._factor.sign
+            return factor.sign
         whole = find_slip_space(tangent, WHOLE, 0, 0.0)
         if whole is not None:
             return build_slip_factor(tangent, whole).sign
         below = np.count_nonzero((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real)))
-        return self._factor.sign * float((-1) ** below)
+        return factor.sign * float((-1) ** below)
 
-    def _eigenvalues(self, factor: Factor, tangent: Linearisation, m: int) -> ComplexArray:
+    def _eigenvalues(self, factor: SignedFactor, tangent: Linearisation, m: int) -> ComplexArray:
         """Eigenvalues of J P^-1 that stand apart from the others."""
         full = np.zeros((tangent.joint.slots.size, m))
 
@@ -102,7 +111,7 @@ class JacobianSolver:
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
-            products = AGED if self._factor.exact else KRYLOV
+            products = AGED if self._factor.exact else _most_products(self._factor)
             solution, found = self._iterate(self._factor, tangent, rows, right, products, 1)
             if found:
                 return solution
@@ -110,7 +119,7 @@ class JacobianSolver:
         if self._factor.exact:
             return self._solve_exactly(self._factor, tangent, rows, right)
         # as far as it gets: Newton judges by the true residual
-        return self._iterate(self._factor, tangent, rows, right, KRYLOV, RESTARTS)[0]
+        return self._iterate(self._factor, tangent, rows, right, _most_products(self._factor), RESTARTS)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve takes away what `NEUTRAL` has put in."""
@@ -146,37 +155,13 @@ class JacobianSolver:
             return tangent.apply(full)[rows].ravel()
 
         # preconditioned from the right, so that the residual that GMRES watches is the true one
-        solution, failed = gmres(
-            LinearOperator((right.size, right.size), matvec=product, dtype=float),
-            right.ravel(),
-            rtol=FORCING,
-            restart=products,
-            maxiter=restarts,
-        )
-        return precondition(solution), not failed
+        solution, found = solve_gmres(product, right.ravel(), FORCING, products, restarts)
+        return precondition(solution), found
 
 
-def ritz_values(product: Callable[[FloatArray], FloatArray], start: FloatArray, most: int) -> ComplexArray:
-    """Eigenvalues of a real operator as Arnoldi's method knows them after at most `most` products."""
-    size = min(most, start.size)
-    basis = np.zeros((size + 1, start.size))
-    projected = np.zeros((size + 1, size))
-    basis[0] = start / np.linalg.norm(start)
-    for k in range(size):
-        image = product(basis[k])
-        length = float(np.linalg.norm(image))
-        for _ in range(2):  # twice, so that the basis stays orthogonal to round-off
-            share = basis[: k + 1] @ image
-            projected[: k + 1, k] += share
-            image = image - share @ basis[: k + 1]
-        projected[k + 1, k] = np.linalg.norm(image)
-        if not projected[k + 1, k] > 1e-12 * length:
-            size = k + 1
-            break
-        basis[k + 1] = image / projected[k + 1, k]
-    if not np.all(np.isfinite(projected)):
-        return np.full(size, np.nan, complex)
-    return np.linalg.eigvals(projected[:size, :size]).astype(complex)
+def _most_products(factor: Factor) -> int:
+    """Products after which a factorisation that is not exact is given up, or GMRES begins again."""
+    return WIDE if isinstance(factor, PeriodFactor) else KRYLOV
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

@@ -90,6 +90,7 @@ def test_a_slip_space_that_is_too_large_is_left_to_the_harmonics(monkeypatch: py
     monkeypatch.setattr(factor, "MOST", 0)
     monkeypatch.setattr(factor, "EXACT", 0)
     monkeypatch.setattr(factor, "DENSE", 100)
+    monkeypatch.setattr(factor, "build_period_factor", lambda _: None)
     assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
     right = np.random.default_rng(8).normal(size=predicted.shape)
     found = JacobianSolver().solve(tangent, right)

@@ -11,7 +11,8 @@ from solver import linear
 from solver.arc import follow_arc
 from solver.balance import Balance
 from solver.joint import build_case
-from solver.linear import JacobianSolver, ritz_values
+from solver.krylov import ritz_values
+from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.path import Effort, PathPoint
 from solver.settings import SolverSettings

@@ -1,0 +1,109 @@
+"""Krylov methods for operators that are only known by their products: GMRES, and eigenvalues by Arnoldi's method.
+
+Bases are orthogonalised twice: an operator may be singular, as that of a joint that slips as a whole, and then one
+pass leaves a basis that is none. There a right-hand side may also lie out of reach: `solve_gmres` ends where it gets
+no farther, with the solution that comes nearest and does not run away along what the operator does not act on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.model import ComplexArray, FloatArray
+
+PATIENCE = 20  # products
+NEUTRAL = 1e-5  # singular value over the largest: a direction that the operator does not act on
+GAIN = 0.75  # of the residual: where it has not come below that within the patience it will not
+
+Product = Callable[[FloatArray], FloatArray]
+
+
+def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, cycles: int) -> tuple[FloatArray, bool]:
+    """Solution (n,) of `product(x) = right` by GMRES from zero, and whether its relative residual is below rtol.
+
+    Begins again after `restart` products, `cycles` times at most.
+    """
+    solution, residual = np.zeros_like(right), right
+    size = float(np.linalg.norm(right))
+    norms = [size]
+    restart = min(restart, right.size)
+    basis = np.empty((restart + 1, right.size))
+    for _ in range(cycles):
+        if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
+            break
+        basis[0] = residual / norms[-1]
+        triangle, rotations = np.zeros((restart, restart)), np.zeros((restart, 2))
+        projected = np.zeros(restart + 1)
+        projected[0] = norms[-1]
+        n_columns, lost = 0, False
+        while n_columns < restart and not lost:
+            column, lost = _extend(basis, n_columns, product(basis[n_columns]))
+            if not np.all(np.isfinite(column)):
+                break
+            for place, (cosine, sine) in enumerate(rotations[:n_columns]):
+                above, below = column[place : place + 2]
+                column[place : place + 2] = cosine * above + sine * below, cosine * below - sine * above
+            above, below = column[n_columns : n_columns + 2]
+            length = float(np.hypot(above, below))
+            if length == 0.0:
+                break
+            cosine, sine = above / length, below / length
+            rotations[n_columns] = cosine, sine
+            triangle[: n_columns + 1, n_columns] = column[: n_columns + 1]
+            triangle[n_columns, n_columns] = length
+            projected[n_columns : n_columns + 2] = cosine * projected[n_columns], -sine * projected[n_columns]
+            n_columns += 1
+            norms.append(abs(float(projected[n_columns])))
+            if norms[-1] <= rtol * size or _stagnates(norms):
+                break
+        if n_columns == 0:
+            break
+        # where the residual is not met, a direction that is next to none would only let the solution run away
+        least = 0.0 if norms[-1] <= rtol * size else NEUTRAL
+        weights = np.linalg.lstsq(triangle[:n_columns, :n_columns], projected[:n_columns], rcond=least)[0]
+        solution = solution + weights @ basis[:n_columns]
+        residual = right - product(solution)
+        norms[-1] = float(np.linalg.norm(residual))
+        if _stagnates(norms):
+            break
+    return solution, norms[-1] <= rtol * size
+
+
+def ritz_values(product: Product, start: FloatArray, most: int) -> ComplexArray:
+    """Eigenvalues of a real operator as Arnoldi's method knows them after at most `most` products."""
+    size = min(most, start.size)
+    basis = np.zeros((size + 1, start.size))
+    projected = np.zeros((size + 1, size))
+    basis[0] = start / np.linalg.norm(start)
+    for k in range(size):
+        projected[: k + 2, k], lost = _extend(basis, k, product(basis[k]))
+        if lost:
+            size = k + 1
+            break
+    if not np.all(np.isfinite(projected)):
+        return np.full(size, np.nan, complex)
+    return np.linalg.eigvals(projected[:size, :size]).astype(complex)
+
+
+def _extend(basis: FloatArray, k: int, image: FloatArray) -> tuple[FloatArray, bool]:
+    """Next vector k + 1 of an orthonormal basis from the image of vector k, in place.
+
+    Returns the components (k + 2,) of the image on the new basis, and whether nothing new was in it.
+    """
+    column = np.zeros(k + 2)
+    length = float(np.linalg.norm(image))
+    for _ in range(2):
+        share = basis[: k + 1] @ image
+        column[: k + 1] += share
+        image = image - share @ basis[: k + 1]
+    column[k + 1] = np.linalg.norm(image)
+    if not column[k + 1] > 1e-12 * length:
+        return column, True
+    basis[k + 1] = image / column[k + 1]
+    return column, False
+
+
+def _stagnates(norms: list[float]) -> bool:
+    return len(norms) > PATIENCE and norms[-1] > GAIN * norms[-1 - PATIENCE]

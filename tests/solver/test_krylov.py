@@ -1,0 +1,83 @@
+"""Krylov methods against dense solves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.krylov import GAIN, PATIENCE, solve_gmres
+from solver.model import FloatArray
+
+
+def counted(matrix: FloatArray) -> tuple[list[int], object]:
+    count = [0]
+
+    def product(vector: FloatArray) -> FloatArray:
+        count[0] += 1
+        return matrix @ vector
+
+    return count, product
+
+
+def well_conditioned(size: int, seed: int) -> FloatArray:
+    random = np.random.default_rng(seed)
+    return np.eye(size) + 0.4 * random.normal(size=(size, size)) / np.sqrt(size)
+
+
+@pytest.mark.parametrize(("restart", "cycles"), [(60, 1), (6, 20)])
+def test_it_finds_the_solution_with_and_without_beginning_again(restart: int, cycles: int) -> None:
+    matrix = well_conditioned(60, 1)
+    right = np.random.default_rng(2).normal(size=60)
+    exact = np.linalg.solve(matrix, right)
+    found, converged = solve_gmres(lambda x: matrix @ x, right, 1e-10, restart, cycles)
+    assert converged
+    assert np.linalg.norm(matrix @ found - right) <= 1e-10 * np.linalg.norm(right)
+    assert np.linalg.norm(found - exact) < 1e-8 * np.linalg.norm(exact)
+
+
+def test_it_is_the_best_of_its_subspace() -> None:
+    matrix = well_conditioned(40, 3)
+    right = np.random.default_rng(4).normal(size=40)
+    found, converged = solve_gmres(lambda x: matrix @ x, right, 1e-10, 5, 1)
+    assert not converged
+    powers = np.stack([np.linalg.matrix_power(matrix, k) @ right for k in range(5)], axis=1)
+    best = powers @ np.linalg.lstsq(matrix @ powers, right)[0]
+    assert np.allclose(found, best, rtol=1e-9, atol=1e-9)
+
+
+def test_outliers_take_one_product_each() -> None:
+    random = np.random.default_rng(5)
+    matrix = np.eye(80) + random.normal(size=(80, 3)) @ random.normal(size=(3, 80))
+    count, product = counted(matrix)
+    right = random.normal(size=80)
+    assert solve_gmres(product, right, 1e-9, 30, 1)[1]  # type: ignore[arg-type]
+    # one more checks the residual
+    assert count[0] == 5
+
+
+def test_a_singular_operator_gives_what_can_be_had_and_ends() -> None:
+    # J with a null vector on either side, and a right-hand side that it does not reach
+    random = np.random.default_rng(6)
+    left, null = (part / np.linalg.norm(part) for part in random.normal(size=(2, 100)))
+    matrix = well_conditioned(100, 7)
+    matrix = matrix - np.outer(left, left @ matrix)
+    matrix = matrix - np.outer(matrix @ null, null)
+    reached = matrix @ random.normal(size=100)
+    right = reached / np.linalg.norm(reached) + 0.3 * left
+    count, product = counted(matrix)
+    found, converged = solve_gmres(product, right, 1e-3, 80, 6)  # type: ignore[arg-type]
+    assert not converged
+    assert np.linalg.norm(found) < 100.0
+    # next to nothing but what lies out of reach is left
+    assert 0.3 <= np.linalg.norm(matrix @ found - right) < 0.3 / GAIN
+    assert count[0] < 3 * PATIENCE
+    # the part that it reaches is no harder than with any other operator
+    assert solve_gmres(lambda x: matrix @ x, reached, 1e-6, 60, 1)[1]
+
+
+def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends() -> None:
+    zero = np.zeros(5)
+    found, converged = solve_gmres(lambda x: x, zero, 1e-3, 5, 2)
+    assert converged
+    assert np.array_equal(found, zero)
+    assert not solve_gmres(lambda x: x * np.nan, np.ones(5), 1e-3, 5, 2)[1]

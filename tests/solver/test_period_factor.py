@@ -1,0 +1,247 @@
+"""The march through the period that preconditions, against the contact law, plain solves and the exact Jacobian."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import factor, linear, period_factor
+from solver.balance import Balance, Linearisation
+from solver.factor import HarmonicFactor, build_factor, build_harmonic_factor
+from solver.harmonics import build_basis
+from solver.joint import Joint, build_case
+from solver.kernels import SEPARATED, SLIP, STICK, contact_sample
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.period_factor import (
+    PASSES,
+    RESONANT,
+    PeriodFactor,
+    build_march,
+    build_period_factor,
+    march_samples,
+    resonances,
+    sample_tangents,
+    stiffness_of_most,
+)
+from solver.settings import Resolution, SolverSettings, all_orders
+from tests.solver.models import OMEGA, dovetail, random_balance, random_model, with_free_masses
+
+SETTINGS = SolverSettings(3, 24)
+KINDS = ("3d", "constant_load", "normal_only", "3d", "one_tangent", "second_tangent", "3d", "3d")
+
+
+def tangent_of(balance: Balance, predicted: FloatArray) -> Linearisation:
+    return balance.linearise(balance.evaluate(predicted))
+
+
+def case(seed: int, highest: int = 3, samples: int = 24, kinds: tuple[str, ...] = KINDS) -> tuple[Balance, FloatArray]:
+    resolution = Resolution(all_orders(highest), samples)
+    return random_balance(random_model(seed, kinds, 4), SETTINGS, seed, wear=False, resolution=resolution)
+
+
+def factor_of(tangent: Linearisation) -> PeriodFactor:
+    found = build_period_factor(tangent)
+    assert found is not None
+    return found
+
+
+def states_at(joint: Joint, predicted: FloatArray, before: FloatArray) -> FloatArray:
+    """State (n_contact, 3), N, behind one sample: predicted forces (n_contact, 3), tangential states (n_contact, 2)."""
+    state = np.zeros_like(predicted)
+    for pair in range(len(predicted)):
+        normal, _, _, *tangents, _ = contact_sample(*predicted[pair], joint.friction_coefficient, *before[pair])
+        state[pair] = predicted[pair, 0] - normal, *tangents
+    return state
+
+
+@pytest.mark.parametrize("stride", [1, 2])
+def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
+    balance, predicted = case(11)
+    joint, at = balance.joint, balance.evaluate(predicted)
+    own, carried = sample_tangents(joint, at, stride)
+    assert own.shape[0] == at.status_t[:, ::stride].shape[1]
+    assert set(at.status_t[:, ::stride].ravel()) == {SEPARATED, STICK, SLIP}
+    random, checked = np.random.default_rng(2), 0
+    for place, sample in enumerate(range(0, at.status_t.shape[1], stride)):
+        now, before = at.predicted_t[:, :, sample], at.state_t[:, :, sample]
+        step = random.normal(size=now.shape) * (joint.to_pairs(np.ones((joint.slots.size, 1)))[:, :, 0])
+        moved = random.normal(size=before.shape)
+        ahead, behind = (states_at(joint, now + h * step, before + h * moved) for h in (1e-5, -1e-5))
+        expected = np.einsum("pij,pj->pi", own[place], step)
+        expected[:, 1:] += np.einsum("pij,pj->pi", carried[place], moved)
+        # slip that begins again where it has ended lies at the corner itself
+        margin = np.hypot(*(now[:, 1:] - before).T) - joint.friction_coefficient * now[:, 0]
+        smooth = np.abs(margin) > 1e-3
+        checked += smooth.sum()
+        constant = ~joint.has_normal
+        assert np.array_equal(expected[constant, 0], np.zeros(constant.sum()))
+        assert np.allclose(((ahead - behind) / 2e-5)[smooth], expected[smooth], rtol=1e-6, atol=1e-6)
+    assert checked > 0.9 * own.shape[0] * own.shape[1]
+
+
+def test_the_march_solves_what_it_says_sample_by_sample() -> None:
+    balance, predicted = case(3)
+    found = build_march(tangent_of(balance, predicted))
+    n_samples, size = found.inverse.shape[:2]
+    n_contact = size // 3
+    right = np.random.default_rng(4).normal(size=(n_samples, size))
+    steps, states = march_samples(found.inverse, found.coupling, found.own, found.carried, right, PASSES)
+    state = np.zeros((n_contact, 3))
+    for _ in range(PASSES):
+        slow = np.empty((2, n_samples, size))
+        for n in range(n_samples):
+            # step and state as two unknowns, nothing eliminated
+            whole = np.eye(2 * size)
+            whole[:size, size:] = found.coupling
+            held = np.zeros((n_contact, 3))
+            for pair in range(n_contact):
+                here = slice(3 * pair, 3 * pair + 3)
+                whole[size:, :size][here, here] = -found.own[n, pair]
+                held[pair, 1:] = found.carried[n, pair] @ state[pair, 1:]
+            slow[:, n] = np.linalg.solve(whole, np.concatenate([right[n], held.ravel()])).reshape(2, size)
+            state = slow[1, n].reshape(n_contact, 3)
+    assert np.allclose(steps, slow[0], rtol=1e-9, atol=1e-9)
+    assert np.allclose(states, slow[1], rtol=1e-9, atol=1e-9)
+
+
+def differing(joint: Joint) -> FloatArray:
+    """What the stiffnesses of the harmonics differ by, over the penalty: matrix over (displacement, harmonic)."""
+    n_rel, m = joint.slots.size, joint.basis.synthesis.shape[0]
+    penalty = joint.penalty
+    size = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.slots]
+    matrix = np.zeros((n_rel * m, n_rel * m))
+    for column, unit in enumerate(np.eye(n_rel * m).reshape(-1, n_rel, m)):
+        motion = unit / size[:, None]
+        matrix[:, column] = (joint.structure.apply(motion) - stiffness_of_most(joint) @ motion).ravel()
+    return matrix
+
+
+@pytest.mark.parametrize("nodal_diameter", [0, 3])
+def test_resonances_are_the_large_singular_values_of_what_differs(nodal_diameter: int) -> None:
+    model, omega = dovetail(5, nodal_diameter), 2.0 * np.pi * 213.0
+    joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(5), 64)).joint(omega, 5.0)
+    whole = differing(joint)
+    added, seen = resonances(joint)
+    sizes = np.linalg.svd(whole, compute_uv=False)
+    left = np.linalg.svd(whole - added.T @ seen, compute_uv=False)
+    assert sizes[0] > 3.0 * RESONANT
+    # where more directions differ than are looked for some are left
+    most = RESONANT if nodal_diameter == 0 else 1.3 * RESONANT
+    assert left[0] < 1.01 * most
+    assert 0 < len(seen) <= np.count_nonzero(sizes > RESONANT)
+
+
+def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.MonkeyPatch) -> None:
+    # with every direction and nothing cut off it is the inverse, whatever the harmonics see
+    monkeypatch.setattr(period_factor, "RESONANT", 1e-9)
+    monkeypatch.setattr(period_factor, "RANK", 100)
+    balance, predicted = case(5, highest=12, samples=25, kinds=("constant_load_one_tangent",) * 9)
+    tangent = tangent_of(balance, 3.0 * predicted)
+    step = np.random.default_rng(6).normal(size=predicted.shape)
+    factor_found = factor_of(tangent)
+    found = factor_found.solve(tangent.apply(step))
+    assert np.linalg.norm(found - step) < 1e-6 * np.linalg.norm(step)
+    without = factor_found.march.solve(tangent.apply(step))[0]
+    assert np.linalg.norm(without - step) > 1e-2 * np.linalg.norm(step)
+
+
+def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_stiffness() -> None:
+    # as many harmonics as samples; lines on which slip forgets all that was before it
+    balance, predicted = case(5, highest=12, samples=25, kinds=("constant_load_one_tangent",) * 9)
+    structure = balance.joint.structure
+    stiffness = np.real(structure.dynamic_stiffness[2])
+    same = np.broadcast_to(stiffness.astype(complex), structure.dynamic_stiffness.shape)
+    joint = replace(
+        balance.joint, structure=replace(structure, static_stiffness=stiffness, dynamic_stiffness=np.array(same))
+    )
+    balance = replace(balance, joint=joint)
+    assert np.array_equal(stiffness_of_most(joint), stiffness)
+    tangent = tangent_of(balance, 3.0 * predicted)
+    assert np.count_nonzero((tangent.at.status_t == SLIP).any(axis=1)) > 4
+    step = np.random.default_rng(6).normal(size=predicted.shape)
+    found = factor_of(tangent).solve(tangent.apply(step))
+    assert np.linalg.norm(found - step) < 1e-9 * np.linalg.norm(step)
+    # and is none of the identity
+    assert np.linalg.norm(tangent.apply(step) - step) > 0.1 * np.linalg.norm(step)
+
+
+def test_no_more_samples_are_marched_than_tell_the_harmonics_apart() -> None:
+    for highest, samples, marched in ((3, 24, 12), (5, 64, 16), (12, 25, 25), (7, 30, 15)):
+        balance, predicted = case(7, highest, samples)
+        found = build_march(tangent_of(balance, predicted))
+        assert found.inverse.shape[0] == marched
+        assert found.basis is build_basis(all_orders(highest), marched)
+
+
+def products(monkeypatch: pytest.MonkeyPatch, solver: JacobianSolver, tangent: Linearisation, right: FloatArray) -> int:
+    """Products with the Jacobian that a direction takes; its residual is checked."""
+    counted = [0]
+    plain = Linearisation.apply
+
+    def apply(self: Linearisation, step: FloatArray) -> FloatArray:
+        counted[0] += 1
+        return plain(self, step)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Linearisation, "apply", apply)
+        step = solver.solve(tangent, right)
+    assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+    return counted[0]
+
+
+@pytest.fixture
+def large_slip_space(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every slip space is too large to be factorised."""
+    for limit in ("EXACT", "EXACT_FEW", "MOST"):
+        monkeypatch.setattr(factor, limit, 0)
+
+
+@pytest.mark.usefixtures("large_slip_space")
+def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = dovetail()
+    omega = 2.0 * np.pi * 213.0
+    joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(13), 128)).joint(omega, 5.0)
+    idle = np.zeros(model.contact.n_contact)
+    balance = Balance(joint, np.zeros((model.contact.n_contact, 2)), idle, idle)
+    predicted = joint.structure.force_h()
+    predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.slots.size, 2))
+    tangent = tangent_of(balance, predicted)
+    status = tangent.at.status_t
+    assert all((status == one).any(axis=1).sum() >= 10 for one in (SEPARATED, SLIP))
+    assert isinstance(build_factor(tangent, tangent.active()), PeriodFactor)
+    # free to slide as a whole: a right-hand side that can be reached
+    right = tangent.apply(np.random.default_rng(2).normal(size=predicted.shape))
+    found = products(monkeypatch, JacobianSolver(), tangent, right)
+    assert found <= 25
+    monkeypatch.setattr(factor, "DENSE", 300)
+    monkeypatch.setattr(factor, "build_period_factor", lambda _: None)
+    assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
+    assert found < 0.75 * products(monkeypatch, JacobianSolver(), tangent, right)
+
+
+@pytest.mark.usefixtures("large_slip_space")
+def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant() -> None:
+    balance, predicted = case(8, highest=5, samples=64)
+    assert predicted.size > linear.SMALL - 50
+    solver = JacobianSolver()
+    random = np.random.default_rng(9)
+    for _ in range(4):
+        tangent = tangent_of(balance, predicted)
+        right = random.normal(size=predicted.shape)
+        step = solver.solve(tangent, right)
+        assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+        dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
+        assert solver.determinant_sign(tangent) == np.linalg.slogdet(dense)[0]
+        predicted = predicted * 1.05
+
+
+def test_masses_on_sliders_are_left_to_the_harmonics() -> None:
+    model = with_free_masses(random_model(10, ("3d", "3d"), 4), [0])
+    balance, predicted = random_balance(model, SETTINGS, 10, wear=False)
+    assert balance.joint.penalty.inertial.any()
+    assert balance.joint.omega == OMEGA
+    assert build_period_factor(tangent_of(balance, predicted)) is None
+    assert isinstance(build_harmonic_factor(tangent_of(balance, predicted), np.arange(2)), HarmonicFactor)
