@@ -152,8 +152,12 @@ class _Arc:
         balance = self.balance_at(parameter, self.history)
         step = self.solver.solve(balance.linearise(evaluation), -self.slope(parameter, evaluation)) / self.size
         tangent = np.append(step.ravel(), 1.0)
-        length = float(np.linalg.norm(tangent))
-        return tangent / length if np.isfinite(length) else None
+        largest = float(np.abs(tangent).max())
+        if not np.isfinite(largest):
+            return None
+        # at a fold the step is far too long to be squared, and yet it is the direction
+        tangent /= largest
+        return np.asarray(tangent / np.linalg.norm(tangent))
 
     def step(
         self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, effort: Effort

@@ -35,29 +35,30 @@ def doubles_period(model: ReducedModel, joint: Joint, evaluation: Evaluation) ->
     opens = evaluation.status_t == SEPARATED
     if not (opens.any(axis=1) & ~opens.all(axis=1)).any() or (model.n_sectors and model.nodal_diameter):
         return False
-    orders = two_periods(joint.basis.orders)
-    if joint.slots.size * (2 * len(orders) + 1) > MOST_UNKNOWNS:
+    if joint.slots.size * (4 * max(*joint.basis.orders, FEWEST) + 1) > MOST_UNKNOWNS:
         return False
     sign, _ = np.linalg.slogdet(odd_part(linearise_over_two(model, joint, evaluation)))
     return bool(sign < 0.0)
 
 
-def two_periods(orders: tuple[int, ...]) -> tuple[int, ...]:
+def two_periods(orders: tuple[int, ...], below: int) -> tuple[int, ...]:
     """Harmonics of half the frequency: the even ones are those of one period, and the odd ones below the highest; more
-    of these where there are few, as what grows need not be as smooth as the state.
+    of these where there are few, as what grows need not be as smooth as the state. below: half the number of samples.
     """
-    return tuple(sorted({2 * order for order in orders} | set(range(1, 2 * max(*orders, FEWEST), 2))))
+    highest = min(2 * max(*orders, FEWEST), below)
+    return tuple(sorted({2 * order for order in orders} | set(range(1, highest, 2))))
 
 
 def linearise_over_two(model: ReducedModel, joint: Joint, evaluation: Evaluation) -> Linearisation:
     """Derivative of the balance over two periods at a state that repeats after one."""
-    orders = two_periods(joint.basis.orders)
+    samples = max(2 * joint.basis.n_samples, 0 if joint.penalty.inertial.any() else FINE)
+    orders = two_periods(joint.basis.orders, samples // 2)
     omega = 0.5 * joint.omega
     longer = replace(
         joint,
         omega=omega,
         structure=build_structure(model, omega, joint.excitation_amplitude, orders),
-        basis=build_basis(orders, max(2 * joint.basis.n_samples, 0 if joint.penalty.inertial.any() else FINE)),
+        basis=build_basis(orders, samples),
     )
     balance = Balance(longer, evaluation.history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
     doubled = tuple(2 * order for order in joint.basis.orders)
