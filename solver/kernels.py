@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.model import FloatArray, IntArray
+from solver.model import BoolArray, FloatArray, IntArray
 
 SEPARATED = 0
 STICK = 1
@@ -76,6 +76,38 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
                 after, _, _ = closed_share(force, predicted_t[pair, 0, (n + 1) % n_samples])
                 mean[pair, n] = 0.5 * (before + after)
     return mean
+
+
+@njit(cache=True)
+def mean_normal_tangent(
+    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
+) -> FloatArray:
+    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    basis_t = np.ascontiguousarray(synthesis.T)
+    tangent = np.zeros((n_contact, m, m))
+    analysis_t = np.ascontiguousarray(analysis.T)
+    rows = np.empty((n_samples, m))
+    for pair in range(n_contact):
+        if not has_normal[pair]:
+            continue
+        for n in range(n_samples):
+            force = predicted_t[pair, 0, n]
+            rows[n] = 0.0
+            if force <= 0.0:
+                continue
+            ahead = (n + 1) % n_samples
+            _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
+            _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
+            for j in range(m):
+                rows[n, j] = 0.5 * (
+                    (own_before + own_after) * basis_t[n, j]
+                    + other_before * basis_t[n - 1, j]
+                    + other_after * basis_t[ahead, j]
+                )
+        tangent[pair] = np.dot(analysis_t, rows)
+    return tangent
 
 
 @njit(cache=True)

@@ -8,9 +8,16 @@ import numpy as np
 
 from solver.inertia import march_masses
 from solver.joint import Joint
-from solver.kernels import march_period, mean_normal_force, wear_integral
+from solver.kernels import (
+    SEPARATED,
+    STICK,
+    march_period,
+    mean_normal_force,
+    mean_normal_tangent,
+    wear_integral,
+)
 from solver.model import FloatArray, IntArray
-from solver.tangents import march_tangent, mass_tangent, mean_normal_tangent
+from solver.tangents import march_tangent, mass_tangent
 
 CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
 MOST_PASSES = 400
@@ -92,7 +99,17 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
     basis, friction, m = joint.basis, joint.friction_coefficient, joint.basis.synthesis.shape[0]
     n_contact = at.predicted_t.shape[0]
     force_tangent, slip_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
-    elastic, inertial = np.flatnonzero(~joint.penalty.inertial), np.flatnonzero(joint.penalty.inertial)
+    has_tangent = (joint.contact.dofs[:, 1:] >= 0).any(axis=1)
+    # one that sticks and stays closed all period long passes all on, one that is open nothing; the start of a period
+    # that was marched more than once may depend on the force even so
+    stuck = (at.status_t == STICK).all(axis=1) & (at.passes == 1)
+    switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
+    harmonics = np.arange(3 * m)
+    force_tangent[np.ix_(stuck & joint.has_normal, harmonics[:m], harmonics[:m])] = np.eye(m)
+    # tangents that do not exist stick
+    force_tangent[np.ix_(stuck | ~has_tangent, harmonics[m:], harmonics[m:])] = np.eye(2 * m)
+    inertial = np.flatnonzero(joint.penalty.inertial & switching)
+    elastic = np.flatnonzero(~joint.penalty.inertial & has_tangent & switching)
     if elastic.size:
         force_tangent[elastic], slip_tangent[elastic] = march_tangent(
             at.predicted_t[elastic],
@@ -100,6 +117,7 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
             at.start[elastic],
             at.state_t[elastic],
             at.passes[elastic],
+            joint.line[elastic],
             basis.synthesis,
             basis.analysis,
             joint.has_normal[elastic],
@@ -118,7 +136,10 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
             basis.analysis / share,
             joint.has_normal[inertial],
         )
-    force_tangent[:, :m, :m] = mean_normal_tangent(at.predicted_t, basis.synthesis, basis.analysis, joint.has_normal)
+    normal = np.flatnonzero(joint.has_normal & switching)
+    force_tangent[normal, :m, :m] = mean_normal_tangent(
+        at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
+    )
     return force_tangent, slip_tangent
 
 

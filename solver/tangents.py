@@ -6,40 +6,8 @@ import numpy as np
 from numba import njit
 
 from solver.inertia import step_mass
-from solver.kernels import PLAIN_PASSES, SLIP, STICK, close, closed_share, contact_sample
+from solver.kernels import PLAIN_PASSES, SLIP, STICK, close, contact_sample
 from solver.model import BoolArray, FloatArray, IntArray
-
-
-@njit(cache=True)
-def mean_normal_tangent(
-    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
-) -> FloatArray:
-    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
-    n_contact, _, n_samples = predicted_t.shape
-    m = synthesis.shape[0]
-    basis_t = np.ascontiguousarray(synthesis.T)
-    tangent = np.zeros((n_contact, m, m))
-    analysis_t = np.ascontiguousarray(analysis.T)
-    rows = np.empty((n_samples, m))
-    for pair in range(n_contact):
-        if not has_normal[pair]:
-            continue
-        for n in range(n_samples):
-            force = predicted_t[pair, 0, n]
-            rows[n] = 0.0
-            if force <= 0.0:
-                continue
-            ahead = (n + 1) % n_samples
-            _, own_before, other_before = closed_share(force, predicted_t[pair, 0, n - 1])
-            _, own_after, other_after = closed_share(force, predicted_t[pair, 0, ahead])
-            for j in range(m):
-                rows[n, j] = 0.5 * (
-                    (own_before + own_after) * basis_t[n, j]
-                    + other_before * basis_t[n - 1, j]
-                    + other_after * basis_t[ahead, j]
-                )
-        tangent[pair] = np.dot(analysis_t, rows)
-    return tangent
 
 
 @njit(cache=True)
@@ -106,13 +74,15 @@ def march_tangent(
     start: FloatArray,
     state_t: FloatArray,
     passes: IntArray,
+    line: IntArray,
     synthesis: FloatArray,
     analysis: FloatArray,
     has_normal: BoolArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Derivative of what `march_period` and `wear_integral` give, the closure of the period included.
 
-    start (n_contact, 2): as in `march_period`. state_t, passes: as it has returned them. has_normal (n_contact,): False
+    start (n_contact, 2): as in `march_period`. state_t, passes: as it has returned them. line (n_contact,): as in
+    `inertia.step_plane`; a tangent that does not exist is returned as one that sticks. has_normal (n_contact,): False
     where the normal force is constant. Returns
 
     - force_tangent (n_contact, 3m, 3m): d(harmonics of the tangential force)/d(harmonics of the predicted force) of
@@ -181,21 +151,47 @@ def march_tangent(
             has_normal[pair],
             dforce,
         )
-        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
-        for component in range(2):
-            for k in range(m):
-                row = (1 + component) * m + k
-                start_1 = dforce_h[k, component, width]
-                start_2 = dforce_h[k, component, width + 1]
-                for column in range(width):
-                    force_tangent[pair, row, column] = (
-                        dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
-                    )
+        if line[pair] >= 0:
+            along = dforce_t[:, line[pair]]
+            _line_tangent(force_tangent[pair], along, dstart, analysis_t, line[pair], has_normal[pair])
+        else:
+            dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
+            for component in range(2):
+                for k in range(m):
+                    row = (1 + component) * m + k
+                    start_1 = dforce_h[k, component, width]
+                    start_2 = dforce_h[k, component, width + 1]
+                    for column in range(width):
+                        force_tangent[pair, row, column] = (
+                            dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
+                        )
         for column in range(width):
             wear_tangent[pair, column] = (
                 wear[column] + wear[width] * dstart[0, column] + wear[width + 1] * dstart[1, column]
             )
     return force_tangent, wear_tangent
+
+
+@njit(cache=True)
+def _line_tangent(
+    tangent: FloatArray, dforce: FloatArray, dstart: FloatArray, analysis_t: FloatArray, line: int, has_normal: bool
+) -> None:
+    """Tangent (3m, 3m) of a pair with one tangent, in place, from `dforce` (N, 3m+2), that of its force: only the
+    columns that there are are analysed.
+    """
+    m, n_samples = analysis_t.shape
+    first, own = 0 if has_normal else m, (1 + line) * m
+    packed = np.empty((n_samples, 2 * m - first))
+    for n in range(n_samples):
+        for k in range(2 * m - first):
+            column = first + k if first + k < m else own + first + k - m
+            start = dforce[n, 3 * m] * dstart[0, column] + dforce[n, 3 * m + 1] * dstart[1, column]
+            packed[n, k] = dforce[n, column] + start
+    harmonics = np.dot(analysis_t, packed)
+    tangent[own : own + m, first:m] = harmonics[:, : m - first]
+    tangent[own : own + m, own : own + m] = harmonics[:, m - first :]
+    for k in range((2 - line) * m, (3 - line) * m):
+        tangent[k, k] = 1.0
 
 
 @njit(cache=True)

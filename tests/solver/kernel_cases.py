@@ -9,9 +9,9 @@ import numpy as np
 
 from solver.harmonics import FourierBasis, build_basis
 from solver.inertia import march_masses
-from solver.kernels import march_period, mean_normal_force, wear_integral
+from solver.kernels import march_period, mean_normal_force, mean_normal_tangent, wear_integral
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.tangents import march_tangent, mass_tangent, mean_normal_tangent
+from solver.tangents import march_tangent, mass_tangent
 
 FRICTION = 0.4
 PERIODS = 3
@@ -115,11 +115,24 @@ def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, Float
     )
 
 
+def both_tangents(n_contact: int) -> np.ndarray:
+    """Lines (n_contact,) of pairs with two tangents."""
+    return np.full(n_contact, -1)
+
+
 def kernel_results() -> dict[str, FloatArray]:
     case = kernel_case(3, BASIS.n_samples, seed=20)
     force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 6)
     force_tangent, wear_tangent = march_tangent(
-        case.predicted_t, FRICTION, case.start, state_t, passes, BASIS.synthesis, BASIS.analysis, case.has_normal
+        case.predicted_t,
+        FRICTION,
+        case.start,
+        state_t,
+        passes,
+        both_tangents(3),
+        BASIS.synthesis,
+        BASIS.analysis,
+        case.has_normal,
     )
     masses = mass_case(6, seed=21)
     mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)

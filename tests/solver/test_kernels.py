@@ -21,11 +21,20 @@ from solver.kernels import (
     contact_sample,
     march_period,
     mean_normal_force,
+    mean_normal_tangent,
     wear_integral,
 )
-from solver.tangents import march_tangent, mean_normal_tangent
+from solver.tangents import march_tangent
 from tests.solver import contact_twin
-from tests.solver.kernel_cases import BASIS, FRICTION, PERIODS, KernelCase, kernel_case, kernel_results
+from tests.solver.kernel_cases import (
+    BASIS,
+    FRICTION,
+    PERIODS,
+    KernelCase,
+    both_tangents,
+    kernel_case,
+    kernel_results,
+)
 
 number = st.integers(-(10**8), 10**8).map(lambda count: 1e-6 * count)  # N; no squares that underflow
 friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
@@ -183,6 +192,7 @@ def derivative_error(
         case.start,
         state_t,
         passes,
+        both_tangents(n_contact),
         basis.synthesis,
         basis.analysis,
         case.has_normal,
@@ -226,9 +236,29 @@ def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
     _, state_t, *_ = march_period(case.predicted_t, FRICTION, case.start, 1e-12, PERIODS)
     arguments = (case.predicted_t, FRICTION, case.start, state_t)
     rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
-    one, _ = march_tangent(*arguments, np.full(4, 1), *rest)
-    two, _ = march_tangent(*arguments, np.full(4, 2), *rest)
+    one, _ = march_tangent(*arguments, np.full(4, 1), both_tangents(4), *rest)
+    two, _ = march_tangent(*arguments, np.full(4, 2), both_tangents(4), *rest)
     assert np.abs(one - two).max() > 1e-3
+
+
+@pytest.mark.parametrize("line", [0, 1])
+def test_a_pair_with_one_tangent_has_the_tangent_of_one_with_two_that_moves_along_it(line: int) -> None:
+    m = BASIS.synthesis.shape[0]
+    case = kernel_case(4, BASIS.n_samples, seed=10)
+    predicted_t, start = case.predicted_t.copy(), case.start.copy()
+    predicted_t[:, 2 - line] = start[:, 1 - line] = 0.0
+    _, state_t, status_t, passes, _ = march_period(predicted_t, FRICTION, start, 1e-12, PERIODS)
+    assert len(np.unique(status_t)) == 3
+    arguments = (predicted_t, FRICTION, start, state_t, passes)
+    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
+    two, two_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, both_tangents(4), *rest))
+    one, one_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, np.full(4, line), *rest))
+    there = np.array([0, 1 + line])
+    rows = slice((1 + line) * m, (2 + line) * m)
+    assert one[:, rows][:, :, there] == pytest.approx(two[:, rows][:, :, there], abs=1e-12)
+    assert one_wear[:, :, there] == pytest.approx(two_wear[:, :, there], abs=1e-12)
+    missing = one.reshape(4, 3 * m, 3 * m)[:, (2 - line) * m : (3 - line) * m]
+    assert np.array_equal(missing, np.broadcast_to(np.eye(3 * m)[(2 - line) * m : (3 - line) * m], missing.shape))
 
 
 def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
@@ -279,7 +309,7 @@ def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
     force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 1)
     assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
     everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
-    tangent, _ = march_tangent(predicted_t, FRICTION, start, state_t, np.array([1]), *everything)
+    tangent, _ = march_tangent(predicted_t, FRICTION, start, state_t, np.array([1]), both_tangents(1), *everything)
     # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
     along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
     across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))

@@ -9,9 +9,10 @@ import pytest
 
 from solver.inertia import march_masses
 from solver.joint import Joint, build_case
-from solver.kernels import SEPARATED, SLIP, STICK, march_period, mean_normal_force, wear_integral
+from solver.kernels import SEPARATED, SLIP, STICK, march_period, mean_normal_force, mean_normal_tangent, wear_integral
 from solver.law import Marched, law_tangent, march_law
 from solver.settings import Resolution, SolverSettings
+from solver.tangents import march_tangent, mass_tangent
 from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "3d", "constant_load_one_tangent")
@@ -44,7 +45,8 @@ def predicted(joint: Joint, seed: int = 2) -> tuple[FloatArray, FloatArray]:
 def of_pairs(joint: Joint, pairs: list[int]) -> Joint:
     """The same joint with some of its pairs alone; its structure is not used."""
     penalty = replace(joint.penalty, **{name: value[pairs] for name, value in vars(joint.penalty).items()})
-    return replace(joint, penalty=penalty, has_normal=joint.has_normal[pairs], line=joint.line[pairs])
+    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs])
+    return replace(joint, penalty=penalty, has_normal=joint.has_normal[pairs], line=joint.line[pairs], contact=contact)
 
 
 def assert_same(found: Marched, expected: Marched, pairs: list[int]) -> None:
@@ -160,3 +162,48 @@ def test_the_harmonics_of_a_stuck_mass_are_those_of_its_predicted_force() -> Non
         select = (own[own > 0][:, None] * m + np.arange(m)).ravel()
         block = force_tangent[pair][np.ix_(select, select)]
         assert block == pytest.approx(np.eye(select.size), abs=1e-12)
+
+
+@pytest.mark.parametrize("resolution", RESOLUTIONS)
+def test_pairs_that_stick_or_are_open_all_period_long_have_the_tangents_of_the_kernels(resolution: Resolution) -> None:
+    joint = mixed_joint(resolution)
+    values, history = predicted(joint)
+    m = values.shape[2]
+    # two pairs stick, two are open, of each kind one; the others switch
+    values[[0, 3], 0] = 0.0
+    values[[0, 3], 0, 0] = 1e3 * PRELOAD
+    values[[2, 4], 0] = 0.0
+    values[[2, 4], 0, 0] = -PRELOAD
+    found = march_law(joint, values, history)
+    assert [set(found.status_t[pair]) for pair in (0, 2, 3, 4)] == [{STICK}, {SEPARATED}, {STICK}, {SEPARATED}]
+    assert len(set(found.status_t[5])) > 1
+    force_tangent, slip_tangent = law_tangent(joint, found)
+    assert not slip_tangent[[0, 2, 3, 4]].any()
+    basis, share = joint.basis, joint.step_share()
+    elastic = [0, 2, 5]
+    by_kernel, _ = march_tangent(
+        found.predicted_t[elastic],
+        FRICTION,
+        *(part[elastic] for part in (found.start, found.state_t, found.passes, joint.line)),
+        basis.synthesis,
+        basis.analysis,
+        joint.has_normal[elastic],
+    )
+    masses, _ = mass_tangent(
+        found.predicted_t[FREE],
+        FRICTION,
+        *(part[FREE] for part in (joint.penalty.mass, joint.penalty.drag, joint.line)),
+        joint.sample_step,
+        found.start[FREE],
+        basis.synthesis,
+        basis.synthesis * share[:, None],
+        basis.analysis / share,
+        joint.has_normal[FREE],
+    )
+    normal = mean_normal_tangent(found.predicted_t, basis.synthesis, basis.analysis, joint.has_normal)
+    for pair in range(6):
+        kernel = by_kernel[elastic.index(pair)] if pair in elastic else masses[FREE.index(pair)]
+        kernel[:m, :m] = normal[pair]
+        own = joint.slots[joint.slots // 3 == pair] % 3
+        select = np.ix_(*2 * [(own[:, None] * m + np.arange(m)).ravel()])
+        assert force_tangent[pair][select] == pytest.approx(kernel[select], abs=1e-11)
