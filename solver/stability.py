@@ -12,7 +12,7 @@ open all over (Z_n / eps: the square of a modulus for each complex harmonic, a p
 So a negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the
 real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
 
-What this does not see: an even number of such multipliers, a period doubling (multiplier through -1), a Neimark-Sacker
+What this does not see: an even number of such multipliers, a period doubling (see `doubling`), a Neimark-Sacker
 bifurcation (complex pair). Disturbances of friction are taken as slow, with the closure over one period.
 """
 
