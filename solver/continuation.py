@@ -194,7 +194,7 @@ class _Line:
         certificate = certify(joint, refined.point.evaluation)
         if not certificate.holds(self.case.settings.tolerance):
             return Outcome.CERTIFICATE_FAILED, None
-        if doubles_period(self.case.model, joint, refined.point.evaluation):
+        if doubles_period(refined.case, joint, refined.point.evaluation, self.effort):
             return Outcome.PERIOD_DOUBLED, None
         return Outcome.CONVERGED, refined
 

@@ -13,52 +13,66 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.adapt import transfer
 from solver.balance import Balance, Evaluation, Linearisation
 from solver.harmonics import build_basis, change_orders
-from solver.joint import Joint
+from solver.joint import Case, Joint
 from solver.kernels import SEPARATED
+from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
+from solver.path import Effort, solve_balance
+from solver.settings import Resolution, all_orders
 from solver.structure import build_structure
 
-FEWEST = 19  # harmonics
-FINE = 1024  # samples of two periods, at least: a short contact decides
+SHARP = Resolution(all_orders(19), 256)  # a contact is judged with at least so many: its sharpness decides
 MOST_UNKNOWNS = 1500  # of the balance over two periods; its Jacobian is factorised as it is
 
 
-def doubles_period(model: ReducedModel, joint: Joint, evaluation: Evaluation) -> bool:
+def doubles_period(case: Case, joint: Joint, evaluation: Evaluation, effort: Effort) -> bool:
     """True where the state has an odd number of real multipliers beyond -1.
 
-    evaluation: of the state, its wear held. False as well where that is not looked for: where no pair comes and goes (a
-    friction contact alone damps), in a travelling wave (no nodal diameter belongs to half an order) and where the
-    unknowns are many.
+    joint, evaluation: of the state, its wear held. False as well where that is not looked for: where no pair comes and
+    goes (a friction contact alone damps), in a travelling wave (no nodal diameter belongs to half an order) and where
+    the unknowns are many. Raises OutOfTimeError.
     """
     opens = evaluation.status_t == SEPARATED
-    if not (opens.any(axis=1) & ~opens.all(axis=1)).any() or (model.n_sectors and model.nodal_diameter):
+    travels = case.model.n_sectors > 0 and case.model.nodal_diameter > 0
+    if travels or not (opens.any(axis=1) & ~opens.all(axis=1)).any():
         return False
-    if joint.slots.size * (4 * max(*joint.basis.orders, FEWEST) + 1) > MOST_UNKNOWNS:
+    if case.resolution.highest < SHARP.highest and _unknowns(joint, SHARP.orders) <= MOST_UNKNOWNS:
+        sharp = case.at(replace(SHARP, samples=max(SHARP.samples, case.resolution.samples)))
+        finer = sharp.joint(joint.omega, joint.excitation_amplitude)
+        balance, start = transfer(sharp, finer, evaluation, joint.basis.orders)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
+        if result.converged:
+            joint, evaluation = finer, result.evaluation
+    if _unknowns(joint, joint.basis.orders) > MOST_UNKNOWNS:
         return False
-    sign, _ = np.linalg.slogdet(odd_part(linearise_over_two(model, joint, evaluation)))
+    sign, _ = np.linalg.slogdet(odd_part(linearise_over_two(case.model, joint, evaluation)))
     return bool(sign < 0.0)
 
 
-def two_periods(orders: tuple[int, ...], below: int) -> tuple[int, ...]:
-    """Harmonics of half the frequency: the even ones are those of one period, and the odd ones below the highest; more
-    of these where there are few, as what grows need not be as smooth as the state. below: half the number of samples.
+def _unknowns(joint: Joint, orders: tuple[int, ...]) -> int:
+    return joint.slots.size * (4 * max(orders) + 1)
+
+
+def two_periods(orders: tuple[int, ...]) -> tuple[int, ...]:
+    """Harmonics of half the frequency: the even ones are those of one period, and all odd ones below the highest.
+
+    More of these would see a stiffness of the contact that the state, with its few harmonics, does not have.
     """
-    highest = min(2 * max(*orders, FEWEST), below)
-    return tuple(sorted({2 * order for order in orders} | set(range(1, highest, 2))))
+    return tuple(sorted({2 * order for order in orders} | set(range(1, 2 * max(orders), 2))))
 
 
 def linearise_over_two(model: ReducedModel, joint: Joint, evaluation: Evaluation) -> Linearisation:
     """Derivative of the balance over two periods at a state that repeats after one."""
-    samples = max(2 * joint.basis.n_samples, 0 if joint.penalty.inertial.any() else FINE)
-    orders = two_periods(joint.basis.orders, samples // 2)
+    orders = two_periods(joint.basis.orders)
     omega = 0.5 * joint.omega
     longer = replace(
         joint,
         omega=omega,
         structure=build_structure(model, omega, joint.excitation_amplitude, orders),
-        basis=build_basis(orders, samples),
+        basis=build_basis(orders, 2 * joint.basis.n_samples),
     )
     balance = Balance(longer, evaluation.history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
     doubled = tuple(2 * order for order in joint.basis.orders)

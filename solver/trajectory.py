@@ -238,7 +238,7 @@ class Trajectory:
         return self._doubling()
 
     def _doubling(self) -> Outcome:
-        doubled = doubles_period(self.case.model, self.joint, self.point.evaluation)
+        doubled = doubles_period(self.case, self.joint, self.point.evaluation, self.effort)
         return Outcome.PERIOD_DOUBLED if doubled else Outcome.CONVERGED
 
     def oscillates(self) -> bool:
