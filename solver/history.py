@@ -34,16 +34,20 @@ class PeriodicState:
 class StartState:
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
-    penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line. resolution: harmonics and
-    samples of the state. response_error, wear_rate_error: its estimated relative errors.
+    coarse: the state that a sweep in steps twice as long has come to, with the same harmonics and samples; None where
+    it has found none. penalty_omega: rad/s, the frequency that the penalty was taken at, the same for all points of a
+    quarter octave. resolution: harmonics and samples of the state. response_error, wear_rate_error: its estimated
+    relative errors, what the steps of the sweep leave wrong included.
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
     branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
-    fold_frequency: Hz, the fold at which the sweep left its branch on the way to this frequency; NaN if none.
+    fold_frequency: Hz, the last of them; NaN if none, and for a ramp, whose folds are none of the
+        frequency.
     message: what an unexpected error said, see `Outcome.EXCEPTION`.
     """
 
     outcome: Outcome
     state: PeriodicState | None
+    coarse: PeriodicState | None
     penalty_omega: float
     resolution: Resolution
     response_error: float

@@ -117,9 +117,9 @@ class Recorder:
         self._kept["samples_used"][wanted] = report.resolution.samples
         self._kept["stable"][wanted] = report.certificate.stable
         worn = depth @ self.model.contact.area
-        error = np.divide(self._local_errors, worn, out=np.zeros_like(worn), where=worn > 0.0)
-        self._kept["worn_volume_error"][wanted] = error
-        self._kept["wear_depth_error"][wanted] = error[:, None] * depth
+        relative = np.divide(self._local_errors, worn, out=np.zeros_like(worn), where=worn > 0.0)
+        self._kept["worn_volume_error"][wanted] = relative
+        self._kept["wear_depth_error"][wanted] = relative[:, None] * depth
         self._last = (cycle, report, rate)
 
     def _cubic(
