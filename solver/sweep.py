@@ -25,6 +25,7 @@ from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance, vibration_change
+from solver.settings import first_resolution
 from solver.settling import settle
 from solver.stability import is_stable
 
@@ -47,8 +48,9 @@ FINE = 1e-3
 SPAN = 0.05
 """Of the parameter: natural length of arc-length steps."""
 
-RECHECK = 1.0
-"""Change of the vibration over the smaller one, after which harmonics and samples are chosen anew."""
+RECHECK = 0.3
+"""Change of the vibration over the smaller one, after which harmonics and samples are chosen anew. Measured on
+the dovetail: with 1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
 
 COSTLY, LIGHT = 2500, 1600
 """Unknowns from which nodes take fewer harmonics than their error asks for, and how many they have then."""
@@ -235,6 +237,16 @@ class Sweep:
             return
         joint = self.joint_at(self.here.parameter)
         refined = refine(self.case, joint.omega, joint.excitation_amplitude, self.here, self.effort)
+        fewest = first_resolution(self.case.settings)
+        if refined.case.resolution.highest < fewest.highest:
+            # a joint that sticks needs one harmonic, but the next node may be the first one that slips
+            if self.case.resolution == fewest:
+                return
+            case = self.case.at(fewest)
+            level = move_point(
+                refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
+            )
+            refined = refined if level is None else replace(refined, case=case, point=level)
         n_rel = joint.slots.size
         if n_rel * (2 * len(refined.case.resolution.orders) + 1) > COSTLY:
             refined = lighter(refined, joint.omega, joint.excitation_amplitude, LIGHT, self.effort) or refined
