@@ -7,6 +7,9 @@ errors does not see. Euler steps are of first order: those of twice the length a
 difference is the error. Steps of second order are wrong by four times as much; where the wear rate has corners they
 are of first order, so that the difference is taken as it is.
 
+Explicit steps beyond what is stable for some pairs ratchet: with twice the length they may go the same wrong way. Their
+companion takes implicit steps, whose error has the other sign.
+
 The difference is that of the depths of all pairs, each by its magnitude: where the volumes of two histories cross their
 profiles still differ.
 """
@@ -20,16 +23,26 @@ import numpy as np
 
 from solver.adaptive import AdaptiveSteps
 from solver.history import StartState
+from solver.joint import Case
+from solver.ladder import fewer
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
+from solver.path import PathPoint
 from solver.record import depth_within
+from solver.settings import Scheme, SolverSettings
 from solver.sweep import move_point
 from solver.trajectory import Trajectory
 
 MOST_PARTS = 40
 """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
 
-_CARRIED = ("kept", "offset", "waiting")
+COSTLY, LIGHT = 2500, 1600
+"""Unknowns from which the companion takes fewer harmonics than the history, and how many it has then at most: what
+these miss is in the difference, too."""
+
+AUTOMATIC = SolverSettings()
+
+_CARRIED = ("kept", "offset", "waiting", "followed")
 
 
 class Companion:
@@ -37,18 +50,21 @@ class Companion:
 
     kept (n_output, n_contact): its depths at the counts asked for, m, NaN where it has not come to. offset
     (n_contact,): m, difference of the depths at the last count at which it had to begin anew from the history itself.
-    waiting: steps of the history that it has still to follow.
+    waiting: steps of the history that it has still to follow. followed: harmonics and samples of the history for which
+    its own were chosen.
     """
 
     def __init__(self, main: Trajectory, start: StartState, cycles: FloatArray) -> None:
         self.main = main
         coarse = replace(start, state=start.coarse or start.state)
-        self.way = Trajectory(main.case, coarse, main.wear_coefficient, main.scheme)
+        scheme: Scheme = "implicit" if main.scheme == "explicit" else main.scheme
+        self.way = Trajectory(main.case, coarse, main.wear_coefficient, scheme)
         self.way.effort = main.effort
         self.cycles = cycles
         self.kept = np.full((cycles.size, main.still.size), np.nan)
         self.offset = np.zeros_like(main.still)
         self.waiting = 0
+        self.followed = main.case.resolution
         self.steps: AdaptiveSteps | None = None
 
     def begin(self) -> None:
@@ -59,7 +75,7 @@ class Companion:
         self.kept[self.cycles == 0.0] = self.way.point.evaluation.wear_depth
         if self.main.scheme == "adaptive":
             self.steps = AdaptiveSteps(self.way, 1.0)
-        if self.main.case is not self.way.case and not self._take_case():
+        if self.main.case.resolution != self.way.case.resolution and not self._take_case():
             self._begin_anew()
 
     def carried(self) -> dict[str, Any]:
@@ -82,7 +98,7 @@ class Companion:
         if self.waiting < 2 and not at_once:
             return
         self.waiting = 0
-        if self.main.case is not self.way.case and not self._take_case():
+        if self.main.case.resolution != self.followed and not self._take_case():
             self._begin_anew()
             return
         for _ in range(MOST_PARTS):
@@ -123,21 +139,36 @@ class Companion:
         self.kept[wanted] = self.offset + depth_within(fraction, way.cycle - cycle, *ends, self.steps is not None)
 
     def _take_case(self) -> bool:
-        """Go on with the harmonics and samples of the history."""
+        """Go on with the harmonics and samples of the history, or with fewer where these are many; False where no
+        state is found with them.
+        """
         way, main = self.way, self.main
-        point = move_point(way.case, main.case, main.joint, way.point, way.effort)
-        way.case, way.joint, way.solver, way.last_change = main.case, main.joint, JacobianSolver(), None
-        if point is not None:
-            way.point = point
-        return point is not None
+        resolution, n_rel = main.case.resolution, main.joint.slots.size
+        if n_rel * (2 * len(resolution.orders) + 1) > COSTLY:
+            while n_rel * (2 * len(resolution.orders) + 1) > LIGHT and resolution.highest > 1:
+                resolution = fewer(resolution, AUTOMATIC)
+        self.followed = main.case.resolution
+        case = main.case.at(resolution)
+        return self._move(way.case, case, way.point)
+
+    def _move(self, old: Case, case: Case, point: PathPoint) -> bool:
+        """Take up a state of another case with the harmonics and samples of this one."""
+        way = self.way
+        joint = case.joint(self.main.joint.omega, self.main.joint.excitation_amplitude)
+        moved = point if old is case else move_point(old, case, joint, point, way.effort)
+        if moved is not None:
+            way.case, way.joint, way.solver, way.last_change = case, joint, JacobianSolver(), None
+            way.point = moved
+        return moved is not None
 
     def _begin_anew(self) -> None:
         """Go on from the state of the history, with the difference that there is."""
         way, main = self.way, self.main
         wanted = (self.cycles > way.cycle) & (self.cycles <= main.cycle)
         self.offset = self.offset + way.point.evaluation.wear_depth - main.point.evaluation.wear_depth
-        way.case, way.joint, way.solver, way.last_change = main.case, main.joint, JacobianSolver(), None
-        way.point, way.cycle = main.point, main.cycle
+        if not self._move(main.case, way.case, main.point):
+            self._move(main.case, main.case, main.point)
+        way.last_change, way.cycle = None, main.cycle
         self.kept[wanted] = main.point.evaluation.wear_depth + self.offset
         if self.steps is not None:
             self.steps.restart()

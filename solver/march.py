@@ -19,8 +19,8 @@ from solver.packed import Packed
 from solver.packing import pack, unpack
 from solver.path import OutOfTimeError
 from solver.record import Recorder
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme, Trajectory
+from solver.settings import Scheme, SolverSettings
+from solver.trajectory import Trajectory
 
 MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
 STEP_ITERATIONS = 10
@@ -53,7 +53,7 @@ def march_wear(
         from which this one goes on: its history is the same to the last bit, but for `run_time`.
     """
     started = computing_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
+    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops))
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -32,10 +32,9 @@ from solver.path import (
     vibration_change,
 )
 from solver.response import StateReport, report_state
+from solver.settings import Scheme
 from solver.stability import is_stable
 from solver.sweep import move_point
-
-Scheme = Literal["explicit", "implicit", "adaptive"]
 
 RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
@@ -44,6 +43,7 @@ MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
 ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
 NO_WEAR = 1e-12  # of the same: such a joint sticks
+COSTLY = 2500  # unknowns from which pairs are compared with fewer harmonics rather than with more
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 _CARRIED = (
@@ -162,14 +162,15 @@ class Trajectory:
         return refined.accurate
 
     def _compare_pairs(self) -> None:
-        """What the slip work of each pair is wrong by: its change with harmonics two levels up.
+        """What the slip work of each pair is wrong by: its change with more harmonics, or fewer where they are many.
 
         The pairs at the edge of the slip zone are wrong by far more than all of them together.
         """
         evaluation = self.point.evaluation
         self.slip_work_error = np.zeros_like(self.still)
-        wanted = on_ladder(self.case.resolution, 2)
-        if not evaluation.slip_work.any() or not self.case.model.holds(wanted.highest):
+        costly = evaluation.predicted_h.size > COSTLY
+        wanted = on_ladder(self.case.resolution, -1 if costly else 2)
+        if not self.wears() or wanted == self.case.resolution or not self.case.model.holds(wanted.highest):
             return
         finer = self.case.at(wanted)
         joint = finer.joint(self.joint.omega, self.joint.excitation_amplitude)
