@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING
 from studyrunner.costs import LearnedCosts
 from studyrunner.crashes import Crash, Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
 from studyrunner.evaluate import (
-    CONVERGED,
+    COMPLETE,
     CRASHED,
     NOT_COMPUTED,
     build_evaluator,
-    describe_failures,
     failed_results,
 )
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.ledger import Ledger
 from studyrunner.output import parts_folder
-from studyrunner.progress import RunProgress, count
+from studyrunner.progress import RunProgress, Standing, count
 from studyrunner.ranks import Ranks
 from studyrunner.records import record_type
 from studyrunner.results import MarchResult, StartResult
@@ -47,6 +46,10 @@ _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
+_LATE = 0.25
+"""A task that takes longer than expected is taken to go on for such a share of its time."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was ended from outside; the file holds what was computed until then. summary: how far it was."""
 
@@ -66,16 +69,17 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_left: points that are not computed yet. n_found: those that an earlier run has left.
+    """How a run ended. n_complete: points computed to their last cycle. n_left: those that are not computed yet.
 
-    failures: a line for each way in which points failed. certificates: the table of the worst.
+    n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
+    certificates: the table that begins with the worn volume.
     """
 
     n_points: int
-    n_converged: int
+    n_complete: int
     n_left: int
     n_found: int
-    failures: tuple[str, ...]
+    findings: tuple[str, ...]
     certificates: str
 
 
@@ -108,7 +112,7 @@ def run_study(
         ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
         take_crashes(ledger)
         if retry_failed:
-            ledger.forget_failed()
+            ledger.forget_failed(COMPLETE)
         n_found = ledger.n_points_finished
         if n_found:
             progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
@@ -154,10 +158,10 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
     outcomes = gathered.outcomes
     return RunSummary(
         n_points=plan.n_points,
-        n_converged=outcomes[CONVERGED],
+        n_complete=sum(outcomes[number] for number in COMPLETE),
         n_left=outcomes[NOT_COMPUTED],
         n_found=n_found,
-        failures=describe_failures(outcomes),
+        findings=gathered.findings,
         certificates=gathered.certificates,
     )
 
@@ -276,12 +280,31 @@ class Course:
             self._left[march.kind] += march.cost
         return new
 
-    @property
-    def seconds(self) -> tuple[float, float]:
-        """Seconds spent on all ranks together, and those expected in the end."""
-        spent = sum(self.costs.measured(kind) for kind in self._left)
-        left = sum(max(0.0, seconds) * self.costs.correction(((kind,),)) for kind, seconds in self._left.items())
-        return spent, spent + left
+    def look(self, running: Sequence[tuple[BranchTask | MarchTask, int, float]]) -> Standing:
+        """How far the tasks are. running: as `Dispatcher.running`."""
+        factors = {kind: self.costs.correction(((kind,),)) for kind in self._left}
+        left = sum(max(0.0, seconds) * factors[kind] for kind, seconds in self._left.items())
+        longest = 0.0
+        for task, _, elapsed in running:
+            expected = task.cost / task.n_results * factors[task.kind]
+            # one that is late takes some time more, nobody knows how much
+            still = max(expected - elapsed, _LATE * elapsed)
+            left += still - expected
+            longest = max(longest, still)
+        return Standing(
+            n_done=self.n_points,
+            n_points=self._ledger.plan.n_points,
+            seconds_left=max(longest, left / max(1, len(running))),
+            running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
+        )
+
+    def _describe(self, task: BranchTask | MarchTask, n_left: int) -> str:
+        """A task that is computed, by what it is at."""
+        if isinstance(task, BranchTask):
+            place = task.order_left[task.n_results - n_left]
+            how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
+            return f"{how} to {task.frequencies[place]:.6g} Hz"
+        return f"{self._ledger.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
 
 
 def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunProgress) -> None:
@@ -301,15 +324,15 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
         forget_crash(ledger.store.folder, rank)
         return course.take_back(lost, crashes)
 
-    def tick() -> None:
+    def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
         ledger.store.tick()
-        progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
+        progress.tick(lambda: course.look(running()))
 
     if course.branches:
         n_branches = count(len(course.branches), "branch", "branches")
-        n_frequencies = count(len(course.branches[0].frequencies), "frequency", "frequencies")
-        progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
-    progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
+        n_starts = count(course.n_starts_left, "start state")
+        progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
+    progress.begin_tasks()
     serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back)
     ledger.store.flush()
 

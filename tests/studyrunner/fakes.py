@@ -92,6 +92,8 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
         fold_frequency=np.nan,
         step_limit=np.inf,
         oscillates=False,
+        last_cycle=task.cycles[-1],
+        largest_wear_depth=1e-6,
         share=place,
     )
 
