@@ -107,11 +107,12 @@ def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
 
 
 def without_values(result: MarchResult, outcome: int) -> MarchResult:
-    """The result as it is where the point failed: NaN, or 0 where the variable is a whole number."""
+    """The result as it is where there is no state: NaN, or 0 where the variable is a whole number."""
     values = {
         name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0) for name, array in result.values.items()
     }
-    return replace(result, outcome=outcome, values=values)
+    nothing = dict.fromkeys(("last_cycle", "error_estimate", "largest_wear_depth"), np.nan)
+    return replace(result, outcome=outcome, values=values, **nothing)
 
 
 def open_ledger(
