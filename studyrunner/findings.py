@@ -72,8 +72,10 @@ class Findings:
     def _say(self, record: np.void) -> str:
         """What is known of a history: what its message says, and how far it came where that is not in it."""
         message, last = str(record["message"]), float(record["last_cycle"])
-        if int(record["outcome"]) in COMPLETE or "cycle" in message or math.isnan(last):
+        if int(record["outcome"]) in COMPLETE or "cycle" in message:
             return message
+        if math.isnan(last):
+            return message or "no state was found"
         end = self._study.cycles_kept[-1]
         return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
 

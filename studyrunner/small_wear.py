@@ -47,13 +47,13 @@ class SmallWear:
         if self._worst is None:
             return "nothing was computed"
         share, point = self._worst
-        text = f"depth over pair spacing at most {share:.2g}"
         if share <= SMALL:
-            return text
+            return f"depth over pair spacing at most {share:.2g}"
         where = describe_point(self._study, point)
         at = f" at {where}" if where else ""
-        others = f", above {SMALL:g} at {self._n_beyond} points" if self._n_beyond > 1 else ""
-        return f"NOT MET, {text} ({self._spacing:.2g} m){at}{others}: is wear_coefficient in 1/Pa? else fewer cycles"
+        all_of_them = f", above {SMALL:g} at {self._n_beyond} points" if self._n_beyond > 1 else ""
+        remedy = "is wear_coefficient in 1/Pa? If it is, take fewer cycles"
+        return f"NOT MET: depth over pair spacing ({self._spacing:.2g} m) is {share:.2g}{at}{all_of_them}: {remedy}"
 
 
 def pair_spacing(facts: SceneFacts) -> float:

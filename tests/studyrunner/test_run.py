@@ -71,7 +71,7 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     assert "2 computed, 1 failed" in first
     assert "2 of 3 points within rtol = 1 %, 1 without one at the last cycle" in volume
     assert outcome == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
-    assert point == "  110 Hz"
+    assert point == "  110 Hz: no state was found"
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
         assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]

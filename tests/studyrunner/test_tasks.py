@@ -51,9 +51,24 @@ def test_one_branch_a_line_of_frequencies() -> None:
     assert_every_point_once(study, plan)
 
 
+def test_a_ramp_is_a_task_at_each_frequency() -> None:
+    """Nothing is serial in it: as many branches as points, and the marches of each from its only state."""
+    study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
+    ramps = [branch for branch in plan.branches if branch.sweep == "ramp"]
+    assert [branch.frequencies for branch in ramps] == [(150.0,), (155.0,), (160.0,)]
+    assert [branch.frequencies for branch in plan.branches if branch.sweep == "up"] == [(150.0, 155.0, 160.0)]
+    assert [branch.number for branch in plan.branches] == list(range(4))
+    assert sum(branch.cost for branch in ramps) > plan.branches[-1].cost
+    for branch in ramps:
+        assert branch.order == branch.order_left == (0,)
+        assert plan.marches[branch.number] == plan.marches_from(branch.number, 0) != ()
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - sum(len(line) for line in plan.marches)
+    assert_every_point_once(study, plan)
+
+
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
-    study, plan = plan_of(*GRID, *SHARED)
+    study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
     assert any(len(task.shares) > 1 for task in plan.marches[0])
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         for task in line:
