@@ -58,15 +58,15 @@ class RunProgress:
 
     def __init__(self) -> None:
         self._began = self._began_tasks = time.monotonic()
-        self._doing = ""
         self._next_line = FIRST_LINE
         self._next_picture = 0.0
         console = Console(stderr=True)
         self._bar: Progress | None = None
         if console.is_terminal:
-            columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-            self._bar = Progress(*columns, TextColumn("{task.fields[standing]}"), console=console, transient=True)
-            self._bar_task = self._bar.add_task("", total=1.0, standing="")
+            # the text comes last: it is cut where the terminal is narrow
+            columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}"))
+            self._bar = Progress(*columns, console=console, transient=True)
+            self._bar_task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -81,11 +81,10 @@ class RunProgress:
 
     def say(self, doing: str) -> None:
         """What is done from now on."""
-        self._doing = doing
         if self._bar is None:
             print(f"{self._clock()} {doing}", file=sys.stderr, flush=True)
         else:
-            self._show()
+            self._bar.update(self._bar_task, description=doing)
 
     def note(self, happened: str) -> None:
         """Something that the user has to know; what is done stays the same."""
@@ -110,19 +109,15 @@ class RunProgress:
                 self._next_picture = elapsed + _SECONDS_A_PICTURE
                 standing = look()
                 text = standing.describe(since)
-                self._bar.update(self._bar_task, completed=standing.share(since), standing=text)
+                self._bar.update(self._bar_task, completed=standing.share(since), description=text)
         elif elapsed >= self._next_line:
             self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
-            print(f"{self._clock()} {self._doing}: {look().describe(since)}", file=sys.stderr, flush=True)
+            print(f"{self._clock()} {look().describe(since)}", file=sys.stderr, flush=True)
 
     @property
     def seconds(self) -> float:
         """Time since the start."""
         return time.monotonic() - self._began
-
-    def _show(self) -> None:
-        if self._bar is not None:
-            self._bar.update(self._bar_task, description=self._doing)
 
     def _clock(self) -> str:
         return f"[{format_seconds(self.seconds):>7}]"

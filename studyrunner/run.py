@@ -46,8 +46,8 @@ _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
-_LATE = 0.25
-"""A task that takes longer than expected is taken to go on for such a share of its time."""
+_LATE = 1.0
+"""A task that takes longer than expected is taken to go on for such a share of the time that it has taken."""
 
 
 class Interrupted(KeyboardInterrupt):
