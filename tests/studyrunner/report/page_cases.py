@@ -58,6 +58,7 @@ def build_file(
     for name, entry in {**{name: ASKED[name] for name in variables}, **KEPT}.items():
         size = shape + tuple(sizes[dimension] for dimension in entry.dimensions)
         values = random.uniform(0.1, 1.0, size) * 1e-6 if entry.dtype == "float64" else random.integers(1, 2, size)
+        values = np.full(size, float(cycles[-1])) if name == "last_cycle" else values
         values[bad] = np.nan if entry.dtype == "float64" else 0
         data[name] = ((*axes, *entry.dimensions), values.astype(entry.dtype), {"units": entry.units, "long_name": name})
     outcome = np.where(bad, FAILED, 0).astype(np.int8)
