@@ -220,7 +220,8 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     colours = [course.line_style(number)["color"] for number in range(len(fields))]
     bars = draw_bars(result, panel, course, choice, reached, scale, colours)
     care = mark_care(result, panel, course, choice, reached, scale)
-    set_from_zero(panel, scale(largest).item())
+    # bars that leave the points too little room are cut
+    set_from_zero(panel, scale(max(largest, min(bars, 2.0 * largest))).item())
     n_oscillating = _mark_oscillating(result, course, choice, panel, fields, scale, _SEEN * largest)
     n_failed = mark_failed(panel, course.values, failed)
     course.set_axis(panel)
@@ -232,7 +233,7 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
         f"Rings: {count(n_oscillating, 'point')} whose wear rate oscillates from step to step" if n_oscillating else "",
-        "Bars: estimated error" if bars else "",
+        "Bars: estimated error" if bars > 0.0 else "",
         *care,
         choice.sentence,
         "Fig. 8 of the paper",

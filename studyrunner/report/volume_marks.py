@@ -65,11 +65,14 @@ def draw_bars(
     fields: list[NDArray[np.float64]],
     scale: Scale,
     colours: list[str],
-) -> bool:
-    """Estimated errors of the last worn volumes over the course as bars; whether there are any. fields: (n,) each."""
-    drawn = False
+) -> float:
+    """Estimated errors of the last worn volumes over the course as bars; how high they reach, m3, 0 where none is.
+
+    fields: (n,) each.
+    """
+    highest = 0.0
     if not result.has("error_estimate"):
-        return drawn
+        return highest
     for point, field, colour in zip(choice.points, fields, colours, strict=True):
         wrong = course.read(result, "error_estimate", point) * field
         told = np.isfinite(wrong) & (wrong > 0.0)
@@ -77,8 +80,8 @@ def draw_bars(
             sides = scale(np.stack([np.minimum(wrong, field)[told], wrong[told]]))
             at = (course.values[told], scale(field[told]))
             panel.errorbar(*at, yerr=sides, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.5, zorder=2.5)
-            drawn = True
-    return drawn
+            highest = max(highest, float((field + wrong)[told].max()))
+    return highest
 
 
 def mark_care(
