@@ -89,9 +89,11 @@ class Result:
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
         """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
+        last = np.full(self.computed.shape, np.nan)
         if self.has("last_cycle"):
-            return np.asarray(self.dataset["last_cycle"].values, dtype=float)
-        return np.where(self.computed, self.cycles[-1], np.nan)
+            last = np.asarray(self.dataset["last_cycle"].values, dtype=float)
+        # points of an older file, or of one that was joined to this
+        return np.where(self.computed & np.isnan(last), self.cycles[-1], last)
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:

@@ -152,6 +152,16 @@ def test_an_older_file_holds_results_of_points_to_tolerance_only() -> None:
     assert content["without"] == [LOST]
 
 
+def test_points_of_an_older_file_that_was_joined_to_a_newer_one_are_results() -> None:
+    result = make_result()
+    last = result.dataset["last_cycle"].copy(deep=True)
+    last.values.flat[:4] = np.nan
+    joined = Result(result.path, result.dataset.assign(last_cycle=last))
+    assert joined.held.all()
+    assert joined.last_cycle.ravel().tolist() == [20_000.0] * 8
+    assert not np.isnan(joined.read("stable").values).any()
+
+
 def test_the_page_knows_which_points_hold_what() -> None:
     content = build_page_data(mixed(), 1e7).content
     assert content is not None
