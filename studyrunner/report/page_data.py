@@ -189,8 +189,7 @@ def _fit_points(
 def _most_worn_first(result: Result, points: NDArray[np.int64]) -> NDArray[np.int64]:
     if not result.has("worn_volume"):
         return points
-    last = result.dataset["worn_volume"].max("cycle").values.ravel()[points]
-    return points[np.argsort(-np.nan_to_num(last), kind="stable")]
+    return points[np.argsort(-np.nan_to_num(result.worn.ravel()[points]), kind="stable")]
 
 
 def _maps(result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]) -> dict[str, object] | None:

@@ -183,7 +183,7 @@ function drawMaps() {
   const entry = maps.variables[state.map];
   const found = held(maps, state.point, state.cycle);
   byId("map-title").textContent = `Contact pairs at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found) {
+  if (!found || !known(state.point, state.cycle)) {
     sayInstead("map-plot", known(state.point, state.cycle) ? "The maps of this point are not on this page." : sentence(state.point));
     return;
   }
@@ -239,7 +239,7 @@ function drawLoop() {
   const { loop_displacement: displacement, loop_force: force } = loops.variables;
   const found = held(loops, state.point, state.cycle);
   byId("loop-title").textContent = `Loop of pair ${loops.contacts[state.loop]} at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found) {
+  if (!found || !known(state.point, state.cycle)) {
     sayInstead("loop-plot", known(state.point, state.cycle) ? "The loops of this point are not on this page." : sentence(state.point));
     return;
   }

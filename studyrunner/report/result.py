@@ -125,6 +125,14 @@ class Result:
         found: NDArray[np.bool_] = inexact | (self.computed & (self.errors > self.rtol))
         return found
 
+    @cached_property
+    def worn(self) -> NDArray[np.float64]:
+        """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
+        volume = self.read("worn_volume")
+        last = volume.isel(cycle=-1)
+        worn = last if self.computed.all() else last.fillna(volume.max("cycle"))
+        return np.asarray(worn.transpose(*self.axes).values, dtype=float)
+
     def ended(self, word: str) -> NDArray[np.bool_]:
         """Which points have the outcome of this word; in the shape of the axes."""
         numbers = [number for number, ending in self.endings.items() if ending.word == word]
@@ -216,7 +224,7 @@ class Result:
     def _shown(self) -> dict[str, int]:
         candidates = []
         if self.has("worn_volume"):
-            candidates.append(self.read("worn_volume").max("cycle").transpose(*self.axes).values)
+            candidates.append(self.worn)
         if self.has("response_amplitude"):
             amplitude = self.read("response_amplitude").isel(cycle=0)
             candidates.append(amplitude.max("response", skipna=False).values)
