@@ -89,9 +89,7 @@ class Result:
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
         """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
-        last = np.full(self.computed.shape, np.nan)
-        if self.has("last_cycle"):
-            last = np.asarray(self.dataset["last_cycle"].values, dtype=float)
+        last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
         # points of an older file, or of one that was joined to this
         return np.where(self.computed & np.isnan(last), self.cycles[-1], last)
 
@@ -103,17 +101,15 @@ class Result:
     @cached_property
     def errors(self) -> NDArray[np.float64]:
         """Estimated relative errors of the last worn volumes; NaN where the file has none; in the shape of the axes."""
-        if not self.has("error_estimate"):
-            return np.full(self.computed.shape, np.nan)
-        return np.asarray(self.dataset["error_estimate"].values, dtype=float)
+        known = self.dataset["error_estimate"].values if self.has("error_estimate") else np.nan
+        return np.broadcast_to(np.asarray(known, dtype=float), self.computed.shape)
 
     @cached_property
     def rtol(self) -> NDArray[np.float64]:
         """Relative error that each point was to keep below; NaN where the file does not say."""
         outcome = self.dataset["outcome"]
         if "rtol" in outcome.dims:
-            values = self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values
-            return np.asarray(values, dtype=float)
+            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
         solver = self.study.get("solver")
         aim = solver.get("rtol") if isinstance(solver, dict) else None
         return np.full(outcome.shape, float(aim) if isinstance(aim, int | float) else np.nan)
@@ -121,16 +117,13 @@ class Result:
     @cached_property
     def above(self) -> NDArray[np.bool_]:
         """Which points were computed with an error of the worn volume, or of their states, above `rtol`."""
-        inexact = self.computed & (self.dataset["outcome"].values != CONVERGED)
-        found: NDArray[np.bool_] = inexact | (self.computed & (self.errors > self.rtol))
-        return found
+        inexact = self.dataset["outcome"].values != CONVERGED
+        return np.asarray(self.computed & (inexact | (self.errors > self.rtol)))
 
     @cached_property
     def worn(self) -> NDArray[np.float64]:
         """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
-        volume = self.read("worn_volume")
-        last = volume.isel(cycle=-1)
-        worn = last if self.computed.all() else last.fillna(volume.max("cycle"))
+        worn = self.read("worn_volume").isel(cycle=-1).fillna(self.read("worn_volume").max("cycle"))
         return np.asarray(worn.transpose(*self.axes).values, dtype=float)
 
     def ended(self, word: str) -> NDArray[np.bool_]:

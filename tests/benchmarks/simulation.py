@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studyrunner.course import Course
 from studyrunner.dispatch import Assignment, Dispatcher
 from studyrunner.results import MarchResult, StartResult
-from studyrunner.run import Course
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 
 Task = BranchTask | MarchTask

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from studyrunner.course import start_marches
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.ledger import Ledger
 from studyrunner.records import record_type
 from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
 from studyrunner.sharing import Index
 from studyrunner.store import Store

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from studyrunner.course import Course
 from studyrunner.results import StartResult
-from studyrunner.run import Course
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, TaskPlan, build_tasks
 from tests.benchmarks.scheduling import SHAPES, replay_shape

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import pytest
 
 from studyrunner.cli import main
+from studyrunner.course import start_marches
 from studyrunner.estimate import AUTOMATIC_HARMONICS
 from studyrunner.results import StartResult
-from studyrunner.run import start_marches
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
 from studyrunner.tasks import Settings, TaskPlan, build_tasks
