@@ -77,6 +77,33 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]
 
 
+@pytest.mark.parametrize("outcome", [Outcome.INACCURATE, Outcome.SENSITIVE])
+def test_points_above_rtol_are_computed_points(
+    outcome: Outcome, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit status 0; their values are kept, and they are named with what there is to say of them."""
+    message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
+
+    def above(task: MarchTask, result: MarchResult) -> MarchResult:
+        if task.position != 1:
+            return result
+        return replace(result, outcome=int(outcome), error_estimate=0.15, message=message)
+
+    use_fake(monkeypatch, above)
+    assert main(SMALL) == 0
+    first, volume, *_, head, point = capsys.readouterr().out.splitlines()
+    assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
+    remedy = 'scheme = "adaptive" or a smaller step'
+    assert volume.endswith(f"2 of 3 points within rtol = 1 %, 1 above it; worst 15 % at 110 Hz: {remedy}")
+    assert head == f"1 x {outcome.meaning}: {outcome.sentence}"
+    assert point == f"  110 Hz: {message}"
+    with xr.open_dataset("out.nc") as result:
+        there = result.sel(frequency=110.0).squeeze()
+        assert there.worn_volume.notnull().all()
+        assert there.outcome == int(outcome)
+        assert there.message.item() == message
+
+
 def test_unexpected_failure_keeps_the_old_file(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

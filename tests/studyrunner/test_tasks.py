@@ -66,6 +66,18 @@ def test_a_ramp_is_a_task_at_each_frequency() -> None:
     assert_every_point_once(study, plan)
 
 
+@pytest.mark.parametrize(
+    ("sweeps", "said"),
+    [
+        ("['ramp']", "6: 3 ramps of the excitation, then 3 wear histories"),
+        ("['up', 'ramp']", "10: 1 branch along the frequency and 3 ramps of the excitation, then 6 wear histories"),
+    ],
+)
+def test_the_plan_tells_ramps_from_branches(sweeps: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    overrides = ["axes.frequency=[1, 2, 3]", "axes.scheme=implicit", f"axes.sweep={sweeps}"]
+    assert printed_plan(overrides, capsys)["tasks"] == said
+
+
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
