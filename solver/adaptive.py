@@ -31,7 +31,7 @@ from solver.model import FloatArray
 from solver.path import CALM, PathPoint, final_history, solve_balance, vibration_change
 from solver.trajectory import RESOLUTION, Trajectory
 
-SHARE = 0.5  # of rtol; an error is judged by what the step has worn, or would have worn at the mean rate so far
+SHARE = 0.2  # of rtol, for the step; an error is judged by what it has worn, or would have worn at the mean rate so far
 LONGEST_RATIO = 2.0  # of two steps
 SHORTEST_RATIO = 0.2
 SAFETY = 0.85

@@ -14,7 +14,7 @@ from solver.companion import Companion
 from solver.history import StartState, WearHistory
 from solver.joint import build_case
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packed import Packed
 from solver.packing import pack, unpack
 from solver.path import OutOfTimeError
@@ -24,7 +24,6 @@ from solver.trajectory import Trajectory
 
 MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
 STEP_ITERATIONS = 10
-SENSITIVE = 0.5  # relative error of the last worn volume from which on one number says too little
 REFRESH = 100  # iterations after which the factorisation kept from step to step is given up, so that a march can be
 # kept on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing
 
@@ -146,7 +145,7 @@ def march_wear(
 
 def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tuple[Outcome, str]:
     """Outcome of a history that has come to its end, and what it does not say by itself."""
-    if history.error_estimate > SENSITIVE:
+    if history.error_estimate > SENSITIVE_ERROR:
         area = march.joint.contact.area
         volume, other = (1e9 * float(depth @ area) for depth in (history.wear_depth[-1], companion.kept[-1]))
         return Outcome.SENSITIVE, (

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
-from solver.outcome import Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packed import Packed
 from solver.settings import Resolution, SolverSettings
 from studyrunner.places import describe_reach, known_to, show_count
@@ -36,9 +36,6 @@ INACCURATE, SENSITIVE = int(Outcome.INACCURATE), int(Outcome.SENSITIVE)
 
 COMPLETE = frozenset(int(outcome) for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to their last cycle."""
-
-SENSITIVE_ERROR = 0.5
-"""Relative error of the worn volume above which one number says little."""
 
 Keep = Callable[[Kept], None]
 """Takes note of how far a task is."""
@@ -71,28 +68,24 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
     from solver.continuation import follow_branch
     from solver.packing import pack
 
+    wanted = sorted(task.order_left)
     branch = follow_branch(
         model,
         friction_coefficient,
         task.excitation_amplitude,
-        np.array(task.frequencies),
-        cast("Any", task.sweep),
+        # no state depends on those that are known
+        np.array([task.frequencies[position] for position in wanted]),
+        cast("Literal['up', 'down', 'ramp']", task.sweep),
         _solver_settings(task.settings),
         keep=lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
-    n_left = task.n_results
-    for position, start in branch:
-        if position in task.known:
-            continue
+    for place, start in branch:
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
         packed = pack(start)
-        yield StartResult(position, Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
-        n_left -= 1
-        if n_left == 0:
-            return
+        yield StartResult(wanted[place], Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
 
 
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
@@ -105,7 +98,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
             yield failed_result(task, place, int(Outcome.EXCEPTION), message)
         return
     nan = math.nan
-    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    start = StartState(Outcome.EXCEPTION, None, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
     packed = pack(start)
     for position in [place for place in task.order if place not in task.known][n_given:]:
         yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)
