@@ -47,7 +47,6 @@ class StartState:
 
     outcome: Outcome
     state: PeriodicState | None
-    coarse: PeriodicState | None
     penalty_omega: float
     resolution: Resolution
     response_error: float
@@ -57,6 +56,7 @@ class StartState:
     branch: int = 0
     fold_frequency: float = float("nan")
     message: str = ""
+    coarse: PeriodicState | None = None
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
             yield failed_result(task, place, int(Outcome.EXCEPTION), message)
         return
     nan = math.nan
-    start = StartState(Outcome.EXCEPTION, None, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
     packed = pack(start)
     for position in [place for place in task.order if place not in task.known][n_given:]:
         yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)

@@ -1,0 +1,122 @@
+"""A start state is that of its own point: whatever else is asked for, in whatever steps."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver import sweep as sweeps
+from solver.continuation import follow_branch
+from solver.history import StartState
+from solver.origin import find_origin
+from solver.outcome import Outcome
+from solver.packed import Packed
+from solver.settings import SolverSettings
+from tests.solver.models import dovetail, scene
+
+AUTOMATIC = SolverSettings()
+BESIDE = 212.5  # Hz: near the resonance of the coarse sector, where it slips
+
+
+def starts(
+    frequencies: list[float], sweep: str = "up", settings: SolverSettings = AUTOMATIC
+) -> dict[float, StartState]:
+    found = follow_branch(dovetail(13), 0.5, 0.5, np.array(frequencies), sweep, settings)
+    return {frequencies[index]: start for index, start in found}
+
+
+@lru_cache
+def alone(sweep: str = "up") -> StartState:
+    return starts([BESIDE], sweep)[BESIDE]
+
+
+def slip_work(start: StartState) -> float:
+    """Work of the mean friction forces on the vibration: what differs first where the history does."""
+    assert start.state is not None
+    motion, force = start.state.displacement_h[:, 1:], start.state.contact_force_h[:, 1:]
+    return float(np.pi * (motion[..., 2::2] * force[..., 1::2] - motion[..., 1::2] * force[..., 2::2])[..., 0].sum())
+
+
+@pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
+@pytest.mark.parametrize("others", [[212.0], [205.0, 211.1, 212.499, 212.501, 214.0]])
+def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: str, others: list[float]) -> None:
+    among = starts(sorted([*others, BESIDE]), sweep)[BESIDE]
+    one, other = alone(sweep).state, among.state
+    assert one is not None
+    assert other is not None
+    assert np.array_equal(one.displacement_h, other.displacement_h)
+    assert np.array_equal(one.start_history, other.start_history)
+    assert (alone(sweep).response_error, alone(sweep).branch) == (among.response_error, among.branch)
+
+
+def test_the_three_loading_histories_leave_different_states() -> None:
+    works = [slip_work(alone(sweep)) for sweep in ("up", "down", "ramp")]
+    assert all(work > 0.0 for work in works)
+    assert len({f"{work:.4e}" for work in works}) == 3
+
+
+def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = SolverSettings(harmonics=5, samples=64)
+    found = {}
+    for change in (0.2, 0.005):
+        monkeypatch.setattr(sweeps, "SMALLEST_CHANGE", change)
+        monkeypatch.setattr(sweeps, "LARGEST_CHANGE", change)
+        found[change] = starts([213.0], settings=settings)[213.0]
+    coarse, fine = found[0.2], found[0.005]
+    assert coarse.coarse is not None
+    assert fine.state is not None
+    assert coarse.state is not None
+    wrong, seen = (
+        np.linalg.norm((coarse.state.displacement_h - other.displacement_h)[:, :, 1:])
+        for other in (fine.state, coarse.coarse)
+    )
+    assert 0.0 < wrong < 2.0 * seen
+    assert abs(slip_work(coarse) / slip_work(fine) - 1.0) < 2.0 * coarse.wear_rate_error
+
+
+def test_a_sweep_goes_on_to_the_last_bit() -> None:
+    kept: list[Packed] = []
+    frequencies = np.array([211.0, 212.0, 212.25, 212.5, 212.75])
+    whole = dict(follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=kept.append))
+    assert kept
+    again = dict(follow_branch(dovetail(13), 0.5, 0.5, frequencies[3:], "up", AUTOMATIC, resume=kept[-1]))
+    for index in (0, 1):
+        one, other = whole[index + 3].state, again[index].state
+        assert one is not None
+        assert other is not None
+        assert np.array_equal(one.displacement_h, other.displacement_h)
+
+
+def test_progress_beyond_a_frequency_is_not_used_for_it() -> None:
+    kept: list[Packed] = []
+    list(follow_branch(dovetail(13), 0.5, 0.5, np.array([212.75]), "up", AUTOMATIC, keep=kept.append))
+    ((_, again),) = follow_branch(dovetail(13), 0.5, 0.5, np.array([BESIDE]), "up", AUTOMATIC, resume=kept[-1])
+    assert again.state is not None
+    assert alone().state is not None
+    assert np.array_equal(again.state.displacement_h, alone().state.displacement_h)
+
+
+@pytest.mark.parametrize("sweep", ["up", "down"])
+def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep: str) -> None:
+    model = dovetail()
+    for frequency in np.linspace(100.0, 500.0, 41):
+        origin = find_origin(model, float(frequency), sweep)
+        for start in origin.starts[:2]:
+            ratio = start / frequency
+            assert 0.49 < ratio <= 0.7001 if sweep == "up" else 1.2999 <= ratio < 1.86
+        assert 1.0 <= origin.penalty / frequency < 1.2
+        assert all(abs(start / resonance - 1.0) > 0.01 for start in origin.starts[:1] for resonance in (212.9, 411.0))
+
+
+def test_all_points_of_a_cell_share_their_origin() -> None:
+    model = scene("two_masses")
+    origins = {find_origin(model, frequency, "up") for frequency in np.linspace(0.107, 0.126, 5)}
+    assert len(origins) == 1
+
+
+def test_a_ramp_finds_a_state_at_every_frequency() -> None:
+    found = starts([205.0, 212.0, 213.0], "ramp")
+    assert [start.outcome for start in found.values()] == [Outcome.CONVERGED] * 3
+    assert all(np.isnan(start.fold_frequency) for start in found.values())
