@@ -1,9 +1,9 @@
 """Where a sweep begins: a frequency that depends on the scene and on the point alone, not on the others of a study.
 
 A machine that is run up or down passes the frequencies on its way to the point, and the joint remembers. So a sweep
-begins well away from the point: for "up" between 0.5 and 0.7 times its frequency, for "down" between 1.3 and 1.85
-times. Within a cell of a quarter octave, the same for all points of a range, it begins where the vibration loads the
-stuck joint least, so that it does not begin at a resonance.
+begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85
+times. It is the same for all points of a quarter octave, and it begins where the vibration loads the stuck joint least,
+so that it does not begin at a resonance.
 """
 
 from __future__ import annotations
@@ -46,26 +46,19 @@ class Origin:
 
 def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
     """Origin of the sweep to a frequency, Hz."""
+    cell = math.floor(CELLS * math.log2(frequency))
+    low, high = (2.0 ** (edge / CELLS) for edge in (cell, cell + 1))
     if sweep == "ramp":
-        cell = math.floor(CELLS * math.log2(frequency))
-        return Origin((), 2.0 ** ((cell + 1) / CELLS), cell)
-    lead = CELLS * math.log2(LEAD[sweep] * frequency)
-    if sweep == "up":
-        cell = math.floor(lead)
-        edges = (cell - 1, cell)
-        penalty = 2.0 ** ((cell + 1) / CELLS) / LEAD[sweep]
-    else:
-        cell = math.ceil(lead)
-        edges = (cell + 1, cell)
-        penalty = 2.0 ** (cell / CELLS) / LEAD[sweep]
+        return Origin((), high, cell)
+    width = 2.0 ** (1.0 / CELLS)
     # where no state is found at the quiet frequency, the edge of the cell and one nearer to the points are tried
-    nearer = 2.0 ** ((2 * edges[1] - edges[0]) / CELLS)
-    return Origin((_quiet(model, *edges), 2.0 ** (edges[1] / CELLS), nearer), penalty, cell)
+    near, away = (LEAD[sweep] * low, 1.0 / width) if sweep == "up" else (LEAD[sweep] * high, width)
+    return Origin((_quiet(model, near * away, near), near, near / away), high, cell)
 
 
-def _quiet(model: ReducedModel, far: int, near: int) -> float:
-    """Frequency, Hz, between two edges of cells, at which the excitation loads the stuck joint least."""
-    frequencies = 2.0 ** (np.linspace(far, near, CANDIDATES + 1) / CELLS)
+def _quiet(model: ReducedModel, far: float, near: float) -> float:
+    """Frequency between two of them, Hz, at which the excitation loads the stuck joint least."""
+    frequencies = np.geomspace(far, near, CANDIDATES + 1)
     loads = []
     for frequency in frequencies:
         try:

@@ -228,8 +228,12 @@ class Sweep:
             self._save()
 
     def _history_change(self, before: PathPoint, after: PathPoint) -> float:
-        """Change of the tangential history, as a force, over the friction limits of the static state."""
-        stiffness = self.case.penalty.tangential[:, None]
+        """Change of the tangential history, as a force, over the friction limits of the static state.
+
+        A mass that sits on its slider itself has none: its mean position is part of the state.
+        """
+        penalty = self.case.penalty
+        stiffness = np.where(penalty.inertial, 0.0, penalty.tangential)[:, None]
         change = np.linalg.norm((after.history - before.history) * stiffness)
         limit = self.case.friction_coefficient * float(np.linalg.norm(after.evaluation.force_h[:, 0, 0]))
         return float(change) / limit if limit > 0.0 else 0.0

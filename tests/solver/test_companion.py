@@ -1,0 +1,132 @@
+"""The error of a worn volume against what it is wrong by: exact wear of the slider, short steps of the dovetail."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.history import StartState, WearHistory
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.settings import Scheme, SolverSettings
+from solver.trajectory import Trajectory
+from tests.references import slider_amplitude, slider_wear_depth
+from tests.solver.models import branch_states, dovetail, scene
+
+WEAR = 1.1e-11  # 1/Pa
+GIVEN = SolverSettings(harmonics=5, samples=64)
+CYCLES = np.linspace(0.0, 4e4, 9)
+BESIDE = 213.0  # Hz: the coarse sector wears there, and stops
+SCHEMES: list[tuple[Scheme, float]] = [
+    ("implicit", 4000.0),
+    ("implicit", 1000.0),
+    ("explicit", 4000.0),
+    ("explicit", 1000.0),
+    ("adaptive", 1e-2),
+]
+
+
+@lru_cache
+def start(frequency: float = BESIDE) -> tuple[ReducedModel, StartState]:
+    model = dovetail(9)
+    (found,) = branch_states(model, 0.5, 0.5, [2 * np.pi * frequency], GIVEN)
+    return model, found
+
+
+@lru_cache
+def worn(scheme: Scheme, step: float, wear: float = WEAR, frequency: float = BESIDE) -> WearHistory:
+    """step: cycles, or rtol of the adaptive scheme."""
+    model, found = start(frequency)
+    settings = SolverSettings(5, 64, rtol=step) if scheme == "adaptive" else GIVEN
+    return march_wear(model, 0.5, found, wear, step, scheme, CYCLES, settings)
+
+
+def errors(history: WearHistory, truth: WearHistory) -> np.ndarray:
+    """Estimated over true errors of the volume at all counts but the first, m3."""
+    true = np.abs(history.worn_volume - truth.worn_volume)[1:]
+    return (history.worn_volume_error * history.worn_volume)[1:] / true
+
+
+@pytest.mark.parametrize(("scheme", "step"), SCHEMES)
+def test_the_error_of_the_dovetail_holds_that_of_its_steps(scheme: Scheme, step: float) -> None:
+    truth = worn("implicit", 50.0)
+    history = worn(scheme, step)
+    assert history.outcome is Outcome.CONVERGED
+    ratio = errors(history, truth)
+    assert ratio.min() > 0.5
+    assert history.error_estimate < 0.5
+    # of the pairs, together: what one is wrong by may cross zero
+    of_pairs = np.abs(history.wear_depth - truth.wear_depth)[-1]
+    assert history.wear_depth_error[-1].sum() > 0.5 * of_pairs.sum()
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "explicit"])
+def test_the_error_falls_with_the_step(scheme: Scheme) -> None:
+    steps = np.array([4000.0, 2000.0, 1000.0])
+    model = scene("sdof_slider", 9)
+    settings = SolverSettings(9, 256)
+    (found,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    sizes = [march_wear(model, 0.5, found, WEAR, step, scheme, CYCLES, settings).error_estimate for step in steps]
+    # what harmonics and samples leave wrong stays
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+@pytest.mark.parametrize(("scheme", "step"), SCHEMES)
+def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: float) -> None:
+    model = scene("sdof_slider", 21)
+    settings = SolverSettings(21, 256, rtol=step) if scheme == "adaptive" else SolverSettings(21, 256)
+    (found,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    cycles = np.linspace(0.0, 8e4, 5)
+    history = march_wear(model, 0.5, found, WEAR, step, scheme, cycles, settings)
+    assert history.outcome is Outcome.CONVERGED
+    exact = slider_wear_depth(
+        cycles,
+        wear_coefficient=WEAR,
+        area=1e-4,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda friction_force: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, friction_force, 2 * np.pi * 160.0),
+    )
+    true = np.abs(history.wear_depth[:, 0] - exact)[1:]
+    assert (history.wear_depth_error[1:, 0] > 0.5 * true).all()
+    assert history.error_estimate < 0.3
+
+
+def test_nothing_that_wears_nothing_has_an_error() -> None:
+    history = worn("implicit", 1000.0, frequency=205.0)
+    assert history.outcome is Outcome.CONVERGED
+    assert not history.worn_volume.any()
+    assert not history.worn_volume_error.any()
+    assert history.error_estimate == 0.0
+
+
+def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = worn("implicit", 1000.0)
+    check = Trajectory.check
+
+    def give_up(self: Trajectory) -> Outcome:
+        return check(self) if self.cycle <= 12_000.0 else Outcome.CERTIFICATE_FAILED
+
+    monkeypatch.setattr(Trajectory, "check", give_up)
+    model, found = start()
+    ended = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+    assert ended.outcome is Outcome.CERTIFICATE_FAILED
+    assert ended.last_cycle == 12_000.0
+    known = CYCLES <= 12_000.0
+    assert np.array_equal(ended.worn_volume[known], whole.worn_volume[known])
+    assert np.isnan(ended.worn_volume[~known]).all()
+    assert np.isnan(ended.worn_volume_error[~known]).all()
+    assert (ended.harmonics_used[~known] == 0).all()
+    assert ended.error_estimate == ended.worn_volume_error[known][-1] > 0.0
+
+
+def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive() -> None:
+    model, found = start()
+    history = march_wear(model, 0.5, found, 40.0 * WEAR, 1000.0, "explicit", np.array([0.0, 1000.0]), GIVEN)
+    assert history.outcome is Outcome.SENSITIVE
+    assert "mm3" in history.message
+    assert np.isfinite(history.worn_volume).all()
