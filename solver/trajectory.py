@@ -32,6 +32,7 @@ from solver.path import (
 )
 from solver.response import StateReport, report_state
 from solver.stability import is_stable
+from solver.step_size import check_step
 
 Scheme = Literal["explicit", "implicit", "adaptive"]
 
@@ -202,6 +203,7 @@ class Trajectory:
             return False
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
+        check_step(self.joint, self.point.evaluation, worn, self.cycle, beyond)
         self.last_change = None
         self.effort.limit = self.effort.iterations + JUMP_ITERATIONS
         landed = self._land(beyond, worn)
@@ -251,11 +253,11 @@ class Trajectory:
         return is_stable(held.linearise(evaluation), self.solver)
 
     def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
-        """Make the state at a share of a step the current one."""
+        """Make the state at a share of a step the current one. Raises StepTooLongError."""
+        before, ahead = self.point.evaluation, point.parameter * length
+        check_step(self.joint, before, point.evaluation.wear_depth, self.cycle, ahead)
         balance = balance_at(point.parameter, self.point.history)
-        self.accept(
-            PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), point.parameter * length
-        )
+        self.accept(PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), ahead)
 
     def accept(self, point: PathPoint, length: float) -> None:
         """Make a state that is so many cycles ahead the current one."""

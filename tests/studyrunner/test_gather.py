@@ -183,6 +183,7 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "crashed",
             "not_computed",
             "period_doubled",
+            "step_too_long",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:
