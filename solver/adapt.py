@@ -150,6 +150,11 @@ def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: i
     return Refined(here.case, here.point, UNKNOWN, False)
 
 
+def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
+    """Relative differences of response and wear rate of two states of one joint, judged like any error."""
+    return _Level(case, joint, one).difference(_Level(case, joint, other))
+
+
 def transfer(
     case: Case, joint: Joint, evaluation: Evaluation, old_orders: tuple[int, ...]
 ) -> tuple[Balance, FloatArray]:

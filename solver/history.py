@@ -34,16 +34,20 @@ class PeriodicState:
 class StartState:
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
-    penalty_omega: rad/s, the frequency that the penalty was taken at, the same along a line. resolution: harmonics and
-    samples of the state. response_error, wear_rate_error: its estimated relative errors.
+    coarse: the state that a sweep in steps twice as long has come to, with the same harmonics and samples; None where
+    it has found none. penalty_omega: rad/s, the frequency that the penalty was taken at, the same for all points of a
+    quarter octave. resolution: harmonics and samples of the state. response_error, wear_rate_error: its estimated
+    relative errors, what the steps of the sweep leave wrong included.
     newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
     branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
-    fold_frequency: Hz, the fold at which the sweep left its branch on the way to this frequency; NaN if none.
+    fold_frequency: Hz, the last of them; NaN if none, and for a ramp, whose folds are none of the
+        frequency.
     message: what an unexpected error said, see `Outcome.EXCEPTION`.
     """
 
     outcome: Outcome
     state: PeriodicState | None
+    coarse: PeriodicState | None
     penalty_omega: float
     resolution: Resolution
     response_error: float
@@ -61,25 +65,24 @@ class WearHistory:
 
     cycles (n_output,); worn_volume (n_output,) m3; wear_rate (n_output,) m3 per cycle; wear_depth, mean_pressure (Pa),
     slip_range (m), open_fraction (n_output, n_contact); response (n_output, n_response) complex first harmonic, m;
-    response_peak (n_output, n_response) m. Output counts that were not reached hold NaN; where the point failed all do.
+    response_peak (n_output, n_response) m. Output counts that were not reached hold NaN, whole numbers 0 there.
+    last_cycle: count up to which the point was computed, whatever ended it; NaN where there is no state at all.
     loop_displacement, m, loop_force, N (n_output, n_loops, n_phase, 3): fretting loops of the pairs asked for, as
         `solver.loops.contact_loops` has them.
     jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    error_estimate: estimated relative error of the last worn volume. volume_error (n_output,): m3, estimated error of
-        the worn volume at the end of the step that a count lies in.
+    worn_volume_error (n_output,): estimated relative error of the worn volume: steps with their propagation, harmonics,
+        samples and start state; 0 where nothing has worn. wear_depth_error (n_output, n_contact): the same of the
+        depths, m. error_estimate: `worn_volume_error` at the last count that was reached.
     residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,): the
         certificate of the states, all relative; NaN where not estimated. stable (n_output,): bool.
     harmonics_used, samples_used (n_output,): int, 0 where there is no state.
-    branch: number of folds that the sweep has jumped over since it began. fold_frequency: Hz, the fold at which the
-        sweep left its branch on the way to this point from the frequency before, NaN if there was none.
-    step_limit: cycles, predicted largest stable explicit step at cycle 0, inf where there is none.
-    oscillates: whether the wear rate oscillated from step to step as an unstable explicit scheme does.
     run_time: CPU seconds of the computing thread, start state included.
     branch, fold_frequency: those of the start state.
     step_limit: cycles, predicted largest stable explicit step at the first state that wears: 2 over the largest
     positive rate at which the wear rate falls with the depth; inf where none. oscillates: the wear rate went up and
     down from step to step without calming, as in an unstable explicit scheme.
-    message: what an unexpected error said, see `Outcome.EXCEPTION`.
+    message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
+        longer and the error reached; empty where there is nothing to add.
     """
 
     outcome: Outcome
@@ -108,7 +111,9 @@ class WearHistory:
     harmonics_used: IntArray
     samples_used: IntArray
     stable: BoolArray
-    volume_error: FloatArray
+    worn_volume_error: FloatArray
+    wear_depth_error: FloatArray
+    last_cycle: float = math.nan
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf

@@ -25,7 +25,13 @@ class Outcome(IntEnum):
     CRASHED = 12
     NOT_COMPUTED = 13
     PERIOD_DOUBLED = 14
+    SENSITIVE = 15
     STEP_TOO_LONG = 16
+
+    @property
+    def complete(self) -> bool:
+        """Whether the point was computed to its last cycle: its values are results, each with its error."""
+        return self in (Outcome.CONVERGED, Outcome.INACCURATE, Outcome.SENSITIVE)
 
     @property
     def meaning(self) -> str:
@@ -46,8 +52,10 @@ _SENTENCES = {
     Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more frequencies or more harmonics.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller"
     " step or more harmonics.",
-    Outcome.INACCURATE: "The estimated error of response or wear rate stays above rtol with as many harmonics as may be"
-    " used: use a larger rtol, or a scene that holds nodal diameters for more harmonics.",
+    Outcome.INACCURATE: "Computed to the end, but the estimated error of response or wear rate stays above rtol for"
+    " some of the cycles, with as many harmonics as may be used: response_error and wear_rate_error say by how much.",
+    Outcome.SENSITIVE: "The worn volume depends so much on the step or on the start state that one number says little:"
+    ' two computations of nearly the same case differ by more than half; use scheme = "adaptive" or a smaller step.',
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits:"
     " use more samples or a smaller tolerance.",
     Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"

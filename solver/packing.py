@@ -23,10 +23,14 @@ from solver.packed import Packed
 from solver.path import PathPoint
 from solver.response import StateReport
 from solver.settings import Resolution
+from solver.sweep import Step
 
 _CLASSES: dict[str, type[Any]] = {
     known.__name__: known
-    for known in (Certificate, Estimate, Evaluation, PathPoint, PeriodicState, Resolution, StartState, StateReport)
+    for known in (
+        *(Certificate, Estimate, Evaluation, PathPoint, PeriodicState),
+        *(Resolution, StartState, StateReport, Step),
+    )
 }
 
 

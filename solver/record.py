@@ -66,9 +66,10 @@ class Recorder:
             name: np.full((n_output, *shape), np.nan, complex if name == "response" else float)
             for name, shape in shapes.items()
         }
-        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "volume_error", *CERTIFIED)}
+        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "worn_volume_error", *CERTIFIED)}
         self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
-        self._kept["stable"] = np.ones(n_output, np.bool_)
+        self._kept["stable"] = np.zeros(n_output, np.bool_)
+        self._kept["wear_depth_error"] = np.full((n_output, n_contact), np.nan)
 
     def carried(self) -> dict[str, Any]:
         """What was kept so far, to be packed."""
@@ -115,7 +116,10 @@ class Recorder:
         self._kept["harmonics_used"][wanted] = report.resolution.highest
         self._kept["samples_used"][wanted] = report.resolution.samples
         self._kept["stable"][wanted] = report.certificate.stable
-        self._kept["volume_error"][wanted] = self._local_errors
+        worn = depth @ self.model.contact.area
+        relative = np.divide(self._local_errors, worn, out=np.zeros_like(worn), where=worn > 0.0)
+        self._kept["worn_volume_error"][wanted] = relative
+        self._kept["wear_depth_error"][wanted] = relative[:, None] * depth
         self._last = (cycle, report, rate)
 
     def _cubic(
@@ -147,13 +151,9 @@ class Recorder:
         return self._history(outcome, np.nan, np.nan, 0, run_time)
 
     def finish(self, outcome: Outcome, jump_cycle: float, iterations: int, run_time: float) -> WearHistory:
-        """The whole history; NaN everywhere where the point failed: an unfinished history is no result."""
-        if outcome is not Outcome.CONVERGED:
-            for name, kept in self._kept.items():
-                kept[:] = False if name in ("harmonics_used", "samples_used", "stable") else np.nan
-            return self._history(outcome, jump_cycle, np.nan, iterations, run_time)
-        volume = float(self._kept["wear_depth"][-1] @ self.model.contact.area)
-        error = self._local_errors / volume if volume > 0.0 else 0.0
+        """The history as far as it was computed."""
+        reached = np.flatnonzero(np.isfinite(self._kept["worn_volume_error"]))
+        error = float(self._kept["worn_volume_error"][reached[-1]]) if reached.size else float("nan")
         return self._history(outcome, jump_cycle, error, iterations, run_time)
 
     def _history(
@@ -168,5 +168,6 @@ class Recorder:
             error_estimate=error,
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
+            last_cycle=float("nan") if self._last is None else min(self._last[0], float(self.cycles[-1])),
             **kept,
         )

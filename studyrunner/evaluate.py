@@ -160,8 +160,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     jump, error = history.jump_cycle, history.error_estimate
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
-        worn = float(history.worn_volume[rows[-1]])
-        error = float(history.volume_error[rows[-1]]) / worn if worn > 0.0 else 0.0
+        error = float(history.worn_volume_error[rows[-1]])
     return MarchResult(
         points=share.points,
         outcome=int(history.outcome),

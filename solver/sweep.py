@@ -1,0 +1,339 @@
+"""The loading history of a point: a slow sweep in steps of its own, which leave the joint as the machine would.
+
+Friction makes the periodic states of a joint a family: which one is reached depends on the tangential displacements at
+which the pairs stick, and these on all vibration before. A sweep therefore walks along nodes whose distance is chosen
+by what happens to the tangential history, and by nothing else. A state that is asked for between two nodes is reached
+from the node before it and leaves the walk as it is, so that a point has the same state whatever else is asked for.
+
+Every second node is also reached in one step from the second but last. This coarse walk, which is never corrected by
+the other one, shows what the steps of the sweep are wrong by: the error falls with their length, so that the
+difference of both is the error of the coarse one, and at least that of the fine one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from solver.adapt import Refined, lighter, refine, transfer
+from solver.arc import JUMP, follow_arc
+from solver.balance import Balance
+from solver.joint import Case, Joint
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance, vibration_change
+from solver.settings import first_resolution
+from solver.settling import settle
+from solver.stability import is_stable
+
+HISTORY = 10.0
+"""Change of the tangential history in a step over the friction limits, over rtol. Measured on the dovetail beside its
+resonance, where it matters most: 0.2 leaves the wear rate wrong by 0.5 %, 0.1 by 0.2 %, 0.02 by 0.1 %."""
+
+SMALLEST_CHANGE, LARGEST_CHANGE = 0.02, 0.2
+"""Limits of that change: smaller ones take hundreds of nodes, larger ones miss the states in which pairs let go."""
+
+LONGEST, SHORTEST = 0.03, 2e-5
+"""Of the parameter: lengths of a step."""
+
+JUMPING = 1e-3
+"""Of the parameter: length of a step in which the branch may end."""
+
+FINE = 1e-3
+"""Of the parameter: steps that may always be taken within a step, however much the vibration changes."""
+
+SPAN = 0.05
+"""Of the parameter: natural length of arc-length steps."""
+
+RECHECK = 0.3
+"""Change of the vibration over the smaller one, after which harmonics and samples are chosen anew. Measured on
+the dovetail: with 1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
+
+COSTLY, LIGHT = 2500, 1600
+"""Unknowns from which nodes take fewer harmonics than their error asks for, and how many they have then."""
+
+MOST_LANDINGS = 6
+"""Ends of branches within a step."""
+
+MOST_ITERATIONS = 2500
+"""From one node to the next."""
+
+REFRESH = 8
+"""Nodes after which the factorisation that is kept from node to node is given up: a walk can go on from there."""
+
+_STATE = ("here", "coarse", "checked", "length", "n_nodes", "branch", "fold", "failure", "lost_at")
+
+
+@dataclass(frozen=True)
+class Step:
+    """A state reached by a step and the folds that were jumped over in it (values of the parameter)."""
+
+    point: PathPoint
+    folds: tuple[float, ...] = ()
+
+
+class Sweep:
+    """The walk along the frequency (rad/s; up or down), or along the excitation (share of it) for a ramp.
+
+    here, coarse: the last node of each walk, None where there is no state. branch: folds jumped over so far. fold: the
+    last of them, NaN if none. failure: why there is no state.
+    """
+
+    def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
+        """direction: 1 or -1, of the parameter. omega: rad/s, of a ramp; None for a sweep along the frequency."""
+        self.case = case
+        self.excitation_amplitude = excitation_amplitude
+        self.direction = direction
+        self.omega = omega
+        self.unworn = np.zeros(case.model.contact.n_contact)
+        self.solver = JacobianSolver()
+        self.effort = Effort()
+        self.here: PathPoint | None = None
+        self.coarse: PathPoint | None = None
+        self.checked: PathPoint | None = None
+        self.ahead: Step | None = None
+        self.length = 0.0
+        self.n_nodes = 0
+        self.saved: dict[str, Any] = {}
+        self.lost_at = float("nan")
+        self.branch = 0
+        self.fold = float("nan")
+        self.failure = Outcome.START_FAILED
+
+    def state_dict(self) -> dict[str, Any]:
+        """What goes on from node to node, to be packed."""
+        own = {"resolution": self.case.resolution, "iterations": self.effort.iterations}
+        return {name: getattr(self, name) for name in _STATE} | own
+
+    def load_state(self, saved: dict[str, Any]) -> None:
+        """Go on from what was `saved` of another walk of the same line: its nodes follow to the last bit."""
+        self.saved = saved
+        for name in _STATE:
+            setattr(self, name, saved[name])
+        self.case = self.case.at(saved["resolution"])
+        self.effort.iterations = saved["iterations"]
+        self.solver, self.ahead = JacobianSolver(), None
+
+    def joint_at(self, parameter: float) -> Joint:
+        """Joint at a value of the parameter."""
+        if self.omega is None:
+            return self.case.joint(parameter, self.excitation_amplitude)
+        return self.case.joint(self.omega, parameter * self.excitation_amplitude)
+
+    def balance_at(self, parameter: float, history: FloatArray) -> Balance:
+        """Unworn balance at a value of the parameter."""
+        return Balance(self.joint_at(parameter), history, self.unworn, np.zeros_like(self.unworn))
+
+    def begin(self, point: PathPoint) -> None:
+        """Take up the first state."""
+        self.here = self.coarse = point
+        self.n_nodes, self.length = 0, LONGEST * self._scale(point.parameter)
+        self._choose_harmonics()
+        self._save()
+
+    def _save(self) -> None:
+        """Keep the current node: the walk goes on from it as another one would that knows no more than this."""
+        self.here, self.coarse, self.checked = (_in_rows(point) for point in (self.here, self.coarse, self.checked))
+        self.solver = JacobianSolver()
+        self.saved = self.state_dict()
+
+    def walk_to(self, parameter: float) -> None:
+        """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
+        while self.here is not None:
+            if self.ahead is None:
+                self.effort.limit = self.effort.iterations + MOST_ITERATIONS
+                self.ahead = self._look_ahead()
+                if self.ahead is None:
+                    self.lost_at, self.here, self.coarse = self.here.parameter, None, None
+                    return
+            if (self.ahead.point.parameter - parameter) * self.direction >= 0.0:
+                return
+            self._advance(self.ahead)
+
+    def state_at(self, parameter: float, effort: Effort) -> tuple[Step | None, PathPoint | None]:
+        """State at a value of the parameter up to the next node, and that of the coarse walk; None where not found.
+
+        Behind a fold that the next step jumps over it is reached backwards from the next node, which has jumped.
+        """
+        if self.here is None or self.ahead is None:
+            return None, None
+        # nothing of this is to be seen in the walk
+        solver = JacobianSolver()
+        beyond = [at for at in self.ahead.folds if (parameter - at) * self.direction > 0.0]
+        reached = None
+        if beyond and parameter != self.ahead.point.parameter:
+            back = self._step(self.ahead.point, parameter, solver, effort)
+            reached = None if back is None or back.folds else Step(back.point, tuple(beyond))
+        reached = reached or self._step(self.here, parameter, solver, effort)
+        coarse = None if self.coarse is None or reached is None else self._step(self.coarse, parameter, solver, effort)
+        return reached, None if coarse is None else coarse.point
+
+    def _scale(self, parameter: float) -> float:
+        return abs(parameter) if self.omega is None else 1.0
+
+    def _look_ahead(self) -> Step | None:
+        """The next node: as far as the tangential history lets it be."""
+        here = self.here
+        assert here is not None
+        scale = self._scale(here.parameter)
+        most = float(np.clip(HISTORY * self.case.settings.rtol, SMALLEST_CHANGE, LARGEST_CHANGE))
+        while True:
+            length = min(self.length, LONGEST * scale)
+            target = here.parameter + self.direction * length
+            if self.omega is not None and target > 1.0:
+                target = 1.0
+            step = self._step(here, target, self.solver, self.effort)
+            shortest = length <= SHORTEST * scale
+            if step is not None:
+                change = self._history_change(here, step.point)
+                if change <= most or shortest or (step.folds and length <= JUMPING * scale):
+                    self.length = length * float(np.clip(0.9 * most / max(change, 1e-12), 0.3, 2.0))
+                    return step
+                shorter = 0.8 * most / change
+            elif shortest or self.effort.exhausted:
+                return None
+            else:
+                shorter = 0.25
+            self.length = max(length * float(np.clip(shorter, 0.1, 0.8)), 0.999 * SHORTEST * scale)
+
+    def _advance(self, step: Step) -> None:
+        """Make the next node the current one."""
+        self.here, self.ahead = step.point, None
+        self.branch += len(step.folds)
+        self.fold = step.folds[-1] if step.folds else self.fold
+        self.n_nodes += 1
+        if step.folds:
+            # behind a jump both walks begin anew: where the coarse one jumps says nothing of the steps
+            self.coarse = step.point
+            self.n_nodes = 0
+        elif self.n_nodes % 2 == 0 and self.coarse is not None:
+            coarse = self._step(self.coarse, step.point.parameter, self.solver, self.effort)
+            # one that is thrown off goes on from the other
+            self.coarse = step.point if coarse is None or coarse.folds else coarse.point
+        before, now = self.checked, step.point
+        assert before is not None
+        if max(
+            vibration_change(before.evaluation, now.evaluation), vibration_change(now.evaluation, before.evaluation)
+        ) > (RECHECK):
+            self._choose_harmonics()
+        if self.n_nodes % REFRESH == 0:
+            self._save()
+
+    def _history_change(self, before: PathPoint, after: PathPoint) -> float:
+        """Change of the tangential history, as a force, over the friction limits of the static state."""
+        stiffness = self.case.penalty.tangential[:, None]
+        change = np.linalg.norm((after.history - before.history) * stiffness)
+        limit = self.case.friction_coefficient * float(np.linalg.norm(after.evaluation.force_h[:, 0, 0]))
+        return float(change) / limit if limit > 0.0 else 0.0
+
+    def _choose_harmonics(self) -> None:
+        """Give the nodes the harmonics and samples that the current state needs, as far as they are automatic."""
+        assert self.here is not None
+        self.checked = self.here
+        if not self.case.settings.automatic:
+            return
+        joint = self.joint_at(self.here.parameter)
+        refined = refine(self.case, joint.omega, joint.excitation_amplitude, self.here, self.effort)
+        fewest = first_resolution(self.case.settings)
+        if refined.case.resolution.highest < fewest.highest:
+            # a joint that sticks needs one harmonic, but the next node may be the first one that slips
+            if self.case.resolution == fewest:
+                return
+            case = self.case.at(fewest)
+            level = move_point(
+                refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
+            )
+            refined = refined if level is None else replace(refined, case=case, point=level)
+        n_rel = joint.slots.size
+        if n_rel * (2 * len(refined.case.resolution.orders) + 1) > COSTLY:
+            refined = lighter(refined, joint.omega, joint.excitation_amplitude, LIGHT, self.effort) or refined
+        if refined.case is not self.case:
+            self._change_case(refined)
+        else:
+            self.here = replace(refined.point, parameter=self.here.parameter)
+        self.checked = self.here
+
+    def _change_case(self, refined: Refined) -> None:
+        assert self.here is not None
+        parameter, coarse, old = self.here.parameter, self.coarse, self.case
+        same = coarse is not None and np.array_equal(coarse.evaluation.predicted_h, self.here.evaluation.predicted_h)
+        self.here = replace(refined.point, parameter=parameter)
+        self.case, self.solver = refined.case, JacobianSolver()
+        if coarse is None or same:
+            self.coarse = self.here
+            return
+        moved = move_point(old, self.case, self.joint_at(coarse.parameter), coarse, self.effort)
+        self.coarse = moved or self.here
+        if moved is None:
+            self.n_nodes = 0
+
+    def _step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | None:
+        """Stable state at a target from a state of the same walk: naturally, through folds, or where it settles."""
+        tolerance = self.case.settings.tolerance
+        scale = self._scale(target)
+        folds: list[float] = []
+
+        def stays(point: PathPoint) -> bool:
+            balance = self.balance_at(point.parameter, point.evaluation.history)
+            return is_stable(balance.linearise(point.evaluation), solver)
+
+        for _ in range(MOST_LANDINGS):
+            if effort.exhausted:
+                break
+            point, arrived = follow_naturally(
+                self.balance_at, start, target, solver, tolerance, effort, fine=FINE * scale
+            )
+            if arrived and stays(point):
+                return Step(point, tuple(folds))
+            # natural steps may have led onto an unstable part, nobody knows where: then the walk begins before them
+            end = start if arrived else point
+            arc = follow_arc(self.balance_at, end, target, SPAN * scale, solver, tolerance, effort, stays)
+            if arc.point is not None:
+                return Step(arc.point, (*folds, *arc.jumps))
+            landed = self._settled(end, target, arc.folds, solver, effort)
+            if landed is None:
+                return None
+            folds.extend(landed.folds)
+            if landed.point.parameter == target:
+                return Step(landed.point, tuple(folds))
+            start = landed.point
+        return None
+
+    def _settled(
+        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
+    ) -> Step | None:
+        """State that the structure settles to from the end of a branch, a little beyond it on the way to the target."""
+        fine = FINE * self._scale(end.parameter)
+        beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
+        joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
+        self.failure, found = settle(self.case, joint, self.unworn, end.evaluation, before, end.history, solver, effort)
+        if found is None:
+            return None
+        landed = PathPoint(beyond, found.evaluation, found.history)
+        if vibration_change(end.evaluation, found.evaluation) <= JUMP:
+            return Step(landed)
+        # an arc that broke off behind the fold has found it all the same
+        return Step(landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * self.direction),))
+
+
+def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, effort: Effort) -> PathPoint | None:
+    """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
+    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders)
+    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
+    if not result.converged:
+        return None
+    return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
+
+
+def _in_rows(point: PathPoint | None) -> PathPoint | None:
+    """The same point with arrays that lie in memory as they do when they were kept: sums over them are the same."""
+    if point is None:
+        return None
+    values: dict[str, Any] = {entry.name: getattr(point.evaluation, entry.name) for entry in fields(point.evaluation)}
+    lain: dict[str, Any] = {
+        name: np.array(value, order="C") for name, value in values.items() if isinstance(value, np.ndarray)
+    }
+    return replace(point, evaluation=replace(point.evaluation, **lain), history=np.array(point.history, order="C"))
