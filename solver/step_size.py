@@ -57,5 +57,5 @@ def check_step(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: 
         advised = length * USEFUL / share
         raise StepTooLongError(
             f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {share:.2g} times the normal"
-            f" forces of the joint: use steps of at most {advised:.2g} cycles, or the adaptive scheme"
+            f" forces of the joint: use steps of at most {advised:.2g} cycles"
         )

@@ -196,10 +196,9 @@ class Trajectory:
 
     def jump(self, length: float) -> bool:
         """The branch has ended at the current count, in a step of the given length: land on another stable state a
-        little beyond; False where there is none.
+        little beyond; False where there is none. Raises StepTooLongError.
         """
-        self.jumps += 1
-        if self.jumps > MOST_JUMPS:
+        if self.jumps >= MOST_JUMPS:
             return False
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
@@ -224,8 +223,10 @@ class Trajectory:
             )
             if not arrived or not self.is_stable(point.evaluation):
                 continue
-            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED and np.isnan(self.jump_cycle):
-                self.jump_cycle = self.cycle
+            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED:
+                # corners at which the branch folds back a little are no jumps, and there may be many of them
+                self.jumps += 1
+                self.jump_cycle = self.cycle if np.isnan(self.jump_cycle) else self.jump_cycle
             self.point = PathPoint(
                 0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation)
             )
