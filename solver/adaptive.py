@@ -31,7 +31,7 @@ from solver.model import FloatArray
 from solver.path import CALM, PathPoint, final_history, solve_balance, vibration_change
 from solver.trajectory import RESOLUTION, Trajectory
 
-SHARE = 0.5  # of rtol; an error is judged by what the step has worn, or would have worn at the mean rate so far
+SHARE = 0.2  # of rtol, for the step; an error is judged by what it has worn, or would have worn at the mean rate so far
 LONGEST_RATIO = 2.0  # of two steps
 SHORTEST_RATIO = 0.2
 SAFETY = 0.85
@@ -40,6 +40,7 @@ FIRST = 0.05  # of the explicit step limit: the first step, before anything is k
 FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears where there is no limit
 ITERATIONS = 10  # of a step: one that takes more is halved
 SHORTEST = 1e-4  # of the first step
+ZERO_STABLE = 2.4  # ratio of two steps below 1 + sqrt(2)
 
 _CARRIED = ("error", "_length", "_shortest", "_before")
 
@@ -97,6 +98,16 @@ class AdaptiveSteps:
                 self._before, self._length = (length, depth), length
                 return arrived, length
             self._length = max(shorter * length, 0.999 * shortest)
+
+    def follow(self, length: float) -> bool:
+        """One step of a given length, however wrong it is; False where none is found."""
+        if self._before is not None and length > ZERO_STABLE * self._before[0]:
+            self._before = None
+        tried = self._attempt(length)
+        if tried is None:
+            return False
+        self._accept(tried[1], length)
+        return True
 
     def carried(self) -> dict[str, Any]:
         """What goes on from step to step, to be packed."""

@@ -59,19 +59,18 @@ def follow_branch(
     state, and at last the state is sought from nothing.
     excitation_amplitude in N.
     keep: called now and then, after the state was taken from the iterator, with the progress of the sweep. resume: such
-        progress of a sweep with the same arguments (frequencies beyond those passed may differ), from which this one
-        goes on: the remaining states are the same to the last bit, but for `run_time`.
+        progress of a sweep that differs in its frequencies only. Frequencies beyond those that it had passed are
+        reached from there; the states are the same to the last bit, but for `run_time`.
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     line = _Line(model, friction_coefficient, excitation_amplitude, sweep, settings)
-    n_done, counted = 0, 0
+    counted = 0
     if resume is not None:
-        n_done, counted, carried = unpack(resume)
+        counted, carried = unpack(resume)
         line.load_state(carried)
     kept = counted
     started = computing_time()
-    for place in range(n_done, order.size):
-        index = order[place]
+    for index in order:
         line.set_deadline(started + settings.time_limit)
         message = ""
         try:
@@ -101,7 +100,7 @@ def follow_branch(
         )
         started, counted = now, line.n_iterations
         if keep is not None and counted >= kept + KEEP and line.walk is not None:
-            keep(pack((place + 1, counted, line.state_dict())))
+            keep(pack((counted, line.state_dict())))
             kept = counted
 
 
@@ -181,7 +180,8 @@ class _Line:
     def advance(self, frequency: float) -> _Found:
         """State at the next frequency, Hz, with the harmonics that it needs."""
         origin, omega = find_origin(self.model, frequency, self.sweep), 2.0 * np.pi * frequency
-        if self.walk is None or self.sweep == "ramp" or origin.cell != (self.origin.cell if self.origin else None):
+        other_cell = self.origin is None or origin.cell != self.origin.cell
+        if self.walk is None or self.sweep == "ramp" or other_cell or self.walk.has_passed(omega):
             self.origin = origin
             self.effort.iterations += 0 if self.walk is None else self.walk.effort.iterations
             self.walk = self._new_walk(origin, omega if self.sweep == "ramp" else None)

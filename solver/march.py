@@ -10,17 +10,18 @@ import numpy as np
 
 from solver.adaptive import AdaptiveSteps
 from solver.clock import computing_time
+from solver.companion import Companion
 from solver.history import StartState, WearHistory
 from solver.joint import build_case
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packed import Packed
 from solver.packing import pack, unpack
 from solver.path import OutOfTimeError
 from solver.record import Recorder
-from solver.settings import SolverSettings
+from solver.settings import Scheme, SolverSettings
 from solver.step_size import StepTooLongError
-from solver.trajectory import Scheme, Trajectory
+from solver.trajectory import Trajectory
 
 MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
 STEP_ITERATIONS = 10
@@ -52,23 +53,27 @@ def march_wear(
         from which this one goes on: its history is the same to the last bit, but for `run_time`.
     """
     started = computing_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme == "adaptive", len(loops))
+    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops))
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = Trajectory(case, start, wear_coefficient, scheme, loops)
+    companion = Companion(march, start, cycles)
     spent_before, message = 0.0, ""
     march.effort.deadline = started + settings.time_limit
     try:
         outcome, n_steps, end = Outcome.CONVERGED, 0, float(cycles[-1])
         if resume is None:
             outcome = march.begin()
-            recorder.add(0.0, march.report(), wear_coefficient)
+            if outcome is Outcome.CONVERGED:
+                companion.begin()
+                recorder.add(0.0, march.report(), wear_coefficient)
         else:
             n_steps, spent_before, *carried = unpack(resume)
             march.take_up(carried[0])
             recorder.take_up(carried[1])
+            companion.take_up(carried[3])
             march.effort.deadline -= spent_before
         steps: AdaptiveSteps | FixedSteps = (
             AdaptiveSteps(march, settings.rtol) if scheme == "adaptive" else FixedSteps(march, end, step, largest_depth)
@@ -90,17 +95,21 @@ def march_wear(
                 # what was reached of the step is a state, too
                 if march.cycle > before:
                     outcome = march.check()
-                    recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
+                    if outcome is Outcome.CONVERGED:
+                        recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
                 if outcome is Outcome.CONVERGED and not march.jump(length):
                     outcome = march.failure
                 if outcome is not Outcome.CONVERGED:
                     break
                 steps.restart()
             outcome = march.check()
+            if outcome is not Outcome.CONVERGED:
+                break
+            companion.follow(at_once=march.cycle >= end)
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
-            if outcome is Outcome.CONVERGED and march.effort.iterations >= refreshed + REFRESH:
+            if march.effort.iterations >= refreshed + REFRESH:
                 spent = spent_before + computing_time() - started
-                parts = (march, recorder, steps)
+                parts = (march, recorder, steps, companion)
                 progress = pack([n_steps, spent, *(part.carried() for part in parts)])
                 # with or without anybody who keeps it, so that all marches take the same way
                 for part, carried in zip(parts, unpack(progress)[2:], strict=True):
@@ -122,9 +131,12 @@ def march_wear(
     spent = spent_before + computing_time() - started
     # adaptive steps go beyond the end
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
-    history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent)
+    history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent, companion.kept)
+    if outcome is Outcome.CONVERGED:
+        outcome, message = _judge(march, history, companion)
     return replace(
         history,
+        outcome=outcome,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         message=message,
@@ -132,6 +144,24 @@ def march_wear(
         # what alternates with the other schemes are small corners of the wear rate, not the steps
         oscillates=scheme == "explicit" and march.oscillates(),
     )
+
+
+def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tuple[Outcome, str]:
+    """Outcome of a history that has come to its end, and what it does not say by itself."""
+    if history.error_estimate > SENSITIVE_ERROR:
+        area = march.joint.contact.area
+        volume, other = (1e9 * float(depth @ area) for depth in (history.wear_depth[-1], companion.kept[-1]))
+        return Outcome.SENSITIVE, (
+            f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 with steps twice as long from the start state of a "
+            f"coarser sweep: known to {100.0 * history.error_estimate:.2g} % only"
+        )
+    if march.inaccurate_from < float("inf"):
+        what = "wear rate" if march.worst.wear_rate >= march.worst.response else "response"
+        return Outcome.INACCURATE, (
+            f"from cycle {march.inaccurate_from:,.0f} on the {what} is known to "
+            f"{100.0 * march.worst.largest:.2g} % only".replace(",", " ")
+        )
+    return Outcome.CONVERGED, ""
 
 
 @dataclass

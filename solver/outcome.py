@@ -6,6 +6,9 @@ import traceback
 from enum import IntEnum
 from pathlib import Path
 
+SENSITIVE_ERROR = 0.5
+"""Relative error of the last worn volume from which on one number says too little."""
+
 
 class Outcome(IntEnum):
     """End of a computation; the number is stored in result files, so numbers are never used again for others."""

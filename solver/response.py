@@ -174,10 +174,14 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 
 @dataclass(frozen=True)
 class StateReport:
-    """What is reported of a state; units and shapes as in `solver.history.WearHistory`, without the cycle dimension."""
+    """What is reported of a state; units and shapes as in `solver.history.WearHistory`, without the cycle dimension.
+
+    slip_work (n_contact,): N m, and what it is wrong by for want of harmonics.
+    """
 
     wear_depth: FloatArray
     slip_work: FloatArray
+    slip_work_error: FloatArray
     mean_pressure: FloatArray
     slip_range: FloatArray
     open_fraction: FloatArray
@@ -190,7 +194,11 @@ class StateReport:
 
 
 def report_state(
-    joint: Joint, evaluation: Evaluation, certificate: Certificate, loops: tuple[int, ...] = ()
+    joint: Joint,
+    evaluation: Evaluation,
+    certificate: Certificate,
+    slip_work_error: FloatArray,
+    loops: tuple[int, ...] = (),
 ) -> StateReport:
     """Pressures, slip and responses of a converged state. loops: pairs whose fretting loops are reported, too."""
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
@@ -199,6 +207,7 @@ def report_state(
     return StateReport(
         wear_depth=evaluation.wear_depth,
         slip_work=evaluation.slip_work,
+        slip_work_error=slip_work_error,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
         slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Automatic = Literal["auto"]
+Scheme = Literal["explicit", "implicit", "adaptive"]
+"""Of the steps on the slow time scale."""
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,11 @@ class Sweep:
         self.solver = JacobianSolver()
         self.saved = self.state_dict()
 
+    def has_passed(self, parameter: float) -> bool:
+        """Whether a value of the parameter lies before the current node, or before where the walk was lost."""
+        last = self.lost_at if self.here is None else self.here.parameter
+        return (parameter - last) * self.direction < 0.0
+
     def walk_to(self, parameter: float) -> None:
         """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
         while self.here is not None:

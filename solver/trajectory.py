@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from solver.adapt import refine
 from solver.balance import Balance, Evaluation
-from solver.certificate import certify
+from solver.certificate import Certificate, certify
 from solver.doubling import doubles_period
-from solver.estimate import Estimate
+from solver.estimate import NOTHING, Estimate
 from solver.explicit_limit import explicit_step_limit
 from solver.history import StartState
 from solver.joint import Case, Joint
 from solver.jump import landings
+from solver.ladder import on_ladder
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.oscillation import WearRates
@@ -31,10 +32,10 @@ from solver.path import (
     vibration_change,
 )
 from solver.response import StateReport, report_state
+from solver.settings import Scheme
 from solver.stability import is_stable
 from solver.step_size import check_step
-
-Scheme = Literal["explicit", "implicit", "adaptive"]
+from solver.sweep import move_point
 
 RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
@@ -42,11 +43,13 @@ JUMPED = 0.05  # relative change of the vibration beyond the end of a branch fro
 MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
 ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
+NO_WEAR = 1e-12  # of the same: such a joint sticks
+COSTLY = 2500  # unknowns from which pairs are compared with fewer harmonics rather than with more
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 _CARRIED = (
     *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
-    *("estimate", "estimated_for", "certificate", "point"),
+    *("estimate", "estimated_for", "accurate", "slip_work_error", "inaccurate_from", "worst", "certificate", "point"),
 )
 
 
@@ -78,6 +81,12 @@ class Trajectory:
         self.rates = WearRates(self.case.model.contact.n_contact + 1)
         self.largest_rate = 0.0
         self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
+        self.slip_work_error = np.zeros_like(self.still)
+        self.certificate: Certificate | None = None
+        self.accurate = self.start.outcome is Outcome.CONVERGED
+        # the first count at which it was not, and the largest errors from there on
+        self.inaccurate_from = float("inf")
+        self.worst = NOTHING
 
     def carried(self) -> dict[str, Any]:
         """What goes on from step to step, to be packed; a factorisation that is kept for the next step is not in it."""
@@ -96,6 +105,12 @@ class Trajectory:
         self.solver = JacobianSolver()
 
     def begin(self) -> Outcome:
+        """Take up the unworn state, and whether it may be reported."""
+        self.take_start()
+        self._compare_pairs()
+        return self.check()
+
+    def take_start(self) -> None:
         """Take up the unworn state: it is evaluated, not solved again."""
         state = self.start.state
         assert state is not None
@@ -105,10 +120,9 @@ class Trajectory:
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
         self._note()
         self.estimated_for = evaluation.predicted_h
-        return self.check()
 
     def check(self) -> Outcome:
-        """Whether the current state may be reported: errors below rtol and a certificate that holds."""
+        """Whether the current state may be reported: a certificate that holds. `accurate`: with errors below rtol."""
         now = self.point.evaluation.predicted_h[:, 1:]
         changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
         accurate, anew = True, False
@@ -117,10 +131,13 @@ class Trajectory:
         holds = self._certify()
         if not holds and accurate and self.case.settings.automatic:
             # more harmonics or samples may be all that it needs
-            accurate = self._refine()
+            accurate, anew = self._refine(), True
             holds = self._certify()
-        if not accurate:
-            return Outcome.INACCURATE
+        self.accurate = self.accurate if not anew else accurate
+        if not self.accurate:
+            self.inaccurate_from = min(self.inaccurate_from, self.cycle)
+            if self.estimate.largest >= self.worst.largest:
+                self.worst = self.estimate
         if not holds:
             return Outcome.CERTIFICATE_FAILED
         return self._doubling() if anew else Outcome.CONVERGED
@@ -135,26 +152,45 @@ class Trajectory:
         return self.certificate.holds(self.case.settings.tolerance)
 
     def _refine(self) -> bool:
-        """Estimate the errors of the current state; False where they cannot be kept below rtol."""
+        """Estimate the errors of the current state; False where they cannot be brought below rtol."""
         refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
         self.estimate, self.point = refined.estimate, refined.point
         if refined.case is not self.case:
             self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None
             self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
         self.estimated_for = self.point.evaluation.predicted_h
+        self._compare_pairs()
         return refined.accurate
 
+    def _compare_pairs(self) -> None:
+        """What the slip work of each pair is wrong by: its change with more harmonics, or fewer where they are many.
+
+        The pairs at the edge of the slip zone are wrong by far more than all of them together.
+        """
+        evaluation = self.point.evaluation
+        self.slip_work_error = np.zeros_like(self.still)
+        costly = evaluation.predicted_h.size > COSTLY
+        wanted = on_ladder(self.case.resolution, -1 if costly else 2)
+        if not self.wears() or wanted == self.case.resolution or not self.case.model.holds(wanted.highest):
+            return
+        finer = self.case.at(wanted)
+        joint = finer.joint(self.joint.omega, self.joint.excitation_amplitude)
+        moved = move_point(self.case, finer, joint, self.point, self.effort)
+        if moved is not None:
+            self.slip_work_error = np.abs(moved.evaluation.slip_work - evaluation.slip_work)
+
     def report(self) -> StateReport:
-        """What is reported of the current state."""
-        return report_state(self.joint, self.point.evaluation, self.certificate, self.loops)
+        """What is reported of the current state, which has been checked."""
+        assert self.certificate is not None
+        return report_state(self.joint, self.point.evaluation, self.certificate, self.slip_work_error, self.loops)
 
     def rate(self) -> FloatArray:
         """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21)."""
         return self.wear_coefficient / self.joint.contact.area * self.point.evaluation.slip_work
 
     def wears(self) -> bool:
-        """Whether anything wears at all."""
-        return bool(self.rate().max(initial=0.0) > 0.0)
+        """Whether anything wears at all, more than round-off of the slip that the static load has caused."""
+        return bool(self.rate() @ self.joint.contact.area > NO_WEAR * self.largest_rate)
 
     def planned_step(self, step: float, largest_depth: float | None) -> float:
         """Step h in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""

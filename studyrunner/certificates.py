@@ -1,4 +1,4 @@
-"""How right the results of a run are: the worst certificate values, and the folds and jumps on the way, as a table."""
+"""How right the results of a run are: worn volumes, outcomes, worst certificates, folds and jumps, as a table."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import CONVERGED
+from studyrunner.evaluate import COMPLETE
+from studyrunner.outcome_table import OutcomeTable
 from studyrunner.progress import count
+from studyrunner.scene import SceneFacts
 from studyrunner.sharing import Index
+from studyrunner.small_wear import SmallWear
 from studyrunner.study import Study
 from studyrunner.variables import CERTIFICATE, COORDINATES
+from studyrunner.worn_volumes import WornVolumes
 
 _NOT_OF_A_SWEEP = ("wear_coefficient", "step", "scheme")
 _FOLDS_NAMED = 5
@@ -45,9 +49,12 @@ class CertificateTable:
     It keeps the worst of each kind and counts: little, however many points there are.
     """
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: Study, facts: SceneFacts) -> None:
         self._study = study
-        self._n_converged = 0
+        self._volumes = WornVolumes(study)
+        self._small = SmallWear(study, facts)
+        self._outcomes = OutcomeTable(study)
+        self._n_complete = 0
         self._n_histories = 0
         self._worst: dict[str, tuple[float, _Place]] = {}
         self._folds: set[tuple[Index, float]] = set()
@@ -57,12 +64,14 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        converged = records["outcome"] == CONVERGED
+        for collected in (self._volumes, self._small, self._outcomes):
+            collected.add(points, records)
+        complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
-        self._n_histories += int(np.count_nonzero(converged))
-        self._n_converged += sum(len(points[row]) for row in _rows(converged))
+        self._n_histories += int(np.count_nonzero(complete))
+        self._n_complete += sum(len(points[row]) for row in _rows(complete))
         for name in CERTIFICATE:
-            self._add_worst(name, first, records[name], converged)
+            self._add_worst(name, first, records[name], complete)
         self._add_folds(points, records["fold_frequency"])
         for row in _rows(~np.isnan(records["jump_cycle"])):
             jump = (float(records["jump_cycle"][row]), first[row])
@@ -70,13 +79,16 @@ class CertificateTable:
             self._n_jumps += len(points[row])
         self._add_too_long(points, records["step_limit"])
         self._note("oscillating", points, records["oscillates"] != 0)
-        self._note("unstable", points, converged & ~np.all(records["stable"] != 0, axis=1))
+        self._note("unstable", points, complete & ~np.all(records["stable"] != 0, axis=1))
 
     def format(self) -> str:
-        """Table in lines: the largest value of each certificate over all converged points, with its place, then how
-        many folds, jumps, too long steps, oscillating wear rates and unstable states there are.
+        """Table in lines: how well the worn volume is known, whether wear is small, outcomes where loads and wear vary;
+        the largest value of each certificate over all points computed to the end, with its place, then how many folds,
+        jumps, too long steps, oscillating wear rates and unstable states there are.
         """
-        rows = [("worst certificate of", f"{count(self._n_converged, 'point')} computed to tolerance")]
+        rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
+        rows.extend(self._outcomes.rows())
+        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the last cycle"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())
         rows.append(("folds in the sweeps", self._format_folds()))
         rows.append(("jumps while wearing", self._format_jumps()))
@@ -88,11 +100,11 @@ class CertificateTable:
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
 
     def _add_worst(
-        self, name: str, first: Sequence[Index], values: NDArray[np.float64], converged: NDArray[np.bool_]
+        self, name: str, first: Sequence[Index], values: NDArray[np.float64], complete: NDArray[np.bool_]
     ) -> None:
         """Largest value (n, n_cycles) and its place; the first in the order of the file where several are equal."""
         # None is negative: NaN, which is not estimated, counts below all.
-        known = np.where(np.isnan(values) | ~converged[:, None], -1.0, values)
+        known = np.where(np.isnan(values) | ~complete[:, None], -1.0, values)
         cycles = known.argmax(axis=1)
         largest = known.max(axis=1)
         value = float(largest.max(initial=-1.0))

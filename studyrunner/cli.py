@@ -52,7 +52,7 @@ examples:
   run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
 
 exit status:
-  0  all points were computed to tolerance
+  0  all points were computed, each with its error; the last lines say how many are within rtol
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
   3  finished and saved, but some points failed; their `outcome` says why
@@ -290,12 +290,12 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
         raise KeyboardInterrupt(
             f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
         ) from None
-    failed = summary.n_points - summary.n_converged
+    failed = summary.n_points - summary.n_complete
     _say(
-        f"{path}: {summary.n_points} points, {summary.n_converged} computed to tolerance, {failed} failed,"
+        f"{path}: {summary.n_points} points, {summary.n_complete} computed, {failed} failed,"
         f" {format_seconds(progress.seconds)}",
-        *(f"  {line}" for line in summary.failures),
         summary.certificates,
+        *summary.findings,
     )
     return SOME_FAILED if failed else CONVERGED
 

@@ -194,6 +194,12 @@ class Dispatcher(Generic[Task]):
         """A task that is computed."""
         return self._held[number].task
 
+    def running(self) -> list[tuple[Task, int, float]]:
+        """What is computed at the moment, longest first: the task, results still to come, seconds since the last."""
+        now = self._clock()
+        busy = [(held.task, held.n_left, now - held.began) for held in self._held.values() if held.began is not None]
+        return sorted(busy, key=lambda entry: -entry[2])
+
     def watch(self) -> None:
         """Called many times a second: now and then learns from tasks that take longer than expected.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
-from solver.outcome import Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packed import Packed
 from solver.settings import Resolution, SolverSettings
+from studyrunner.places import describe_reach, known_to, show_count
 from studyrunner.records import failed_result
 from studyrunner.results import Kept, MarchResult, StartResult
+from studyrunner.study import AUTO
 from studyrunner.tasks import BranchTask, MarchTask, Settings
 
 
@@ -30,6 +32,10 @@ class Ending:
 
 
 CONVERGED, CRASHED, NOT_COMPUTED = int(Outcome.CONVERGED), int(Outcome.CRASHED), int(Outcome.NOT_COMPUTED)
+INACCURATE, SENSITIVE = int(Outcome.INACCURATE), int(Outcome.SENSITIVE)
+
+COMPLETE = frozenset(int(outcome) for outcome in Outcome if outcome.complete)
+"""Outcomes of points that were computed to their last cycle."""
 
 Keep = Callable[[Kept], None]
 """Takes note of how far a task is."""
@@ -62,28 +68,24 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
     from solver.continuation import follow_branch
     from solver.packing import pack
 
+    wanted = sorted(task.order_left)
     branch = follow_branch(
         model,
         friction_coefficient,
         task.excitation_amplitude,
-        np.array(task.frequencies),
-        cast("Literal['up', 'down']", task.sweep),
+        # no state depends on those that are known
+        np.array([task.frequencies[position] for position in wanted]),
+        cast("Literal['up', 'down', 'ramp']", task.sweep),
         _solver_settings(task.settings),
         keep=lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
-    n_left = task.n_results
-    for position, start in branch:
-        if position in task.known:
-            continue
+    for place, start in branch:
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
         packed = pack(start)
-        yield StartResult(position, Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
-        n_left -= 1
-        if n_left == 0:
-            return
+        yield StartResult(wanted[place], Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
 
 
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
@@ -96,7 +98,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
             yield failed_result(task, place, int(Outcome.EXCEPTION), message)
         return
     nan = math.nan
-    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    start = StartState(Outcome.EXCEPTION, None, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
     packed = pack(start)
     for position in [place for place in task.order if place not in task.known][n_given:]:
         yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)
@@ -105,14 +107,13 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
     """The histories of a task, one for each of its shares.
 
-    One march gives all of them. Where it fails, or its wear rate oscillates, that may have been after the end of
+    One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
     another history, which then takes a march of its own.
     """
     history = _solve(model, friction_coefficient, task, keep)
     yield build_result(task, history)
-    tells_all = history.outcome is Outcome.CONVERGED and not history.oscillates
     for place, share in enumerate(task.shares[1:], start=1):
-        if tells_all:
+        if not history.oscillates:
             yield build_result(task, history, place)
         else:
             alone = replace(task, shares=(share,), resume=None)
@@ -148,38 +149,113 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
 def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:
     """What the result file holds of one share of a march: the output counts and variables that the task asks for.
 
-    What is per cycle is per cycle of the share. A share that ends before the march knows nothing of later jumps and
-    errors. Effort is that of the march.
+    What is per cycle is per cycle of the share. A share knows nothing of what came after its last count: jumps, errors,
+    the end of the march. What was computed of a history that ends early is kept. Effort is that of the march.
     """
     share, own = task.shares[place], task.shares[0]
     slower = share.wear_coefficient / own.wear_coefficient if place else 1.0
     counts = np.array(task.counts(share))
     rows = np.searchsorted(history.cycles, counts)
-    failed = history.outcome is not Outcome.CONVERGED
-    values = {name: _variable(history, name, slower, failed)[rows] for name in task.variables}
-    jump, error = history.jump_cycle, history.error_estimate
+    reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
+    known = rows[reached]
+    values = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
+    jump = history.jump_cycle
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
-        error = float(history.worn_volume_error[rows[-1]])
+    outcome = share_outcome(task, history, known, place, whole=bool(reached.all()))
+    last = task.cycles[-1]
+    if not reached.all():
+        last = min(history.last_cycle / slower, last)
+    elif not outcome.complete and not task.held:
+        last = min(history.last_cycle, last)
+    errors, depths = history.worn_volume_error[known], history.wear_depth[known]
     return MarchResult(
         points=share.points,
-        outcome=int(history.outcome),
+        outcome=int(outcome),
         values=values,
         jump_cycle=jump,
-        error_estimate=error,
+        error_estimate=float(errors[-1]) if known.size else math.nan,
         newton_iterations=history.newton_iterations,
         run_time=history.run_time,
         branch=history.branch,
         fold_frequency=history.fold_frequency,
         step_limit=history.step_limit / slower,
         oscillates=history.oscillates,
-        message=history.message,
+        last_cycle=last,
+        largest_wear_depth=float(depths.max(initial=0.0)) if known.size else math.nan,
+        message=_message(task, history, outcome, place, slower, known, last),
         share=place,
     )
 
 
-def _variable(history: WearHistory, name: str, slower: float, failed: bool) -> NDArray[np.generic]:
-    """A variable of the result, its first dimension the output counts of the history; empty of all where it failed.
+def share_outcome(
+    task: MarchTask, history: WearHistory, known: NDArray[np.intp], place: int, *, whole: bool
+) -> Outcome:
+    """How one share of a march ended, judged by its own rows.
+
+    known: rows of the history at the counts of the share that were reached. whole: whether these are all. The march
+    itself, which is the first share, ended as the history says; so did those that were not reached to their end.
+    """
+    ended = history.outcome
+    if place == 0 or not whole:
+        return ended
+    if history.worn_volume_error[known[-1]] > SENSITIVE_ERROR:
+        return Outcome.SENSITIVE
+    settings = task.settings
+    # given numbers of both aim at nothing, and a march that kept below rtol did so up to every count
+    judged = ended is Outcome.INACCURATE or (not ended.complete and AUTO in (settings.harmonics, settings.samples))
+    errors = _state_errors(history, known)
+    if judged and bool((errors > settings.rtol).any()):
+        return Outcome.INACCURATE
+    return Outcome.CONVERGED
+
+
+def _state_errors(history: WearHistory, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """The larger of the estimated errors of response and wear rate; those that are not estimated count as 0."""
+    response, rate = (np.nan_to_num(one[rows], posinf=np.inf) for one in _estimated(history))
+    return np.asarray(np.maximum(response, rate))
+
+
+def _estimated(history: WearHistory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimated errors of response and wear rate."""
+    return history.response_error, history.wear_rate_error
+
+
+def _message(
+    task: MarchTask,
+    history: WearHistory,
+    outcome: Outcome,
+    place: int,
+    slower: float,
+    known: NDArray[np.intp],
+    last: float,
+) -> str:
+    """What the outcome of a share does not say by itself.
+
+    What the solver says counts the cycles of the march: it holds for the first share, and an error for all.
+    """
+    said = history.message if place == 0 or outcome is Outcome.EXCEPTION else ""
+    if said or outcome is Outcome.CONVERGED or not known.size:
+        return said
+    worn = float(history.worn_volume_error[known[-1]])
+    if not outcome.complete:
+        return describe_reach(last, task.cycles[-1], worn)
+    if outcome is Outcome.SENSITIVE:
+        return f"the worn volume {known_to(worn)}"
+    above = np.flatnonzero(_state_errors(history, known) > task.settings.rtol)
+    if not above.size:
+        return ""
+    behind = known[above[0] :]
+    response, rate = (float(np.nan_to_num(one[behind], posinf=np.inf).max()) for one in _estimated(history))
+    cycle = float(history.cycles[behind[0]]) / slower
+    begin = f"from cycle {show_count(cycle)} on " if cycle > 0.0 else ""
+    return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
+
+
+def _variable(
+    history: WearHistory, name: str, slower: float, rows: NDArray[np.intp], reached: NDArray[np.bool_]
+) -> NDArray[np.generic]:
+    """A variable of the result at rows of the history; NaN, or 0 where it is a whole number, where not reached.
 
     slower: wear coefficient over that of the history.
     """
@@ -192,9 +268,9 @@ def _variable(history: WearHistory, name: str, slower: float, failed: bool) -> N
         values = slower * history.wear_rate
     else:
         values = getattr(history, name)
-    if failed:
-        return np.full_like(values, np.nan if values.dtype.kind == "f" else 0)
-    return values
+    found = values[np.minimum(rows, len(values) - 1)]
+    found[~reached] = np.nan if values.dtype.kind == "f" else 0
+    return found
 
 
 def _moves(start: StartState) -> bool:
@@ -213,9 +289,3 @@ def _solver_settings(settings: Settings) -> SolverSettings:
 
 def _packed(kept: Kept | None) -> Packed | None:
     return None if kept is None else Packed(kept.text, kept.arrays)
-
-
-def describe_failures(outcomes: Mapping[int, int]) -> tuple[str, ...]:
-    """One line for each way in which points failed: how many of them, and the sentence. outcomes: points by number."""
-    counts = {ending: outcomes.get(ending.number, 0) for ending in endings() if ending.number != CONVERGED}
-    return tuple(f"{count} x {ending.meaning}: {ending.sentence}" for ending, count in counts.items() if count)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from studyrunner.certificates import CertificateTable
 from studyrunner.evaluate import NOT_COMPUTED, endings
+from studyrunner.findings import Findings
 from studyrunner.ledger import Ledger
 from studyrunner.output import partial_path
 from studyrunner.provenance import describe_run
@@ -40,10 +41,15 @@ Region = tuple[int | slice, ...]
 
 @dataclass(frozen=True)
 class Gathered:
-    """What the end of a run tells. outcomes: points by number of their outcome. certificates: the table."""
+    """What the end of a run tells.
+
+    outcomes: points by number of their outcome. certificates: the table. findings: lines that name the points that
+    failed or are less exact than was asked for.
+    """
 
     outcomes: Mapping[int, int]
     certificates: str
+    findings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ def gather(
     of_scene: what no task computes. scene: what goes into the group of the scene, None for none. Points that are not
     computed yet say so in their outcome. Raises StorageError.
     """
-    index, gathered = _read_through(study, ledger)
+    index, gathered = _read_through(study, facts, ledger)
     temporary = partial_path(path)
     try:
         with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
@@ -89,7 +95,7 @@ def gather(
     return gathered
 
 
-def _read_through(study: Study, ledger: Ledger) -> tuple[_Index, Gathered]:
+def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Index, Gathered]:
     """Reads every file once: where each point is, how it ended, and the table."""
     shape = tuple(len(values) for values in study.dimensions.values())
     index = _Index(np.full(math.prod(shape), -1, dtype=np.int32), np.zeros(math.prod(shape), dtype=np.int32))
@@ -101,15 +107,16 @@ def _read_through(study: Study, ledger: Ledger) -> tuple[_Index, Gathered]:
                 found.setdefault(number, []).append((row, share.points))
                 at = [int(np.ravel_multi_index(point, shape)) for point in share.points]
                 index.file[at], index.row[at] = number, row
-    table = CertificateTable(study)
+    table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
     for number, entries in found.items():
         records = ledger.store.read(number)[[row for row, _ in entries]]
         for outcome, (_, points) in zip(records["outcome"].tolist(), entries, strict=True):
             outcomes[outcome] += len(points)
-        table.add([points for _, points in entries], records)
+        for collected in (table, findings):
+            collected.add([points for _, points in entries], records)
     outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
-    return index, Gathered(outcomes, table.format())
+    return index, Gathered(outcomes, table.format(), findings.format(outcomes))
 
 
 def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store: Store, index: _Index) -> None:
@@ -262,7 +269,7 @@ def _attributes(name: str, entry: Variable) -> dict[str, object]:
         found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
         found["sentences"] = "\n".join(flag.sentence for flag in endings())
     if name in ASKED and not entry.dtype.startswith("float"):
-        found["comment"] = " ".join(filter(None, (entry.comment, "0 where the point failed, see outcome.")))
+        found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
     return found
 
 

@@ -1,7 +1,8 @@
 """What a finished task is known by: a hash of all that its result depends on, the solver included.
 
-A study that is changed keeps the results whose hash is still asked for. A start state depends on the frequencies that
-its sweep has passed, as its branch is followed through them; a march on its start state.
+A study that is changed keeps the results whose hash is still asked for. A start state depends on its own frequency and
+on how it is reached, not on the other frequencies of the study: a sweep has steps of its own; a march depends on its
+start state.
 """
 
 from __future__ import annotations
@@ -42,13 +43,8 @@ class Identities:
             # a time limit decides whether there is a result, not which
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
             line = (branch.excitation_amplitude, branch.sweep, settings)
-            # the penalty is that of the highest frequency
-            key = _digest("line", self._scene, line, max(branch.frequencies))
-            found = [""] * len(branch.frequencies)
-            for place in branch.order:
-                key = _digest(key, branch.frequencies[place])
-                found[place] = key
-            self._lines[branch.number] = tuple(found)
+            key = _digest("line", self._scene, line)
+            self._lines[branch.number] = tuple(_digest("start", key, frequency) for frequency in branch.frequencies)
         return self._lines[branch.number]
 
     def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:

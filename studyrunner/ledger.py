@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
+
+import numpy as np
 
 from studyrunner.identity import Identities
 from studyrunner.records import failed_result, pack
@@ -105,21 +108,22 @@ class Ledger:
             raise TypeError(f"{progress!r} is no progress of {task}")
         self.store.keep_progress(self.key(task), progress)
 
-    def forget_failed(self) -> None:
-        """Points that failed are to be computed again, and what comes behind them on their branch."""
-        failed = self.store.select(lambda records: records["outcome"] != 0)
+    def forget_failed(self, complete: Collection[int]) -> None:
+        """Points that failed are to be computed again. complete: outcomes of those that did not."""
+        failed = self.store.select(lambda records: ~np.isin(records["outcome"], list(complete)))
         for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
-            behind: set[int] = set()
-            for place in branch.order:
-                known = self.store.has_start(keys[place])
-                if behind or (known and read_start(place, self.store.read_start(keys[place])).failed):
-                    behind.add(place)
-                    self.store.forget_start(keys[place])
-            if behind:
+            without_state = {
+                place
+                for place, key in enumerate(keys)
+                if self.store.has_start(key) and read_start(place, self.store.read_start(key)).failed
+            }
+            for place in without_state:
+                self.store.forget_start(keys[place])
+            if without_state:
                 self.store.forget_progress(self.key(branch))
             for march in line:
                 for key in self._histories[march.number]:
-                    if key in failed or march.position in behind:
+                    if key in failed or march.position in without_state:
                         self.store.forget_history(key)
 
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:

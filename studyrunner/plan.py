@@ -29,7 +29,11 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
     n_values = _result_values(study, facts, plan.n_points)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
-    branches = f"{count(len(plan.branches), 'branch', 'branches')} along the frequency"
+    n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
+    n_along = len(plan.branches) - n_ramps
+    ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
+    ways += [f"{count(n_ramps, 'ramp')} of the excitation"] if n_ramps else []
+    branches = " and ".join(ways)
     left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or [
         "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
     ]

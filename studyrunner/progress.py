@@ -4,33 +4,69 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
 
-_FIRST_LINE = 2.0
-_LONGEST_SILENCE = 60.0
+FIRST_LINE = 2.0
+"""Seconds to the first plain line."""
+
+LONGEST_SILENCE = 30.0
+"""Seconds between two plain lines, at most."""
+
 _GROWTH = 1.5
+_SECONDS_A_PICTURE = 0.1
+_MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far the tasks of a run are.
+
+    n_done, n_points: points. seconds_left: expected. running: what is computed at the moment, longest first.
+    """
+
+    n_done: int
+    n_points: int
+    seconds_left: float
+    running: tuple[str, ...]
+
+    def share(self, elapsed: float) -> float:
+        """Share of the time that is over after so many seconds; all of it only where every point is done."""
+        if self.n_done == self.n_points:
+            return 1.0
+        return min(elapsed / max(elapsed + self.seconds_left, 1e-9), 0.99)
+
+    def describe(self, elapsed: float) -> str:
+        """Points and percent that are done, the time left, and what runs, in one line."""
+        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * self.share(elapsed):.0f} %"]
+        if self.n_done < self.n_points:
+            parts.append(f"about {format_seconds(self.seconds_left)} left")
+        if self.running:
+            named = ", ".join(self.running[:_MOST_NAMED])
+            more = f" and {len(self.running) - _MOST_NAMED} more" if len(self.running) > _MOST_NAMED else ""
+            parts.append(f"running: {named}{more}")
+        return ", ".join(parts)
 
 
 class RunProgress:
     """What the user sees while a study runs. Only rank 0 has one."""
 
     def __init__(self) -> None:
-        self._began = time.monotonic()
-        self._doing = ""
-        self._next_line = _FIRST_LINE
-        self._done_cost = 0.0
-        self._total_cost = 0.0
-        self._points = (0, 0)
+        self._began = self._began_tasks = time.monotonic()
+        self._next_line = FIRST_LINE
+        self._next_picture = 0.0
         console = Console(stderr=True)
         self._bar: Progress | None = None
         if console.is_terminal:
-            columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-            self._bar = Progress(*columns, TextColumn("{task.fields[left]}"), console=console, transient=True)
-            self._bar_task = self._bar.add_task("", total=1.0, left="")
+            # the text comes last: it is cut where the terminal is narrow
+            columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}"))
+            self._bar = Progress(*columns, console=console, transient=True)
+            self._bar_task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -45,11 +81,10 @@ class RunProgress:
 
     def say(self, doing: str) -> None:
         """What is done from now on."""
-        self._doing = doing
         if self._bar is None:
             print(f"{self._clock()} {doing}", file=sys.stderr, flush=True)
         else:
-            self._show()
+            self._bar.update(self._bar_task, description=doing)
 
     def note(self, happened: str) -> None:
         """Something that the user has to know; what is done stays the same."""
@@ -58,46 +93,34 @@ class RunProgress:
         else:
             self._bar.console.print(happened)
 
-    def report(self, done_cost: float, total_cost: float, done_points: int, n_points: int) -> None:
-        """How far the tasks are, in estimated seconds and in points."""
-        self._done_cost, self._total_cost, self._points = done_cost, total_cost, (done_points, n_points)
-        if self._bar is not None:
-            self._show()
+    def begin_tasks(self) -> None:
+        """The tasks begin now: what came before does not count for how far they are."""
+        self._began_tasks = time.monotonic()
 
-    def tick(self) -> None:
-        """Called many times a second: prints a plain line when one is due."""
-        elapsed = time.monotonic() - self._began
-        if self._bar is not None or elapsed < self._next_line:
-            return
-        self._next_line = elapsed + min(max(_FIRST_LINE, (_GROWTH - 1.0) * elapsed), _LONGEST_SILENCE)
-        done, total = self._points
-        print(f"{self._clock()} {self._doing}: {done} of {total} points{self._left()}", file=sys.stderr, flush=True)
+    def tick(self, look: Callable[[], Standing]) -> None:
+        """Called many times a second: shows how far the tasks are where that is due, and only then looks.
+
+        On a terminal the bar moves; elsewhere a plain line is printed, often at first, then every half minute.
+        """
+        elapsed = self.seconds
+        since = time.monotonic() - self._began_tasks
+        if self._bar is not None:
+            if elapsed >= self._next_picture:
+                self._next_picture = elapsed + _SECONDS_A_PICTURE
+                standing = look()
+                text = standing.describe(since)
+                self._bar.update(self._bar_task, completed=standing.share(since), description=text)
+        elif elapsed >= self._next_line:
+            self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
+            print(f"{self._clock()} {look().describe(since)}", file=sys.stderr, flush=True)
 
     @property
     def seconds(self) -> float:
         """Time since the start."""
         return time.monotonic() - self._began
 
-    def _show(self) -> None:
-        if self._bar is not None:
-            total = self._total_cost or 1.0
-            self._bar.update(
-                self._bar_task,
-                description=self._doing,
-                completed=self._done_cost,
-                total=total,
-                left=self._left().lstrip(", "),
-            )
-
     def _clock(self) -> str:
         return f"[{format_seconds(self.seconds):>7}]"
-
-    def _left(self) -> str:
-        # Before, hardly more is known than what the plan said.
-        if self._done_cost <= 0.0 or self._points[0] == 0:
-            return ""
-        left = self.seconds * (self._total_cost / self._done_cost - 1.0)
-        return f", about {format_seconds(left)} left"
 
 
 def format_seconds(seconds: float) -> str:

@@ -72,6 +72,8 @@ def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> Ma
         fold_frequency=math.nan,
         step_limit=math.nan,
         oscillates=False,
+        last_cycle=math.nan,
+        largest_wear_depth=math.nan,
         message=message,
         share=place,
     )

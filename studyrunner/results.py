@@ -59,8 +59,8 @@ def read_start(position: int, kept: Kept) -> StartResult:
 class MarchResult:
     """One history of a task, and the points that have it.
 
-    values: variable -> array with the dimensions of that variable after the axes; NaN, or 0 where the variable is a
-        whole number, where there is no result.
+    values: variable -> array with the dimensions of that variable after the axes; after `last_cycle` NaN, or 0 where
+        the variable is a whole number.
     share: its place among the shares of the task.
     The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
     """
@@ -76,5 +76,7 @@ class MarchResult:
     fold_frequency: float
     step_limit: float
     oscillates: bool
+    last_cycle: float
+    largest_wear_depth: float
     message: str = ""
     share: int = 0

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.costs import LearnedCosts
-from studyrunner.crashes import Crash, Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
+from studyrunner.course import Course
+from studyrunner.crashes import Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
 from studyrunner.evaluate import (
-    CONVERGED,
+    COMPLETE,
     CRASHED,
     NOT_COMPUTED,
     build_evaluator,
-    describe_failures,
     failed_results,
 )
 from studyrunner.identity import Identities, hash_of_kind
@@ -31,7 +29,7 @@ from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
 from studyrunner.store import Store, StoreInUseError
 from studyrunner.study import Study
-from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -39,12 +37,6 @@ if TYPE_CHECKING:
 
     from solver.model import ReducedModel
     from studyrunner.gather import Gathered
-
-_RANKS_A_TASK = 2
-"""A task that as many ranks were at when they were lost is not given to another one."""
-
-_COST_AT_REST = 0.01
-"""Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -66,16 +58,17 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_left: points that are not computed yet. n_found: those that an earlier run has left.
+    """How a run ended. n_complete: points computed to their last cycle. n_left: those that are not computed yet.
 
-    failures: a line for each way in which points failed. certificates: the table of the worst.
+    n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
+    certificates: the table that begins with the worn volume.
     """
 
     n_points: int
-    n_converged: int
+    n_complete: int
     n_left: int
     n_found: int
-    failures: tuple[str, ...]
+    findings: tuple[str, ...]
     certificates: str
 
 
@@ -108,7 +101,7 @@ def run_study(
         ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
         take_crashes(ledger)
         if retry_failed:
-            ledger.forget_failed()
+            ledger.forget_failed(COMPLETE)
         n_found = ledger.n_points_finished
         if n_found:
             progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
@@ -154,10 +147,10 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
     outcomes = gathered.outcomes
     return RunSummary(
         n_points=plan.n_points,
-        n_converged=outcomes[CONVERGED],
+        n_complete=sum(outcomes[number] for number in COMPLETE),
         n_left=outcomes[NOT_COMPUTED],
         n_found=n_found,
-        failures=describe_failures(outcomes),
+        findings=gathered.findings,
         certificates=gathered.certificates,
     )
 
@@ -194,96 +187,6 @@ def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluat
     return note_tasks(evaluate, job.folder, rank)
 
 
-class Course:
-    """How far the tasks of a study are, and what their results make possible.
-
-    A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
-    order.
-    """
-
-    def __init__(self, ledger: Ledger) -> None:
-        self.costs = LearnedCosts()
-        self.branches = ledger.branches_left()
-        self.n_points = ledger.n_points_finished
-        self.n_starts_left = sum(branch.n_results for branch in self.branches)
-        self._ledger = ledger
-        self._n_lost: Counter[str] = Counter()
-        self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
-        self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
-        lines = ledger.plan.marches
-        self._left[MARCHES] = sum(march.cost for line in lines for march in line if not ledger.is_finished(march))
-
-    def begin(self) -> Iterator[BranchTask | MarchTask]:
-        """The tasks that are possible from the start."""
-        yield from self.branches
-        for branch in self._ledger.plan.branches:
-            for result in self._ledger.known_starts(branch):
-                yield from self._start(branch, result)
-
-    def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
-        """Takes a result; returns the tasks that it makes possible."""
-        self._left[task.kind] -= task.cost / task.n_results
-        if isinstance(task, BranchTask) and isinstance(result, StartResult):
-            self.n_starts_left -= 1
-            self._ledger.add_start(task, result)
-            return self._start(task, result)
-        if isinstance(task, MarchTask) and isinstance(result, MarchResult):
-            self._ledger.add_history(task, result)
-            self.n_points += len(result.points)
-        return ()
-
-    def take_back(
-        self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
-    ) -> list[BranchTask | MarchTask]:
-        """What is to be done in place of the tasks of a lost rank, each with the number of results still to be given.
-
-        The rank was at the first of them. crashes: by the key of the task. A task that crashes is not tried again, and
-        neither is one with which several ranks were lost, as it may need more memory than there is.
-        """
-        left: list[BranchTask | MarchTask] = []
-        for task, n_left in lost:
-            self._n_lost[task.key] += task is lost[0][0]
-            again = self._ledger.renew(task)
-            crash = crashes.get(task.key)
-            if crash is None and self._n_lost[task.key] >= _RANKS_A_TASK:
-                position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
-                crash = Crash(task.key, position, f"{_RANKS_A_TASK} ranks were lost while they were at it")
-            if crash is not None:
-                self.n_points += self._ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
-            if isinstance(again, BranchTask):
-                if crash is not None and crash.position is not None:
-                    behind = again.order[again.order.index(crash.position) :]
-                    again = replace(again, known=again.known.union(behind))
-                again = replace(again, cost=task.cost * again.n_results / task.n_results)
-                self._left[task.kind] -= task.cost * n_left / task.n_results - again.cost
-                self.n_starts_left -= n_left - again.n_results
-                left += [again] if again.n_results else []
-            elif crash is not None:
-                self._left[task.kind] -= task.cost * n_left / task.n_results
-            else:
-                # it gives all of its histories again
-                n_given = task.n_results - n_left
-                self.n_points -= sum(len(share.points) for share in again.shares[:n_given])
-                self._left[task.kind] += task.cost * n_given / task.n_results
-                left.append(again)
-        return left
-
-    def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
-        planned = self._ledger.marches_from(branch.number, result.position)
-        new = start_marches(planned, result)
-        for before, march in zip(planned, new, strict=True):
-            self._left[MARCHES] -= before.cost
-            self._left[march.kind] += march.cost
-        return new
-
-    @property
-    def seconds(self) -> tuple[float, float]:
-        """Seconds spent on all ranks together, and those expected in the end."""
-        spent = sum(self.costs.measured(kind) for kind in self._left)
-        left = sum(max(0.0, seconds) * self.costs.correction(((kind,),)) for kind, seconds in self._left.items())
-        return spent, spent + left
-
-
 def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunProgress) -> None:
     """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
     course = Course(ledger)
@@ -301,29 +204,14 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
         forget_crash(ledger.store.folder, rank)
         return course.take_back(lost, crashes)
 
-    def tick() -> None:
+    def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
         ledger.store.tick()
-        progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
+        progress.tick(lambda: course.look(running()))
 
     if course.branches:
         n_branches = count(len(course.branches), "branch", "branches")
-        n_frequencies = count(len(course.branches[0].frequencies), "frequency", "frequencies")
-        progress.say(f"following {n_branches} along {n_frequencies}, marching through wear histories")
-    progress.report(*course.seconds, course.n_points, ledger.plan.n_points)
+        n_starts = count(course.n_starts_left, "start state")
+        progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
+    progress.begin_tasks()
     serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back)
     ledger.store.flush()
-
-
-def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:
-    """The marches from a start state. Where something moves they take about the same time, be it little or much.
-
-    The time grows with the unknowns of the state itself, not with a power: marches seldom factorise anew.
-    """
-    tasks = []
-    for task in planned:
-        n_unknowns = started.n_unknowns or task.n_unknowns
-        share = n_unknowns / task.n_unknowns
-        share *= 1.0 if started.moves else _COST_AT_REST
-        cost = task.cost * share
-        tasks.append(replace(task, start=started.start, cost=cost, n_unknowns=n_unknowns, moves=started.moves))
-    return tuple(tasks)

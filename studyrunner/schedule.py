@@ -152,7 +152,7 @@ def serve_tasks(
     run: Run[Task, Result],
     take: Callable[[Task, Result], Iterable[Task]],
     costs: LearnedCosts,
-    tick: Callable[[], None] = lambda: None,
+    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None,
     keep: Callable[[Task, object], None] = lambda *_: None,
     take_back: TakeBack[Task] = give_again,
 ) -> None:
@@ -160,8 +160,9 @@ def serve_tasks(
 
     run: gives the results of a task one by one. take: called in the main thread, in the order in which results arrive;
         returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
-        second. keep: called with how far a task is; never after its last result. tasks: are taken one by one, as
-        there is use for them. take_back: called with a rank that is lost and the tasks that it had.
+        second, with what tells the tasks that run, as `Dispatcher.running`. keep: called with how far a task is; never
+        after its last result. tasks: are taken one by one, as there is use for them. take_back: called with a rank that
+        is lost and the tasks that it had.
     Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
     another rank ends that rank's process.
     """
@@ -218,7 +219,7 @@ def serve_tasks(
                 if quiet:
                     break
             dispatcher.watch()
-            tick()
+            tick(dispatcher.running)
             if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
                 accept(0, message)
     except BaseException:

@@ -51,7 +51,7 @@ HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_
 SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
 FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
 Scheme = Literal["implicit", "explicit", "adaptive"]
-Sweep = Literal["up", "down"]
+Sweep = Literal["up", "down", "ramp"]
 
 
 def _read_name(value: object) -> str:
@@ -124,8 +124,8 @@ class AxesSection(Section):
     scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
         ("implicit",), description="of the wear steps"
     )
-    sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down")))] = Field(
-        ("up",), description="the branch followed at cycle 0"
+    sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down", "ramp")))] = Field(
+        ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"
     )
     harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
     samples: SamplesAxis | None = Field(None, description="time samples in a period")

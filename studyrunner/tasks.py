@@ -51,11 +51,12 @@ class Settings:
 
 @dataclass(frozen=True)
 class BranchTask:
-    """One branch along all frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
+    """One branch along frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
 
-    number: of the branch in the study. cost: estimated seconds. known: places of the frequencies whose results are not
-    asked for: an earlier run has left them, or all that starts from them. resume: how far that run was; None to begin
-    with the first one. key: what the branch is known by in the folder of the run.
+    A sweep "up" or "down" passes all frequencies of a line. A "ramp" raises the excitation at a single one, so that it
+    is a task of its own. number: of the branch in the study. cost: estimated seconds. known: places of the frequencies
+    whose results are not asked for: an earlier run has left them, or all that starts from them. resume: how far that
+    run was; None to begin with the first one. key: what the branch is known by in the folder of the run.
     """
 
     number: int
@@ -72,7 +73,7 @@ class BranchTask:
     def order(self) -> tuple[int, ...]:
         """Places of the frequencies in the order of the sweep."""
         places = range(len(self.frequencies))
-        return tuple(places if self.sweep == "up" else reversed(places))
+        return tuple(reversed(places) if self.sweep == "down" else places)
 
     @property
     def order_left(self) -> tuple[int, ...]:
@@ -181,8 +182,8 @@ class MarchTask:
 class TaskPlan:
     """All tasks of a study.
 
-    marches: for each branch, the tasks that start from it. n_unknowns: in the largest task; an estimate where the
-    number of harmonics is automatic.
+    marches: for each branch, the tasks that start from it, by frequency. n_unknowns: in the largest task; an estimate
+    where the number of harmonics is automatic.
     """
 
     branches: tuple[BranchTask, ...]
@@ -221,30 +222,41 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
         settings = _settings(study, line)
         n_unknowns = _unknowns(n_displacements, settings.harmonics)
         seconds = seconds_an_iteration(n_unknowns)
-        branches.append(
-            BranchTask(
-                number=len(branches),
-                excitation_amplitude=study.axes.excitation_amplitude[line[0]],
-                sweep=study.axes.sweep[line[1]],
-                settings=settings,
-                frequencies=tuple(study.axes.frequency[place] for place in ascending),
-                cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(ascending)),
+        sweep = study.axes.sweep[line[1]]
+        for places in _stretches(sweep, ascending):
+            number = len(branches)
+            branches.append(
+                BranchTask(
+                    number=number,
+                    excitation_amplitude=study.axes.excitation_amplitude[line[0]],
+                    sweep=sweep,
+                    settings=settings,
+                    frequencies=tuple(study.axes.frequency[place] for place in places),
+                    cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(places)),
+                )
             )
-        )
-        marches.append(
-            tuple(
-                task
-                for position, place in enumerate(ascending)
-                for task in _marches(study, sharing, (len(marches), position), place, lines, n_unknowns, numbers)
+            marches.append(
+                tuple(
+                    task
+                    for position, place in enumerate(places)
+                    for task in _marches(study, sharing, (number, position), place, lines, n_unknowns, numbers)
+                )
             )
-        )
     return TaskPlan(
         branches=tuple(branches),
         marches=tuple(marches),
-        left_out=sharing.left_out(len(branches) * len(ascending), math.prod(sizes)),
+        left_out=sharing.left_out(sum(len(branch.frequencies) for branch in branches), math.prod(sizes)),
         n_points=math.prod(sizes),
         n_unknowns=max(_unknowns(n_displacements, harmonics) for harmonics in study.harmonics),
     )
+
+
+def _stretches(sweep: str, ascending: list[int]) -> Iterator[list[int]]:
+    """Places of the frequencies that one task reaches: each for itself where the excitation is raised at it."""
+    if sweep == "ramp":
+        yield from ([place] for place in ascending)
+    else:
+        yield ascending
 
 
 def march_variables(study: Study) -> tuple[str, ...]:

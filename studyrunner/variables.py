@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class Variable:
     """One variable of the result: its dimensions after the axes, its unit and what it means.
 
-    dtype: of numpy. Floating numbers are NaN where a point failed, whole ones 0. flags: what the values 0, 1, ... mean,
-    one word each. content: what ACDD calls its type. comment: what a reader would ask next.
+    dtype: of numpy. Floating numbers are NaN where there is no result, whole ones 0. flags: what the values 0, 1, ...
+    mean, one word each. content: what ACDD calls its type. comment: what a reader would ask next.
     """
 
     dimensions: tuple[str, ...]
@@ -120,6 +120,18 @@ ASKED = {
         "1",
         "estimated relative truncation error of the wear rate",
         comment="By solving again with more harmonics and samples; NaN where it was not estimated.",
+    ),
+    "worn_volume_error": Variable(
+        ("cycle",),
+        "1",
+        "estimated relative error of the worn volume",
+        comment="Steps with their propagation, harmonics, samples and start state; 0 where nothing has worn.",
+    ),
+    "wear_depth_error": Variable(
+        ("cycle", "contact"),
+        "m",
+        "estimated error of the wear depth",
+        comment="Single pairs are known less well than the worn volume of all.",
     ),
     "harmonics_used": Variable(("cycle",), "1", "harmonics above the static one in the state", "int32"),
     "samples_used": Variable(("cycle",), "1", "time samples in a period of the state", "int32"),
@@ -237,7 +249,19 @@ KEPT = {
         (),
         "1",
         "estimated relative error of the last worn volume",
-        comment="Of the steps, and of harmonics and samples in the wear rates.",
+        comment="Of the last count that was reached, see worn_volume_error; NaN where it was not estimated.",
+    ),
+    "last_cycle": Variable(
+        (),
+        "1",
+        "cycle count up to which the point was computed",
+        comment="Values after it are NaN, or 0 where a variable is a whole number; NaN where there is no state at all.",
+    ),
+    "largest_wear_depth": Variable(
+        (),
+        "m",
+        "largest wear depth of any pair at any count",
+        comment="The joint is taken as it was designed: small against the distance between pairs, wear leaves it so.",
     ),
     "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
     "fold_frequency": Variable(
@@ -260,7 +284,13 @@ KEPT = {
         ("steady", "oscillating"),
         comment="Only the explicit scheme is watched.",
     ),
-    "message": Variable((), "1", "what an unexpected error said, empty where there was none", "U240"),
+    "message": Variable(
+        (),
+        "1",
+        "what the outcome does not say by itself",
+        "U240",
+        comment="From which cycle on something holds no longer and the error reached; what an unexpected error said.",
+    ),
 }
 """Those that every result holds."""
 
@@ -278,8 +308,9 @@ COORDINATES = {
     "sweep": Variable(
         (),
         "1",
-        "direction of the sweep whose branch is followed at cycle 0",
-        comment="up: from low to high frequencies.",
+        "how the unworn state is reached",
+        comment="up: from low to high frequencies; down: from high to low ones; ramp: at this frequency, by raising the"
+        " excitation from nothing.",
     ),
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),

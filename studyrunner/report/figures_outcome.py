@@ -1,4 +1,4 @@
-"""Where and why points failed, and how right the others are: outcomes, certificates, estimated errors."""
+"""Where and why points ended as they did, and how right they are: outcomes, certificates, estimated errors."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
-from studyrunner.progress import count
 from studyrunner.report.course import Course, find_course
 from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
 from studyrunner.report.figures_volume import NO_VOLUME
+from studyrunner.report.reliance import tell_ends, tell_volumes
 from studyrunner.report.result import CONVERGED, Result, as_sentences
 from studyrunner.report.units import show_power
 
@@ -30,8 +30,8 @@ _ERRORS = {
     "energy_error": "energy balance, worst cycle",
 }
 _NOTE = (
-    "Each value is the largest over all points computed to tolerance and all cycle counts kept; 0 is the best. A point"
-    " whose certificates exceed their limits is not saved as a result."
+    "Each value of a certificate is the largest over all points computed to the last cycle and all cycle counts kept; 0"
+    " is the best. A point ends where its certificates exceed their limits."
 )
 _FLOOR = 1e-3
 _NEGLIGIBLE = 1e-6
@@ -48,18 +48,13 @@ def draw_outcomes(result: Result) -> Iterator[Drawing | Table]:
         ending = result.endings[number]
         first = result.describe(point) if number != CONVERGED else ""
         rows.append((str(number), ending.word.replace("_", " "), str(numbers[number]), ending.sentence, first))
-    n_failed = outcome.size - numbers[CONVERGED]
-    note = (
-        f"{n_failed} of {count(outcome.size, 'point')} have no result: gaps in the figures, NaN in the file."
-        if n_failed
-        else f"All {count(outcome.size, 'point')} were computed to tolerance."
-        if outcome.size > 1
-        else "The point was computed to tolerance."
-    )
+    n_special = outcome.size - numbers[CONVERGED]
+    without = "" if result.held.all() else "Where there is no result there are gaps in the figures and NaN in the file"
+    note = as_sentences(tell_volumes(result), tell_ends(result), without)
     columns = ("number", "outcome", "points", "what it means", "first of them at")
     yield Table("outcomes", "Outcomes of the points", columns, tuple(rows), note)
     course = find_course(result)
-    if n_failed and course is not None:
+    if n_special and course is not None:
         yield draw_outcome_map(result, course)
 
 
@@ -128,7 +123,7 @@ def draw_certificates(result: Result) -> Iterator[Drawing | Missing | Table]:
     else:
         yield Missing("certificates", title, "The file carries no certificate_summary: run the study anew.")
     course = find_course(result)
-    if course is not None and result.converged.any():
+    if course is not None and result.computed.any():
         drawing = draw_errors(result, course)
         if drawing is not None:
             yield drawing

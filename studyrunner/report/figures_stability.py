@@ -44,7 +44,7 @@ def list_stability(result: Result) -> Iterator[Table]:
     oscillates = result.read("oscillates").values != 0
     unstable = np.zeros_like(oscillates)
     if result.has("stable"):
-        unstable = (result.read("stable") == 0).any("cycle").transpose(*result.axes).values & result.converged
+        unstable = (result.read("stable") == 0).any("cycle").transpose(*result.axes).values & result.computed
     step, explicit = _steps(result)
     too_long = explicit & np.isfinite(limit) & (step > limit)
     rows = []

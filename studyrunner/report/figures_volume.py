@@ -25,6 +25,7 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.result import Choice, Result, as_sentences
 from studyrunner.report.units import Scale, scale_for
+from studyrunner.report.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
 
 _MOST_LINES = 6
 _MOST_MAPS = 4
@@ -76,6 +77,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     figure = new_figure(3.4)
     panel = figure.subplots()
     ends: list[str] = []
+    early: list[str] = []
     exact_drawn: list[NDArray[np.float64]] = []
     highest = 0.0
     for number, (point, label) in enumerate(choice):
@@ -86,7 +88,10 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
         highest = max(highest, float(np.nanmax(worn)))
         style = line_style(number, worn.size)
         panel.plot(cycles(result.cycles), scale(worn), label=label or "computed", **style)
-        ends.append(f"{scale.show(float(worn[-1]), 4)} ({label})" if label else scale.show(float(worn[-1]), 4))
+        highest = max(highest, draw_band(result, panel, full, cycles, scale, style["color"]))
+        early.append(mark_end(result, panel, full, cycles, scale, style["color"]))
+        amount = f"{scale.show(float(worn[-1]), 4)}{tell_error(result, full)}"
+        ends += [f"{amount} ({label})" if label else amount] if np.isfinite(worn[-1]) else []
         jump = float(result.at("jump_cycle", full).values) if result.has("jump_cycle") else np.nan
         if np.isfinite(jump):
             height = np.interp(jump, result.cycles, worn)
@@ -115,9 +120,13 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     if len(panel.get_lines()) > 1:
         panel.legend()
     where = result.describe(shown, [course]) if course else ""
-    amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if largest > NO_VOLUME else "Nothing wears."
+    amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if ends else ""
+    amount = amount if largest > NO_VOLUME else "Nothing wears."
+    bands = "Bands: estimated error" if any(found.get_gid() == "error" for found in panel.collections) else ""
     schemes = "" if "scheme" in result.varying else _tell_scheme(result)
-    text = as_sentences(f"Worn volume over cycles{f' at {where}' if where else ''}", amount, schemes, choice.sentence)
+    text = as_sentences(
+        f"Worn volume over cycles{f' at {where}' if where else ''}", amount, bands, *early, schemes, choice.sentence
+    )
     return Drawing("worn_volume", "Worn volume over cycles", f"{text} Fig. 4 of the paper.", figure)
 
 
@@ -173,10 +182,10 @@ def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[
     return Choice(points, labels, choice.sentence), list(fields)
 
 
-def _read_last(result: Result, course: Course) -> list[NDArray[np.float64]]:
-    """Last worn volumes along the course, of combinations without a result as well."""
+def _read_reached(result: Result, course: Course) -> list[NDArray[np.float64]]:
+    """First worn volumes along the course, of combinations without a result as well: NaN where there is no state."""
     choice = result.choose([course.axis], _MOST_LINES)
-    return [course.read(result, "worn_volume", point)[:, -1] for point in choice.points]
+    return [course.read(result, "worn_volume", point)[:, 0] for point in choice.points]
 
 
 def _label_map(panels: NDArray[Any], course: Course, cycles: Scale) -> None:
@@ -199,14 +208,20 @@ def _where_largest(result: Result, course: Course, choice: Choice, fields: list[
 def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     """Worn volume at the last cycle count over the course, one line a combination (Fig. 8)."""
     choice, fields = _read_known(result, course, "worn_volume", _MOST_LINES)
-    failed = np.array([np.isnan(one) for one in _read_last(result, course)])
+    failed = np.array([np.isnan(one) for one in _read_reached(result, course)])
+    # of a point that ended early, what was worn by then
+    reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
     fields = [field[:, -1:] for field in fields]
     figure = new_figure(3.4)
     panel: Axes = figure.subplots()
     for number, (field, label) in enumerate(zip(fields, choice.labels, strict=True)):
         panel.plot(course.values, scale(field[:, 0]), label=label or "computed", **course.line_style(number))
-    largest = max(float(np.nanmax(field, initial=0.0)) for field in fields)
-    set_from_zero(panel, scale(largest).item())
+    largest = max(float(np.nanmax(field, initial=0.0)) for field in reached)
+    colours = [course.line_style(number)["color"] for number in range(len(fields))]
+    bars = draw_bars(result, panel, course, choice, reached, scale, colours)
+    care = mark_care(result, panel, course, choice, reached, scale)
+    # bars that leave the points too little room are cut
+    set_from_zero(panel, scale(max(largest, min(bars, 2.0 * largest))).item())
     n_oscillating = _mark_oscillating(result, course, choice, panel, fields, scale, _SEEN * largest)
     n_failed = mark_failed(panel, course.values, failed)
     course.set_axis(panel)
@@ -215,9 +230,11 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         panel.legend()
     caption = as_sentences(
         f"Worn volume after {result.cycle_label(-1)} over {course.name}",
-        f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, fields)}",
+        f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
         f"Rings: {count(n_oscillating, 'point')} whose wear rate oscillates from step to step" if n_oscillating else "",
+        "Bars: estimated error" if bars > 0.0 else "",
+        *care,
         choice.sentence,
         "Fig. 8 of the paper",
     )
@@ -249,8 +266,8 @@ def _mark_oscillating(
 
 
 def _where_last(result: Result, course: Course, choice: Choice, fields: list[NDArray[np.float64]]) -> str:
-    """As `_where_largest`, for fields of one cycle count."""
+    """As `_where_largest`, for fields (course,) without cycles."""
     number = int(np.argmax([np.nanmax(field, initial=-1.0) for field in fields]))
-    place = int(np.nanargmax(fields[number][:, 0]))
+    place = int(np.nanargmax(fields[number]))
     label = f" ({choice.labels[number]})" if choice.labels[number] else ""
     return f", at {result.describe({course.axis: int(course.index[place])}, [course.axis])}{label}"

@@ -23,10 +23,10 @@ _Part = Callable[[Result], Iterator[Item]]
 def draw_report(result: Result) -> Iterator[Item]:
     """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
 
-    Where no point was computed to tolerance, the results are left out with a single sentence.
+    Where no point holds a state, the results are left out with a single sentence.
     """
     of_results: tuple[_Part, ...] = (draw_responses, draw_volumes, draw_flanks, draw_loops)
-    if not result.converged.any():
+    if not result.held.any():
         of_results = (_tell_nothing,)
     parts = (
         draw_outcomes,
@@ -52,4 +52,4 @@ def _draw_precision(result: Result) -> Iterator[Item]:
 
 
 def _tell_nothing(_result: Result) -> Iterator[Missing]:
-    yield Missing("results", "Results", "No point was computed to tolerance: the file holds no results to draw.")
+    yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")

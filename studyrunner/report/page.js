@@ -83,7 +83,7 @@ function prepare() {
     addChoice("loop-choice", "component", "component", loops.components.map((name) => name.replace("_", " ")), state.component, (i) => { state.component = i; drawLoop(); });
   }
   byId("loop-part").hidden = !loops;
-  byId("course-part").hidden = cycles.length < 2 || !data.outcome.includes(0) || !(courses.worn_volume || courses.wear_rate);
+  byId("course-part").hidden = cycles.length < 2 || data.without.length === data.outcome.length || !(courses.worn_volume || courses.wear_rate);
   byId("course-part").classList.toggle("wide", Boolean(maps) && !loops);
   const slider = byId("cycle");
   slider.max = String(cycles.length - 1);

@@ -7,8 +7,9 @@ multiplies them by `factor` where it shows them.
 from __future__ import annotations
 
 import base64
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.report.drawing import COLOURS
 from studyrunner.report.page_panels import build_panels
-from studyrunner.report.result import Result, units_of
+from studyrunner.report.result import CONVERGED, Result, units_of
 from studyrunner.report.units import scale_for
 from studyrunner.variables import CERTIFICATE
 
@@ -26,6 +27,7 @@ COURSES = (
     "response_phase",
     "response_peak",
     "worn_volume",
+    "worn_volume_error",
     "wear_rate",
     "exact_worn_volume",
     "exact_response_amplitude",
@@ -37,7 +39,16 @@ MAPS = ("mean_pressure", "wear_depth", "open_fraction")
 
 LOOPS = ("loop_displacement", "loop_force")
 
-POINT_NUMBERS = ("jump_cycle", "error_estimate", "newton_iterations", "run_time", "branch", "step_limit")
+POINT_NUMBERS = (
+    "jump_cycle",
+    "error_estimate",
+    "last_cycle",
+    "largest_wear_depth",
+    "newton_iterations",
+    "run_time",
+    "branch",
+    "step_limit",
+)
 """Numbers of a point that stand in the list beside the plots."""
 
 _LARGEST = {"harmonics_used": "harmonics", "samples_used": "samples in a period"}
@@ -79,13 +90,15 @@ def build_page_data(result: Result, limit: float) -> PageData:
     Cycles are thinned out evenly where there are too many numbers, those of the contact pairs before those of the
     point, then points lose their maps and loops; each of these is said in a note.
     """
-    n_points = result.converged.size
+    n_points = result.held.size
     if n_points > MOST_POINTS:
         note = f"The study has {n_points} points, more than the {MOST_POINTS} that can be picked here."
         return PageData(None, (note,))
     notes: list[str] = []
     floats = limit / _CHARACTERS_A_FLOAT
-    points = _point_numbers(result)
+    points, last = _point_numbers(result), result.last_cycle
+    remarks = {str(place): text for place, text in _remarks(result)}
+    floats -= len(json.dumps(remarks)) / _CHARACTERS_A_FLOAT
     floats -= sum(len(str(entry["data"])) for entry in points.values()) / _CHARACTERS_A_FLOAT
     kept = _fit_courses(result, _SHARE_OF_COURSES * floats, notes)
     if kept is None:
@@ -102,8 +115,13 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "colours": COLOURS,
         "cycles": result.cycles[kept.cycles].tolist(),
         "responses": result.responses,
-        "shown": int(np.ravel_multi_index(shown, result.converged.shape)),
+        "shown": int(np.ravel_multi_index(shown, result.held.shape)),
         "outcome": result.dataset["outcome"].values.ravel().tolist(),
+        "without": np.flatnonzero(~result.held).tolist(),
+        "ends": {
+            str(place): float(last.flat[place]) for place in np.flatnonzero(result.held & ~result.computed).tolist()
+        },
+        "remarks": remarks,
         "endings": {str(number): ending.sentence for number, ending in result.endings.items()},
         "points": points,
         "courses": courses,
@@ -111,6 +129,18 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "loops": loops,
     }
     return PageData(content, tuple(notes))
+
+
+def _remarks(result: Result) -> Iterator[tuple[int, str]]:
+    """What there is to say of points beside their outcome, by number: messages, and errors above rtol."""
+    messages = result.dataset["message"].values.ravel() if result.has("message") else None
+    for place in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
+        message = "" if messages is None else str(messages[place])
+        error = float(result.errors.ravel()[place])
+        above = result.above.ravel()[place] and math.isfinite(error)
+        texts = (message, f"Its worn volume is known to {100.0 * error:.2g} %" if above else "")
+        if any(texts):
+            yield place, ". ".join(filter(None, texts))
 
 
 def encode_floats(values: ArrayLike) -> str:
@@ -127,7 +157,7 @@ def thin_out(count: int, keep: int) -> NDArray[np.int64]:
 
 def _fit_courses(result: Result, floats: float, notes: list[str]) -> _Kept | None:
     """Cycles at which the numbers of all points fit; None where not even two of them do."""
-    n_cycles, n_points = result.dataset.sizes.get("cycle", 1), result.converged.size
+    n_cycles, n_points = result.dataset.sizes.get("cycle", 1), result.held.size
     names = [name for name in COURSES if result.has(name)]
     per_cycle = sum(math.prod(_inner_shape(result.dataset[name])[1:]) for name in names) * n_points
     keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
@@ -144,9 +174,9 @@ def _fit_points(
 ) -> _Kept:
     """Points and cycles at which `floats_each` numbers fit: first the cycles are thinned out, then points go.
 
-    The points that stay are those worn most at the end; those that failed have nothing to keep.
+    The points that stay are those worn most at the end; those without a state have nothing to keep.
     """
-    points = np.flatnonzero(result.converged)
+    points = np.flatnonzero(result.held)
     fewest = min(len(cycles), fewest_cycles)
     room = int(floats // max(floats_each, 1))
     keep = min(len(cycles), room // max(len(points), 1))
@@ -159,14 +189,13 @@ def _fit_points(
 def _most_worn_first(result: Result, points: NDArray[np.int64]) -> NDArray[np.int64]:
     if not result.has("worn_volume"):
         return points
-    last = result.dataset["worn_volume"].isel(cycle=-1).values.ravel()[points]
-    return points[np.argsort(-np.nan_to_num(last), kind="stable")]
+    return points[np.argsort(-np.nan_to_num(result.worn.ravel()[points]), kind="stable")]
 
 
 def _maps(result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]) -> dict[str, object] | None:
     """Values of the contact pairs; None where the file or the page holds none."""
     names = [name for name in MAPS if result.has(name)]
-    if not names or not result.converged.any():
+    if not names or not result.held.any():
         return None
     kept = _fit_points(result, cycles, len(names) * result.dataset.sizes["contact"], floats, _FEWEST_MAP_CYCLES)
     _say_what_is_kept("Maps", kept, cycles, result, notes)
@@ -184,9 +213,9 @@ def _loops(
     result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]
 ) -> tuple[dict[str, object] | None, float]:
     """Loops of the pairs that the file holds, and the floats that they take; None where there are none."""
-    if not result.has(*LOOPS) or not result.converged.any():
+    if not result.has(*LOOPS) or not result.held.any():
         return None, 0.0
-    first = int(np.flatnonzero(result.converged)[0])
+    first = int(np.flatnonzero(result.held)[0])
     held = np.flatnonzero(
         np.isfinite(_read(result.dataset["loop_force"], _Kept(np.array([first]), cycles[:1]))).any(axis=(0, 1, 3, 4))
     )
@@ -210,12 +239,12 @@ def _loops(
 
 
 def _say_what_is_kept(what: str, kept: _Kept, cycles: NDArray[np.int64], result: Result, notes: list[str]) -> None:
-    n_points = int(np.count_nonzero(result.converged))
+    n_points = int(np.count_nonzero(result.held))
     if not len(kept.points):
         notes.append(f"{what} are not on this page: those of a single point would not fit.")
         return
     if len(kept.points) < n_points:
-        notes.append(f"{what} are on this page for the {len(kept.points)} most worn of {n_points} converged points.")
+        notes.append(f"{what} are on this page for the {len(kept.points)} most worn of {n_points} points.")
     if len(kept.cycles) < len(cycles):
         notes.append(
             f"{what} are on this page at {len(kept.cycles)} of the {len(cycles)} cycle counts of the slider: the"

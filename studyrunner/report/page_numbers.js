@@ -48,8 +48,10 @@ function places(point) {
 
 const pointAt = (found) => found.reduce((point, place, axis) => point * sizes[axis] + place, 0);
 const varying = axes.map((_, axis) => axis).filter((axis) => sizes[axis] > 1);
-const converged = (point) => data.outcome[point] === 0;
-const sentence = (point) => data.endings[data.outcome[point]];
+// Whether there are numbers of a point at this cycle: one that ended early has those of the first cycles.
+const without = new Set(data.without);
+const known = (point, cycle) => !without.has(point) && !(cycles[cycle] > data.ends[point] * (1 + 1e-9));
+const sentence = (point) => [data.endings[data.outcome[point]], data.remarks[point]].filter(Boolean).join(" ");
 
 function axisText(axis, place) {
   const value = axes[axis].values[place];

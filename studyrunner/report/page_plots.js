@@ -71,8 +71,8 @@ function drawResponse() {
   lines.forEach((line) => {
     const number = line.number;
     const colour = data.colours[number % data.colours.length];
-    const good = line.points.filter(converged);
-    const bad = line.points.filter((point) => !converged(point));
+    const good = line.points.filter((point) => known(point, state.cycle));
+    const bad = line.points.filter((point) => !known(point, state.cycle));
     if (entry && cycles.length > 1 && good.length) {
       traces.push({
         x: line.points.map(at), y: line.points.map((point) => value(point, 0)),
@@ -101,13 +101,13 @@ function drawResponse() {
     }
   });
   traces.push({
-    x: [at(state.point)], y: [converged(state.point) ? value(state.point, state.cycle) : 0], mode: "markers",
+    x: [at(state.point)], y: [known(state.point, state.cycle) ? value(state.point, state.cycle) : 0], mode: "markers",
     hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
     marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
   });
   const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values } : {};
   byId("response-hint").textContent = varying.length
-    ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points that failed." : "")
+    ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points without a value there." : "")
     : "The study has a single point.";
   Plotly.react("response-plot", traces, layout({
     height: 380, uirevision: `${state.response}`, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
@@ -119,7 +119,7 @@ function drawResponse() {
 function drawCourse() {
   const panels = [["worn_volume", "worn volume"], ["wear_rate", "wear rate"]].filter(([name]) => courses[name]);
   if (byId("course-part").hidden) return;
-  if (!converged(state.point)) {
+  if (!known(state.point, 0)) {
     sayInstead("course-plot", sentence(state.point));
     return;
   }
@@ -136,6 +136,17 @@ function drawCourse() {
     const place = { xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const scaled = (kind) => Array.from(cycles, (_, cycle) => course(kind, state.point, cycle) * entry.factor);
     const values = scaled(name);
+    if (name === "worn_volume" && courses.worn_volume_error) {
+      const wrong = Array.from(cycles, (_, cycle) => course("worn_volume_error", state.point, cycle));
+      const told = cycles.map((_, i) => i).filter((i) => Number.isFinite(values[i] * wrong[i]));
+      const edge = (sign) => told.map((i) => Math.max(values[i] * (1 + sign * wrong[i]), 0));
+      const counts = told.map((i) => cycles[i]);
+      traces.push({
+        ...place, x: [...counts, ...counts.slice().reverse()], y: [...edge(1), ...edge(-1).reverse()], mode: "lines",
+        fill: "toself", fillcolor: "rgba(0, 114, 178, 0.18)", line: { width: 0 }, hoverinfo: "skip", showlegend: false,
+        name: "estimated error", meta: "worn_volume_error",
+      });
+    }
     traces.push({
       ...place, x: cycles, y: values, mode: cycles.length > 1 ? "lines" : "markers", showlegend: false, meta: name, name: title,
       line: { color: data.colours[0], width: 2 }, hovertemplate: "cycle %{x}<br>%{y:.5~g}<extra></extra>",
@@ -172,8 +183,8 @@ function drawMaps() {
   const entry = maps.variables[state.map];
   const found = held(maps, state.point, state.cycle);
   byId("map-title").textContent = `Contact pairs at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found) {
-    sayInstead("map-plot", converged(state.point) ? "The maps of this point are not on this page." : sentence(state.point));
+  if (!found || !known(state.point, state.cycle)) {
+    sayInstead("map-plot", known(state.point, state.cycle) ? "The maps of this point are not on this page." : sentence(state.point));
     return;
   }
   const nPairs = entry.values.length / (maps.points.length * maps.cycles.length);
@@ -228,8 +239,8 @@ function drawLoop() {
   const { loop_displacement: displacement, loop_force: force } = loops.variables;
   const found = held(loops, state.point, state.cycle);
   byId("loop-title").textContent = `Loop of pair ${loops.contacts[state.loop]} at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found) {
-    sayInstead("loop-plot", converged(state.point) ? "The loops of this point are not on this page." : sentence(state.point));
+  if (!found || !known(state.point, state.cycle)) {
+    sayInstead("loop-plot", known(state.point, state.cycle) ? "The loops of this point are not on this page." : sentence(state.point));
     return;
   }
   const parts = loops.components.length;

@@ -11,6 +11,7 @@ import numpy as np
 from studyrunner.progress import count
 from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page_data import PageData
+from studyrunner.report.reliance import describe_ended, tell_ends, tell_volumes
 from studyrunner.report.result import CONVERGED, Result, units_of
 from studyrunner.report.units import show_cycles, show_number
 
@@ -81,18 +82,24 @@ def _scene(result: Result) -> str:
 
 
 def _outcomes(result: Result) -> str:
-    """How many points ended how, in sentences."""
-    n_points, n_converged = result.converged.size, int(np.count_nonzero(result.converged))
-    text = f"<p>{count(n_points, 'point')}, {n_converged} computed to tolerance.</p>"
-    if n_converged == n_points:
-        return text
+    """How well the worn volume is known, and how many points ended how, in sentences."""
+    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
+    text = f"<p>{escape(' '.join(filter(None, (tell_volumes(result), tell_ends(result)))))}</p>"
     numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
+    if n_computed == n_points and set(numbers) == {CONVERGED}:
+        return text
     items = "".join(
-        f"<li>{count(numbers[number], 'point')}: {escape(ending.sentence)}</li>"
+        f"<li>{count(numbers[number], 'point')}: {escape(ending.sentence)}{_named(result, number)}</li>"
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     )
     return f'{text}<ul class="outcomes">{items}</ul>'
+
+
+def _named(result: Result, number: int) -> str:
+    """The first points of an outcome, each with what there is to say of it."""
+    lines = describe_ended(result, number)
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>" if lines else ""
 
 
 def interactive_section(data: PageData) -> str:

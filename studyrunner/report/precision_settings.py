@@ -129,7 +129,7 @@ def read_runs(result: Result) -> tuple[Runs, ...]:
             setting = reader.setting(whole)
             if setting in runs or setting in failures:
                 continue
-            if result.converged[tuple(whole.values())]:
+            if result.computed[tuple(whole.values())]:
                 runs[setting] = reader.run(setting, whole)
             else:
                 number = int(result.dataset["outcome"].values[tuple(whole.values())])
@@ -166,7 +166,7 @@ class _Reader:
         result = self.result
         if result.has(name):
             return np.asarray(result.read(name).values, dtype=float)
-        return np.broadcast_to(np.nan, (*result.converged.shape, *shape))
+        return np.broadcast_to(np.nan, (*result.computed.shape, *shape))
 
     def settings(self, place: Mapping[str, int]) -> Iterator[dict[str, int]]:
         """Places of all settings at a point, in the order of the axes."""

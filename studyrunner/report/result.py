@@ -20,7 +20,10 @@ from studyrunner.user_error import UserError
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 CONVERGED = 0
-"""The `outcome` of a point that was computed to tolerance."""
+"""The `outcome` of a point of which nothing else is to be said."""
+
+_COMPLETE = ("converged", "inaccurate", "sensitive")
+"""Words of the outcomes of points that were computed to the last cycle."""
 
 _NEEDED = ("outcome", "cycle", "contact")
 
@@ -74,10 +77,59 @@ class Result:
         return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
 
     @cached_property
-    def converged(self) -> NDArray[np.bool_]:
-        """Which points were computed to tolerance; in the shape of the axes."""
-        found: NDArray[np.bool_] = self.dataset["outcome"].values == CONVERGED
-        return found
+    def computed(self) -> NDArray[np.bool_]:
+        """Which points were computed to the last cycle, each with its error; in the shape of the axes."""
+        outcome = self.dataset["outcome"].values
+        if not self.has("last_cycle"):
+            # an older file holds nothing of any other point
+            return np.asarray(outcome == CONVERGED)
+        complete = [number for number, ending in self.endings.items() if ending.word in _COMPLETE]
+        return np.asarray(np.isin(outcome, complete))
+
+    @cached_property
+    def last_cycle(self) -> NDArray[np.float64]:
+        """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
+        last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
+        # points of an older file, or of one that was joined to this
+        return np.where(self.computed & np.isnan(last), self.cycles[-1], last)
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which points hold values, be it of the first cycles only; in the shape of the axes."""
+        return np.asarray(self.computed | (self.last_cycle >= self.cycles[0]))
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64]:
+        """Estimated relative errors of the last worn volumes; NaN where the file has none; in the shape of the axes."""
+        known = self.dataset["error_estimate"].values if self.has("error_estimate") else np.nan
+        return np.broadcast_to(np.asarray(known, dtype=float), self.computed.shape)
+
+    @cached_property
+    def rtol(self) -> NDArray[np.float64]:
+        """Relative error that each point was to keep below; NaN where the file does not say."""
+        outcome = self.dataset["outcome"]
+        if "rtol" in outcome.dims:
+            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
+        solver = self.study.get("solver")
+        aim = solver.get("rtol") if isinstance(solver, dict) else None
+        return np.full(outcome.shape, float(aim) if isinstance(aim, int | float) else np.nan)
+
+    @cached_property
+    def above(self) -> NDArray[np.bool_]:
+        """Which points were computed with an error of the worn volume, or of their states, above `rtol`."""
+        inexact = self.dataset["outcome"].values != CONVERGED
+        return np.asarray(self.computed & (inexact | (self.errors > self.rtol)))
+
+    @cached_property
+    def worn(self) -> NDArray[np.float64]:
+        """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
+        worn = self.read("worn_volume").isel(cycle=-1).fillna(self.read("worn_volume").max("cycle"))
+        return np.asarray(worn.transpose(*self.axes).values, dtype=float)
+
+    def ended(self, word: str) -> NDArray[np.bool_]:
+        """Which points have the outcome of this word; in the shape of the axes."""
+        numbers = [number for number, ending in self.endings.items() if ending.word == word]
+        return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
@@ -131,10 +183,11 @@ class Result:
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
 
     def read(self, name: str) -> xr.DataArray:
-        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where the point failed."""
+        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
         values = self.dataset[name]
         if values.dtype.kind in "iu" and "cycle" in values.dims:
-            return values.where(self.dataset["outcome"] == CONVERGED)
+            last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
+            return values.where(self.dataset["cycle"] <= last)
         return values
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
@@ -153,10 +206,10 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to tolerance the one of the largest final worn volume; where nothing is worn, or the
-        file does not hold it, the one of the largest response at the first cycle count kept; else the first point that
-        was computed; else the first. Explicit and oscillating histories, which wear too much, only count where there is
-        no other.
+        Among the points computed to the last cycle the one of the largest final worn volume; where nothing is worn, or
+        the file does not hold it, the one of the largest response at the first cycle count kept; else the first point
+        that was computed; else the first. Explicit, oscillating and sensitive histories, which wear too much, only
+        count where there is no other; those that ended early only where none was computed to the end.
         """
         return dict(self._shown)
 
@@ -164,14 +217,15 @@ class Result:
     def _shown(self) -> dict[str, int]:
         candidates = []
         if self.has("worn_volume"):
-            candidates.append(self.read("worn_volume").isel(cycle=-1).values)
+            candidates.append(self.worn)
         if self.has("response_amplitude"):
             amplitude = self.read("response_amplitude").isel(cycle=0)
             candidates.append(amplitude.max("response", skipna=False).values)
-        candidates.append(np.ones(self.converged.shape))
-        trusted = self.converged & self._trusted
+        candidates.append(np.ones(self.computed.shape))
+        usable = self.computed if self.computed.any() else self.held
+        trusted = usable & self._trusted
         for measure in candidates:
-            known = np.where((trusted if trusted.any() else self.converged) & np.isfinite(measure), measure, 0.0)
+            known = np.where((trusted if trusted.any() else usable) & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 place = np.unravel_index(int(np.argmax(known)), known.shape)
                 return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
@@ -179,14 +233,14 @@ class Result:
 
     @property
     def _trusted(self) -> NDArray[np.bool_]:
-        """Histories that are neither explicit nor oscillate; in the shape of the axes."""
+        """Histories that are neither explicit nor sensitive and do not oscillate; in the shape of the axes."""
         outcome = self.dataset["outcome"]
         trusted = xr.ones_like(outcome, dtype=bool)
         if "scheme" in outcome.dims:
             trusted = trusted & (self.dataset["scheme"] != "explicit")
         if self.has("oscillates"):
             trusted = trusted & (self.dataset["oscillates"] == 0)
-        found: NDArray[np.bool_] = trusted.transpose(*self.axes).values
+        found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
         return found
 
     @cached_property

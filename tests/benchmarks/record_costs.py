@@ -12,9 +12,9 @@ from __future__ import annotations
 import sys
 import time
 
+from studyrunner.course import start_marches
 from studyrunner.evaluate import build_evaluator
 from studyrunner.results import StartResult
-from studyrunner.run import start_marches
 from studyrunner.scene import build_study_scene, describe_scene
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studyrunner.course import Course
 from studyrunner.dispatch import Assignment, Dispatcher
 from studyrunner.results import MarchResult, StartResult
-from studyrunner.run import Course
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 
 Task = BranchTask | MarchTask
@@ -169,7 +169,7 @@ def replay(
 
 def _history(task: MarchTask) -> MarchResult:
     nan = float("nan")
-    return MarchResult(task.points, 0, {}, nan, nan, 0, 0.0, 0, nan, float("inf"), False)
+    return MarchResult(task.points, 0, {}, nan, nan, 0, 0.0, 0, nan, float("inf"), False, nan, nan)
 
 
 def lognormal(rng: np.random.Generator, spread: float) -> float:

@@ -9,6 +9,7 @@ takes two. Each step is noted in a file, and what was gone on from in another on
 FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
 to the fourth one where "in branch" stands behind.
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
+FAKE_TELLING: seconds between two lines that say how far the run is.
 FAKE_PATIENCE: each branch stops after its first start state until a march from it is done; after this time it raises.
 """
 
@@ -27,7 +28,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner import run, schedule
+from studyrunner import progress, run, schedule
 from studyrunner.cli import main
 from studyrunner.ranks import launcher_rank
 from studyrunner.results import Kept, MarchResult, StartResult
@@ -160,6 +161,8 @@ def wait_until(condition: Callable[[], bool], patience: float) -> None:
 if __name__ == "__main__":
     run.build_evaluator = build_fake
     schedule.SECONDS_TO_PROGRESS = 0.03
+    if "FAKE_TELLING" in os.environ:
+        progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])
     if "FAKE_NOTHING" in os.environ and launcher_rank() == 0:
         samples = [own_memory()]
         threading.Thread(target=watch_memory, args=(samples,), daemon=True).start()

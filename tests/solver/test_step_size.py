@@ -15,9 +15,8 @@ from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.path import Effort
 from solver.response import solve_static_state
-from solver.settings import SolverSettings
+from solver.settings import Scheme, SolverSettings
 from solver.step_size import LARGEST, StepTooLongError, check_step, moved_share
-from solver.trajectory import Scheme
 from tests.solver.models import OMEGA, branch_states, dovetail, random_model
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)

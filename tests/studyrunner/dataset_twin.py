@@ -75,7 +75,7 @@ def build_dataset(
             dataset[name].attrs["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
             dataset[name].attrs["flag_meanings"] = " ".join(entry.flags)
         if name in asked and not entry.dtype.startswith("float"):
-            failed = "0 where the point failed, see outcome."
+            failed = "0 where there is no result, see last_cycle."
             dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
     flags = endings()
     dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from studyrunner.course import start_marches
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.ledger import Ledger
 from studyrunner.records import record_type
 from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.run import start_marches
 from studyrunner.scene import SceneFacts
 from studyrunner.sharing import Index
 from studyrunner.store import Store
@@ -92,6 +92,8 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
         fold_frequency=np.nan,
         step_limit=np.inf,
         oscillates=False,
+        last_cycle=task.cycles[-1],
+        largest_wear_depth=1e-6,
         share=place,
     )
 
@@ -105,11 +107,12 @@ def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
 
 
 def without_values(result: MarchResult, outcome: int) -> MarchResult:
-    """The result as it is where the point failed: NaN, or 0 where the variable is a whole number."""
+    """The result as it is where there is no state: NaN, or 0 where the variable is a whole number."""
     values = {
         name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0) for name, array in result.values.items()
     }
-    return replace(result, outcome=outcome, values=values)
+    nothing = dict.fromkeys(("last_cycle", "error_estimate", "largest_wear_depth"), np.nan)
+    return replace(result, outcome=outcome, values=values, **nothing)
 
 
 def open_ledger(

@@ -46,7 +46,7 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
 
 def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
     """The table of results that come in some at a time."""
-    table = CertificateTable(study)
+    table = CertificateTable(study, FACTS)
     for some in (results[:1], results[1:6], results[6:]):
         kind = record_type(study, FACTS)
         records = np.concatenate([np.empty(0, kind), *(pack(kind, "", result) for result in some)])
@@ -102,7 +102,7 @@ def test_order_of_the_results_does_not_matter() -> None:
 def test_nothing_special() -> None:
     study, results = study_with_results()
     table = table_of(study, results)
-    assert table["worst certificate of"] == "96 points computed to tolerance"
+    assert table["worst certificate of"] == "96 points computed to the last cycle"
     labels = ("folds in the sweeps", "jumps while wearing", "explicit steps too long", "oscillating wear rate")
     for label in (*labels, "unstable states"):
         assert table[label] == "none"
@@ -151,7 +151,7 @@ def test_explicit_steps_beyond_their_limit_are_counted() -> None:
 def test_no_point_was_computed() -> None:
     study, results = study_with_results(("axes.frequency=150", "axes.scheme=implicit"))
     table = table_of(study, [without_values(result, 4) for result in results])
-    assert table["worst certificate of"] == "0 points computed to tolerance"
+    assert table["worst certificate of"] == "0 points computed to the last cycle"
     assert table["scaled residual"] == "none"
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from studyrunner.course import Course
 from studyrunner.results import StartResult
-from studyrunner.run import Course
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, TaskPlan, build_tasks
 from tests.benchmarks.scheduling import SHAPES, replay_shape
@@ -21,22 +21,40 @@ def plan_of() -> TaskPlan:
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     plan = plan_of()
     course = Course(MemoryLedger(plan))
-    spent, expected = course.seconds
-    assert (spent, expected) == (0.0, pytest.approx(plan.cost))
+    assert course.look(()).seconds_left == pytest.approx(plan.cost)
     marches = []
     for branch in plan.branches:
         for started in fake_branch(branch):
             course.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
             marches.extend(course.take(branch, started))
     assert course.n_starts_left == 0
-    for task in marches:
-        course.costs.learn(task.kin, task.cost, 3.0)
+    for number, task in enumerate(marches, start=1):
+        course.costs.learn(task.kin, task.cost, 2.0 * task.cost)
         course.take(task, fake_march(task))
-        spent, expected = course.seconds
-        assert spent <= expected
-    assert course.n_points == plan.n_points
-    n_starts = sum(branch.n_results for branch in plan.branches)
-    assert course.seconds == (pytest.approx(n_starts + 3.0 * len(marches)),) * 2
+        left = 2.0 * sum(march.cost for march in marches[number:])
+        if number > 8:
+            assert course.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
+    assert course.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
+    assert course.look(()).n_done == course.look(()).n_points == plan.n_points
+
+
+def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
+    plan = plan_of()
+    course = Course(MemoryLedger(plan))
+    up, down = plan.branches
+    (march, *_) = course.take(up, next(iter(fake_branch(up))))
+    all_of_it = course.look(()).seconds_left
+    expected = march.cost
+    half = course.look([(march, 1, 0.5 * expected)])
+    assert half.seconds_left == pytest.approx(all_of_it - 0.5 * expected)
+    both = course.look([(march, 1, 0.5 * expected), (down, down.n_results - 2, 0.0)])
+    assert both.seconds_left == pytest.approx(0.5 * half.seconds_left)
+    assert half.running == ("1 Hz implicit",)
+    # a sweep down that has given two states is on the way to the third
+    assert both.running[1] == f"sweep down to {down.frequencies[-3]:.6g} Hz"
+    # what is late is not over at once
+    late = course.look([(march, 1, 1e6)])
+    assert late.seconds_left >= 1e6
 
 
 def test_finished_marches_are_kept_with_their_results() -> None:

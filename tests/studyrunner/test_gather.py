@@ -82,11 +82,15 @@ CONTRACT = {
     "energy_error": (("cycle",), "1"),
     "response_error": (("cycle",), "1"),
     "wear_rate_error": (("cycle",), "1"),
+    "worn_volume_error": (("cycle",), "1"),
+    "wear_depth_error": (("cycle", "contact"), "m"),
     "harmonics_used": (("cycle",), "1"),
     "samples_used": (("cycle",), "1"),
     "stable": (("cycle",), "1"),
     "branch": ((), "1"),
     "fold_frequency": ((), "Hz"),
+    "last_cycle": ((), "1"),
+    "largest_wear_depth": ((), "m"),
     "step_limit": ((), "1"),
     "oscillates": ((), "1"),
     "message": ((), "1"),
@@ -183,13 +187,14 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "crashed",
             "not_computed",
             "period_doubled",
+            "sensitive",
             "step_too_long",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:
                 there = opened[name].values[point]
                 assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
-                assert "0 where the point failed" in opened[name].attrs.get("comment", "") or there.dtype.kind == "f"
+                assert "0 where there is no result" in opened[name].attrs.get("comment", "") or there.dtype.kind == "f"
         assert opened.stable.sum() == opened.stable.size - 3
 
 

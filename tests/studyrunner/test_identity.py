@@ -56,10 +56,7 @@ POINT = (155.0, 10.0, 1e-11, 100.0)
         {"solver__samples": "128"},
         {"solver__tolerance": "1e-9"},
         {"solver__rtol": "1e-3"},
-        {"axes__frequency": "[151, 155, 160]"},
-        {"axes__frequency": "[155, 160]"},
-        {"axes__frequency": "[150, 152, 155, 160]"},
-        {"axes__frequency": "[150, 155, 161]"},
+        {"axes__sweep": "['ramp']"},
         {"scene": "1" * 64},
     ],
     ids=str,
@@ -113,7 +110,10 @@ def test_values_of_a_point_are_in_its_hash(point: tuple[float, ...], changes: di
         {"solver__time_limit": "3"},
         {"study__title": "another"},
         {"axes__frequency": "[160, 150, 155]"},
-        {"axes__frequency": "[150, 155, 158, 160]"},
+        {"axes__frequency": "[155]"},
+        {"axes__frequency": "[151, 155, 160]"},
+        {"axes__frequency": "[150, 152, 155, 158, 160]"},
+        {"axes__frequency": "[100, 155, 900]"},
         {"axes__excitation_amplitude": "[9, 10]"},
         {"axes__wear_coefficient": "[3e-11, 1e-11]"},
         {"axes__step": "[10, 100]"},
@@ -142,19 +142,30 @@ def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
+def test_a_start_state_is_known_by_its_own_frequency(sweep: str) -> None:
+    """Whatever others are asked for, so that another study takes it over."""
+    few, many = (
+        {where[0]: start for where, (start, _) in hashes(axes__sweep=f"['{sweep}']", axes__frequency=text).items()}
+        for text in ("[150, 155]", "[140, 150, 152.5, 155, 190]")
+    )
+    assert len(set(many.values())) == 5
+    assert few == {frequency: many[frequency] for frequency in few}
+
+
 def test_all_points_have_hashes_of_their_own() -> None:
     changes = {
         "axes__excitation_amplitude": "[9, 10]",
         "axes__wear_coefficient": "[0, 1e-12, 1e-11]",
         "axes__step": "[10, 100]",
         "axes__scheme": "['implicit', 'explicit', 'adaptive']",
-        "axes__sweep": "['up', 'down']",
+        "axes__sweep": "['up', 'down', 'ramp']",
         "axes__harmonics": "[3, 5]",
     }
     found = hashes_of_all(**changes)
     assert len({history for _, history in found}) == len(found) > 100
     starts = {start for start, _ in found}
-    assert len(starts) == 3 * 2 * 2 * 2
+    assert len(starts) == 3 * 2 * 3 * 2
 
 
 def test_a_history_that_is_read_from_another_one_is_not_one_of_its_own() -> None:

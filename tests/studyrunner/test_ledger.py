@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studyrunner.course import Course
+from studyrunner.evaluate import COMPLETE
 from studyrunner.ledger import Ledger
 from studyrunner.results import Kept
-from studyrunner.run import Course
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
 from tests.studyrunner.fakes import FACTS, fake_branch, fake_march, open_ledger, without_values
@@ -100,11 +101,12 @@ def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks: int, folder: Path) -
         ("outputs.variables=['worn_volume']", (0, 12)),
         ("axes.sweep=['up']", (0, 0)),
         ("axes.excitation_amplitude=[11]", (6, 12)),
-        # behind the last one of a sweep upwards, in front of a sweep downwards; the largest one sets the penalty
-        ("axes.frequency=[90, 100, 110, 120]", (5, 10)),
-        ("axes.frequency=[100, 110, 115, 120]", (5, 10)),
-        ("axes.frequency=[100, 110, 120, 130]", (8, 16)),
-        ("axes.frequency=[110, 120]", (2, 4)),
+        # a state knows nothing of the other frequencies
+        ("axes.frequency=[90, 100, 110, 120]", (2, 4)),
+        ("axes.frequency=[100, 110, 115, 120]", (2, 4)),
+        ("axes.frequency=[100, 110, 120, 130]", (2, 4)),
+        ("axes.frequency=[110, 120]", (0, 0)),
+        ("axes.sweep=['up', 'ramp']", (3, 6)),
         ("solver.time_limit=100", (0, 0)),
         ("solver.tolerance=1e-9", (6, 12)),
     ],
@@ -124,16 +126,23 @@ def test_points_that_failed_are_tried_again_where_asked_for_only(folder: Path) -
         compute(ledger, failing=frozenset({2, 7}))
     with ledger_of(folder) as ledger:
         assert compute(ledger) == (0, 0)
-        ledger.forget_failed()
+        ledger.forget_failed(COMPLETE)
         assert ledger.n_points_finished == 10
         assert compute(ledger) == (0, 2)
     with ledger_of(folder) as ledger:
-        ledger.forget_failed()
+        ledger.forget_failed(COMPLETE)
         assert compute(ledger) == (0, 0)
 
 
-def test_a_start_state_that_failed_is_tried_again_with_all_behind_it(folder: Path) -> None:
-    """What comes behind it on its branch began without it."""
+def test_points_that_are_not_to_tolerance_have_not_failed(folder: Path) -> None:
+    with ledger_of(folder) as ledger:
+        compute(ledger, failing=frozenset({2, 7}))
+        ledger.forget_failed([*COMPLETE, 4])
+        assert ledger.n_points_finished == 12
+
+
+def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder: Path) -> None:
+    """What comes behind it on its branch does not depend on it."""
     with ledger_of(folder) as ledger:
         down = ledger.plan.branches[1]
         for branch in ledger.plan.branches:
@@ -143,11 +152,11 @@ def test_a_start_state_that_failed_is_tried_again_with_all_behind_it(folder: Pat
         ledger.keep(down, Kept("progress", (np.zeros(1),)))
         compute(ledger)
         assert ledger.n_points_finished == 12
-        ledger.forget_failed()
-        assert ledger.n_points_finished == 8
+        ledger.forget_failed(COMPLETE)
+        assert ledger.n_points_finished == 10
         (left,) = ledger.branches_left()
-        assert (left.number, left.known, left.resume) == (1, frozenset({2}), None)
-        assert compute(ledger) == (2, 4)
+        assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
+        assert compute(ledger) == (1, 2)
 
 
 def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
@@ -167,7 +176,7 @@ def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
     with ledger_of(folder) as ledger:
         n_marches = compute(ledger)[1]
         assert n_marches == 12 - n_before - 1
-        ledger.forget_failed()
+        ledger.forget_failed(COMPLETE)
         assert compute(ledger) == (0, 1)
 
 

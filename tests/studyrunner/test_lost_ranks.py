@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studyrunner.course import Course
 from studyrunner.crashes import Crash
 from studyrunner.evaluate import CRASHED
 from studyrunner.ledger import Ledger
 from studyrunner.results import Kept
-from studyrunner.run import Course
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
 from tests.studyrunner.fakes import fake_branch, fake_march, open_ledger

@@ -5,18 +5,20 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from solver.history import WearHistory
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.evaluate import _solver_settings, build_result
-from studyrunner.progress import RunProgress, format_seconds
+from studyrunner.progress import format_seconds
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.study_file import read_study
@@ -53,7 +55,8 @@ def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     use_fake(monkeypatch, lambda _, result: result)
     assert main(SMALL) == 0
     first, *table = capsys.readouterr().out.splitlines()
-    assert first.startswith("out.nc: 3 points, 3 computed to tolerance, 0 failed, ")
+    assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
+    assert table[0].split(maxsplit=2) == ["worn", "volume", "3 of 3 points within rtol = 1 %; worst 1 % at 100 Hz"]
     with xr.open_dataset("out.nc") as result:
         assert table == result.attrs["certificate_summary"].splitlines()
 
@@ -64,13 +67,41 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 
     use_fake(monkeypatch, fail_one)
     assert main(SMALL) == 3
-    first, second, third, *_ = capsys.readouterr().out.splitlines()
-    assert "2 computed to tolerance, 1 failed" in first
-    assert second.strip() == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
-    assert third.endswith(" 2 points computed to tolerance")
+    first, volume, *_, outcome, point = capsys.readouterr().out.splitlines()
+    assert "2 computed, 1 failed" in first
+    assert "2 of 3 points within rtol = 1 %, 1 without one at the last cycle" in volume
+    assert outcome == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    assert point == "  110 Hz: no state was found"
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
         assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("outcome", [Outcome.INACCURATE, Outcome.SENSITIVE])
+def test_points_above_rtol_are_computed_points(
+    outcome: Outcome, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit status 0; their values are kept, and they are named with what there is to say of them."""
+    message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
+
+    def above(task: MarchTask, result: MarchResult) -> MarchResult:
+        if task.position != 1:
+            return result
+        return replace(result, outcome=int(outcome), error_estimate=0.15, message=message)
+
+    use_fake(monkeypatch, above)
+    assert main(SMALL) == 0
+    first, volume, *_, head, point = capsys.readouterr().out.splitlines()
+    assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
+    remedy = 'scheme = "adaptive" or a smaller step'
+    assert volume.endswith(f"2 of 3 points within rtol = 1 %, 1 above it; worst 15 % at 110 Hz: {remedy}")
+    assert head == f"1 x {outcome.meaning}: {outcome.sentence}"
+    assert point == f"  110 Hz: {message}"
+    with xr.open_dataset("out.nc") as result:
+        there = result.sel(frequency=110.0).squeeze()
+        assert there.worn_volume.notnull().all()
+        assert there.outcome == int(outcome)
+        assert there.message.item() == message
 
 
 def test_unexpected_failure_keeps_the_old_file(
@@ -138,14 +169,55 @@ def test_unworn_certificates_hold_for_all_cycles() -> None:
     assert result.values["stable"].tolist() == [True, True, True]
 
 
-def test_a_point_that_failed_holds_no_numbers_whatever_the_solver_got_to() -> None:
-    failed = history([0.0, 1e5], Outcome.CERTIFICATE_FAILED)
-    result = build_result(march_task("slow_time.outputs=2"), failed)
-    assert result.outcome == 7
+def ended_at(last: float, at: WearHistory, outcome: Outcome = Outcome.CERTIFICATE_FAILED) -> WearHistory:
+    """The history as it is where the march has ended there."""
+    behind = at.cycles > last
+    changed = {}
+    for name, values in vars(at).items():
+        if isinstance(values, np.ndarray) and name != "cycles":
+            cut = values.copy()
+            cut[behind] = np.nan if values.dtype.kind in "fc" else 0
+            changed[name] = cut
+    return replace(at, outcome=outcome, last_cycle=last, error_estimate=0.03, **changed)
+
+
+def test_what_was_computed_of_a_point_that_failed_is_kept() -> None:
+    failed = ended_at(50.0, history([0.0, 40.0, 80.0, 1e5]))
+    result = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), failed)
+    assert (result.outcome, result.last_cycle, result.error_estimate) == (7, 50.0, 0.03)
+    for name, values in result.values.items():
+        if name != "wear_rate_error":
+            there = np.isfinite(values) if ASKED[name].dtype == "float64" else values != 0
+            assert there[:2].all() or name == "stable", name
+            assert not there[2:].any(), name
+    assert result.values["worn_volume"][:2].tolist() == [0.0, 1.0]
+    assert result.largest_wear_depth == 1.0
+    assert (result.branch, result.fold_frequency, result.newton_iterations) == (2, 101.5, 7)
+    assert result.message == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
+
+
+def test_a_point_without_a_state_holds_no_numbers() -> None:
+    nothing = ended_at(-1.0, history([0.0, 1e5]), Outcome.START_FAILED)
+    result = build_result(march_task("slow_time.outputs=2"), replace(nothing, last_cycle=np.nan))
+    assert result.outcome == 2
+    assert np.isnan([result.last_cycle, result.error_estimate, result.largest_wear_depth]).all()
     for name, values in result.values.items():
         empty = np.isnan(values) if ASKED[name].dtype == "float64" else values == 0
         assert empty.all(), name
-    assert (result.branch, result.fold_frequency, result.newton_iterations) == (2, 101.5, 7)
+    assert result.message == ""
+
+
+def test_states_above_rtol_are_kept_and_the_message_says_from_when_on_and_how_far() -> None:
+    above = np.array([0.001, 0.02, 0.026, 0.002])
+    found = replace(
+        history([0.0, 40.0, 80.0, 20000.0], Outcome.INACCURATE), wear_rate_error=above, response_error=0.5 * above
+    )
+    result = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), found)
+    assert result.values["worn_volume"].tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert (result.outcome, result.last_cycle) == (6, 20000.0)
+    assert result.message == "from cycle 40 on the wear rate is known to 2.6 % only"
+    said = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), replace(found, message="what it says"))
+    assert said.message == "what it says"
 
 
 def test_loops_are_read_at_the_counts_of_a_point() -> None:
@@ -155,8 +227,9 @@ def test_loops_are_read_at_the_counts_of_a_point() -> None:
     result = build_result(task, history([0.0, 10.0, 20.0], loops=loops))
     assert np.array_equal(result.values["loop_displacement"], loops[1:])
     assert np.array_equal(result.values["loop_force"], -loops[1:])
-    failed = build_result(task, history([0.0, 10.0, 20.0], Outcome.MARCH_FAILED, loops))
-    assert np.isnan(failed.values["loop_force"]).all()
+    failed = build_result(task, ended_at(10.0, history([0.0, 10.0, 20.0], loops=loops)))
+    assert np.array_equal(failed.values["loop_force"][0], -loops[1])
+    assert np.isnan(failed.values["loop_force"][1]).all()
     held = march_task("slow_time.outputs=[10, 20]", "outputs.loops=[0]", "axes.wear_coefficient=0")
     at_rest = build_result(held, history([0.0], loops=loops[:1]))
     assert np.array_equal(at_rest.values["loop_force"], -loops[[0, 0]])
@@ -172,23 +245,6 @@ def test_response_is_amplitude_and_phase() -> None:
     assert result.values["response_amplitude"].tolist() == [[1.0], [2.0]]
     assert np.allclose(result.values["response_phase"], np.pi / 2)
     assert (result.newton_iterations, result.run_time) == (7, 0.5)
-
-
-def test_plain_lines_come_less_and_less_often(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = 0.0
-    monkeypatch.setattr("studyrunner.progress.time.monotonic", lambda: now)
-    with RunProgress() as progress:
-        progress.say("marching")
-        progress.report(25.0, 100.0, 5, 20)
-        for second in range(1, 1000):
-            now = float(second)
-            progress.tick()
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "[    0 s] marching"
-    assert lines[1] == "[    2 s] marching: 5 of 20 points, about 6 s left"
-    assert 15 < len(lines) < 30
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(3.4, "3 s"), (90.0, "1.5 min"), (7200.0, "2.0 h")])

@@ -171,9 +171,9 @@ ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive
 COUNTS = [0.0, 2.0, 4.0, 5.0, 10.0]
 
 
-def shared_task() -> MarchTask:
+def shared_task(*overrides: str) -> MarchTask:
     """A march of three histories at cycles 0 and 10, which are read at 0, 10; 0, 4; 0, 2 cycles of the first."""
-    study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2")
+    study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2", *overrides)
     ((task,),) = build_tasks(study, 2).marches
     start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
     packed = pack(start)
@@ -203,9 +203,72 @@ def test_a_share_does_not_know_of_jumps_after_its_last_count(jump: float, expect
 
 def test_the_error_of_a_share_is_that_at_its_own_end() -> None:
     found = [build_result(shared_task(), history(COUNTS), place).error_estimate for place in range(3)]
-    np.testing.assert_allclose(found, [0.0, 0.3 * 2.0 / 2.0, 0.3 * 1.0 / 1.0])
-    at_rest = replace(history(COUNTS), worn_volume=np.array([0.0, 0.0, 0.0, 0.0, 1.0]))
-    assert build_result(shared_task(), at_rest, 2).error_estimate == 0.0
+    np.testing.assert_allclose(found, [0.12, 0.06, 0.03])
+
+
+@pytest.mark.parametrize(
+    ("last", "outcomes", "lasts"),
+    [
+        (10.0, [4, 0, 0], [10.0, 10.0, 10.0]),
+        (9.0, [4, 0, 0], [9.0, 10.0, 10.0]),
+        (4.0, [4, 0, 0], [4.0, 10.0, 10.0]),
+        (3.0, [4, 4, 0], [3.0, 7.5, 10.0]),
+        (1.5, [4, 4, 4], [1.5, 3.75, 7.5]),
+    ],
+)
+def test_shares_of_a_march_that_ended_early_are_shares_all_the_same(
+    last: float, outcomes: list[int], lasts: list[float]
+) -> None:
+    """Cycles 0 and 10 of the shares are 0, 10; 0, 4; 0, 2 cycles of the march."""
+    ended = replace(history(COUNTS, Outcome.MARCH_FAILED), last_cycle=last, message="at cycle 9")
+    found = [build_result(shared_task(), ended, place) for place in range(3)]
+    assert [result.outcome for result in found] == outcomes
+    np.testing.assert_allclose([result.last_cycle for result in found], lasts)
+    for place, result in enumerate(found):
+        there = np.isfinite(result.values["worn_volume"]).tolist()
+        assert there == [True, last >= shared_task().counts(shared_task().shares[place])[-1]]
+        assert result.error_estimate == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
+    # the message of the march counts its own cycles
+    assert found[0].message == "at cycle 9"
+    assert all(result.message == "" for result in found if result.outcome == 0)
+    assert all("at cycle 9" not in result.message for result in found[1:])
+
+
+@pytest.mark.parametrize(
+    ("above", "ended", "harmonics", "expected"),
+    [
+        ([False, False, False, False, False], Outcome.INACCURATE, "auto", [6, 0, 0]),
+        ([False, False, False, False, True], Outcome.INACCURATE, "auto", [6, 0, 0]),
+        ([False, False, True, False, False], Outcome.INACCURATE, "auto", [6, 6, 0]),
+        ([True, False, False, False, False], Outcome.INACCURATE, "auto", [6, 6, 6]),
+        ([False, True, False, False, False], Outcome.MARCH_FAILED, "auto", [4, 0, 6]),
+        ([True, True, True, True, True], Outcome.CONVERGED, "auto", [0, 0, 0]),
+        ([True, True, True, True, True], Outcome.MARCH_FAILED, "3", [4, 0, 0]),
+    ],
+)
+def test_a_share_is_above_rtol_by_its_own_states(
+    above: list[bool], ended: Outcome, harmonics: str, expected: list[int]
+) -> None:
+    rates = np.where(above, 0.02, 0.005)
+    found = replace(history(COUNTS, ended), wear_rate_error=rates, response_error=np.full(5, np.nan))
+    task = shared_task(f"solver.harmonics={harmonics}", "solver.samples=64")
+    assert [build_result(task, found, place).outcome for place in range(3)] == expected
+
+
+def test_a_share_says_from_which_of_its_own_cycles_on() -> None:
+    rates = np.array([0.005, 0.005, 0.04, 0.04, 0.03])
+    found = replace(history(COUNTS, Outcome.INACCURATE), wear_rate_error=rates, message="of the march")
+    messages = [build_result(shared_task(), found, place).message for place in range(3)]
+    # 4 cycles of the march are 10 of the share
+    assert messages == ["of the march", "from cycle 10 on the wear rate is known to 4 % only", ""]
+
+
+def test_a_share_is_sensitive_by_its_own_last_count() -> None:
+    errors = np.array([0.0, 0.2, 0.7, 0.4, 0.9])
+    found = replace(history(COUNTS, Outcome.SENSITIVE), worn_volume_error=errors, message="of the march")
+    results = [build_result(shared_task(), found, place) for place in range(3)]
+    assert [result.outcome for result in results] == [15, 15, 0]
+    assert [result.message for result in results] == ["of the march", "the worn volume is known to 70 % only", ""]
 
 
 def marched(
@@ -234,24 +297,22 @@ def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [result.values["worn_volume"][-1] for result in found] == [3.0, 2.0, 1.0]
 
 
-def fail_late(at: WearHistory, wear: float) -> WearHistory:
-    outcome = Outcome.CONVERGED if wear < 1e-11 else Outcome.MARCH_FAILED
-    return replace(at, outcome=outcome, oscillates=False)
+def test_a_march_that_fails_is_not_done_again_for_its_shares(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail_late(at: WearHistory, wear: float) -> WearHistory:
+        return replace(at, outcome=Outcome.MARCH_FAILED, last_cycle=3.0, oscillates=False)
+
+    found, calls = marched(monkeypatch, fail_late)
+    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
+    assert [result.outcome for result in found] == [4, 4, 0]
 
 
-def oscillate_late(at: WearHistory, wear: float) -> WearHistory:
-    return replace(at, oscillates=wear >= 1e-11)
+def test_what_oscillates_late_does_not_where_it_ends_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    def oscillate_late(at: WearHistory, wear: float) -> WearHistory:
+        return replace(at, oscillates=wear >= 1e-11)
 
-
-@pytest.mark.parametrize("change", [fail_late, oscillate_late])
-def test_what_happens_late_does_not_happen_to_those_that_end_before(
-    change: Callable[[WearHistory, float], WearHistory], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found, calls = marched(monkeypatch, change)
+    found, calls = marched(monkeypatch, oscillate_late)
     assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0]), (4e-12, [0.0, 10.0]), (2e-12, [0.0, 10.0])]
-    last = change(history([0.0]), 1e-11)
-    assert [result.outcome for result in found] == [int(last.outcome), 0, 0]
-    assert [result.oscillates for result in found] == [last.oscillates, False, False]
+    assert [result.oscillates for result in found] == [True, False, False]
     assert [result.share for result in found] == [0, 1, 2]
     for result in found[1:]:
         assert result.values["worn_volume"].tolist() == result.values["wear_rate"].tolist() == [0.0, 1.0]

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import pytest
 
 from studyrunner.cli import main
+from studyrunner.course import start_marches
 from studyrunner.estimate import AUTOMATIC_HARMONICS
 from studyrunner.results import StartResult
-from studyrunner.run import start_marches
 from studyrunner.study import Study
 from studyrunner.study_file import read_study
 from studyrunner.tasks import Settings, TaskPlan, build_tasks
@@ -51,9 +51,36 @@ def test_one_branch_a_line_of_frequencies() -> None:
     assert_every_point_once(study, plan)
 
 
+def test_a_ramp_is_a_task_at_each_frequency() -> None:
+    """Nothing is serial in it: as many branches as points, and the marches of each from its only state."""
+    study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
+    ramps = [branch for branch in plan.branches if branch.sweep == "ramp"]
+    assert [branch.frequencies for branch in ramps] == [(150.0,), (155.0,), (160.0,)]
+    assert [branch.frequencies for branch in plan.branches if branch.sweep == "up"] == [(150.0, 155.0, 160.0)]
+    assert [branch.number for branch in plan.branches] == list(range(4))
+    assert sum(branch.cost for branch in ramps) > plan.branches[-1].cost
+    for branch in ramps:
+        assert branch.order == branch.order_left == (0,)
+        assert plan.marches[branch.number] == plan.marches_from(branch.number, 0) != ()
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - sum(len(line) for line in plan.marches)
+    assert_every_point_once(study, plan)
+
+
+@pytest.mark.parametrize(
+    ("sweeps", "said"),
+    [
+        ("['ramp']", "6: 3 ramps of the excitation, then 3 wear histories"),
+        ("['up', 'ramp']", "10: 1 branch along the frequency and 3 ramps of the excitation, then 6 wear histories"),
+    ],
+)
+def test_the_plan_tells_ramps_from_branches(sweeps: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    overrides = ["axes.frequency=[1, 2, 3]", "axes.scheme=implicit", f"axes.sweep={sweeps}"]
+    assert printed_plan(overrides, capsys)["tasks"] == said
+
+
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
-    study, plan = plan_of(*GRID, *SHARED)
+    study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
     assert any(len(task.shares) > 1 for task in plan.marches[0])
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         for task in line:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,15 @@ from studyrunner.report.result import Result
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
-WORDS = ("not_computed", "converged", "static_failed", "branch_lost")
-SENTENCES = ("It was not reached.", "It was computed.", "The static state failed.", "The branch was lost.")
+WORDS = ("not_computed", "converged", "static_failed", "branch_lost", "inaccurate", "sensitive")
+SENTENCES = (
+    "It was not reached.",
+    "It was computed.",
+    "The static state failed.",
+    "The branch was lost.",
+    "Above.",
+    "Two.",
+)
 
 SUMMARY = """worst certificate of              3 points computed to tolerance
   scaled residual                 1.0e-08 at frequency 2 Hz
@@ -72,6 +79,8 @@ def make_result(
         "energy_error": 3e-4 * (1.0 + peak[..., None] * np.ones(len(cycles))),
         "stable": np.ones((*shape, len(cycles)), dtype=np.int8),
         "error_estimate": 0.02 * peak,
+        "worn_volume_error": 0.02 * peak[..., None] * share,
+        "last_cycle": np.full(shape, float(cycles[-1])),
         "jump_cycle": np.full(shape, math.nan),
         "fold_frequency": np.full(shape, math.nan),
         "step_limit": np.full(shape, 5000.0),
@@ -91,7 +100,7 @@ def make_result(
         if name not in without
     }
     flags = {
-        "flag_values": np.array([-1, 0, 1, 3], dtype=np.int8),
+        "flag_values": np.array([-1, 0, 1, 3, 6, 15], dtype=np.int8),
         "flag_meanings": " ".join(WORDS),
         "sentences": "\n".join(SENTENCES),
     }
@@ -107,6 +116,25 @@ def make_result(
 def with_variables(result: Result, **variables: xr.DataArray) -> Result:
     """The same file with further variables, or others in their place."""
     return Result(result.path, result.dataset.assign(variables))
+
+
+def with_endings(result: Result, endings: Mapping[int, tuple[int, float]], messages: Mapping[int, str]) -> Result:
+    """The same file with other endings of points, by flat index: outcome, and the cycle count that they came to."""
+    dataset = result.dataset.copy(deep=True)
+    texts = np.full(dataset["outcome"].shape, "", dtype=object)
+    for flat, text in messages.items():
+        texts.flat[flat] = text
+    dataset["message"] = (AXES, texts)
+    for flat, (outcome, last) in endings.items():
+        place = np.unravel_index(flat, dataset["outcome"].shape)
+        dataset["outcome"].values[place] = outcome
+        dataset["last_cycle"].values[place] = last
+        for values in dataset.data_vars.values():
+            if "cycle" in values.dims:
+                behind = dataset["cycle"].values > last
+                cut = values.values[place]
+                cut[behind] = math.nan if values.dtype.kind == "f" else 0
+    return Result(result.path, dataset)
 
 
 def with_surfaces(result: Result, number: int) -> Result:

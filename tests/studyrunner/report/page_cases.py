@@ -58,7 +58,9 @@ def build_file(
     for name, entry in {**{name: ASKED[name] for name in variables}, **KEPT}.items():
         size = shape + tuple(sizes[dimension] for dimension in entry.dimensions)
         values = random.uniform(0.1, 1.0, size) * 1e-6 if entry.dtype == "float64" else random.integers(1, 2, size)
-        values[bad] = np.nan if entry.dtype == "float64" else 0
+        values = np.full(size, "") if entry.is_text else values
+        values = np.full(size, float(cycles[-1])) if name == "last_cycle" else values
+        values[bad] = np.nan if entry.dtype == "float64" else "" if entry.is_text else 0
         data[name] = ((*axes, *entry.dimensions), values.astype(entry.dtype), {"units": entry.units, "long_name": name})
     outcome = np.where(bad, FAILED, 0).astype(np.int8)
     flags = {"flag_values": np.arange(5, dtype=np.int8), "flag_meanings": "converged one two three march_failed"}

@@ -283,6 +283,39 @@ def test_a_failed_point_is_picked_and_says_why(page: Any, dataset: xr.Dataset) -
     assert_maps_are(page, dataset, "mean_pressure", FAILED + 4, 4)
 
 
+def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser: Any, tmp_path: Path) -> None:
+    """With the band of its error, and with a cross on the response where it has no value."""
+    dataset = build_file(cycles=(0.0, 100.0, 200.0, 300.0, 400.0))
+    early = int(shown_point(dataset))
+    place = np.unravel_index(early, dataset["outcome"].shape)
+    dataset["outcome"].values[place], dataset["last_cycle"].values[place] = 4, 250.0
+    dataset["message"].values[place] = "it ended at cycle 250"
+    dataset["worn_volume_error"].values[place] = 0.25
+    for values in dataset.data_vars.values():
+        if "cycle" in values.dims and values.dtype.kind == "f":
+            values.values[place][3:] = np.nan
+    load(browser, write(dataset, tmp_path))
+    for name, index in zip(dataset["outcome"].dims, place, strict=True):
+        if dataset.sizes[name] > 1:
+            choose(browser, f"axis {str(name).replace('_', ' ')}", int(index))
+    assert selected(browser).endswith(f"{SENTENCES[4]} it ended at cycle 250")
+    script = "return document.getElementById('{}').data.map(({{meta, x, y}}) => [meta, x, y])"
+    course = {meta: (x, y) for meta, x, y in browser.execute_script(script.format("course-plot"))}
+    x, y = course["worn_volume_error"]
+    assert x == [0.0, 100.0, 200.0, 200.0, 100.0, 0.0]
+    worn = np.array(course["worn_volume"][1][:3])
+    np.testing.assert_allclose(y, [*(1.25 * worn), *(0.75 * worn)[::-1]], rtol=1e-6)
+    (crosses,) = [x for meta, x, _ in browser.execute_script(script.format("response-plot")) if meta == "failed"]
+    assert crosses == [dataset["frequency"].values[place[0]]]
+    assert map_values(browser) == []
+    from selenium.webdriver.common.keys import Keys
+
+    press(browser, Keys.HOME)
+    assert map_values(browser) != []
+    assert not [meta for meta, *_ in browser.execute_script(script.format("response-plot")) if meta == "failed"]
+    assert browser.get_log("browser") == []
+
+
 def test_the_lists_pick_points_variables_and_responses(page: Any, dataset: xr.Dataset) -> None:
     index = (2, 1, 0, 0, 1, 0)
     for name, place in zip(("frequency", "wear coefficient", "scheme"), (2, 1, 1), strict=True):

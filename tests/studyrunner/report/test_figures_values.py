@@ -22,7 +22,7 @@ def test_worn_volume_over_cycles() -> None:
         np.testing.assert_allclose(y, 1e9 * values_of(result, "worn_volume", frequency=2, scheme=number))
     assert "at 202 Hz" in drawing.caption
     last = 1e9 * float(values_of(result, "worn_volume", frequency=2, scheme=1)[-1])
-    assert f"{last:.4g} mm³ (explicit scheme)" in drawing.caption
+    assert f"{last:.4g} mm³ ± 2 %, above rtol (explicit scheme)" in drawing.caption
 
 
 def test_a_lost_branch_is_marked_on_the_history() -> None:
@@ -165,7 +165,10 @@ def test_table_of_outcomes() -> None:
         ("3", "branch lost", "2", "The branch was lost."),
     ]
     assert table.rows[1][4] == "201 Hz, implicit scheme"
-    assert table.note.startswith("2 of 8 points")
+    assert table.note.startswith(
+        "The worn volume of 2 of 8 points is known within rtol = 1 %, of 4 less well; the worst"
+    )
+    assert "8 points, 6 computed to the last cycle, 2 without a result." in table.note
 
 
 def test_table_of_certificates_is_that_of_the_file() -> None:

@@ -135,7 +135,7 @@ def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps() -> 
     assert 0 < len(points) < n_good
     assert sorted(points) == sorted(np.argsort(-worn)[: len(points)].tolist())
     assert len(content["maps"]["cycles"]) == 11
-    assert any(f"the {len(points)} most worn of {n_good} converged points" in note for note in few.notes)
+    assert any(f"the {len(points)} most worn of {n_good} points" in note for note in few.notes)
 
 
 def test_cycles_of_points_are_thinned_out_last() -> None:
@@ -213,7 +213,7 @@ def test_missing_variables_are_left_out() -> None:
 
 def test_the_shown_point_is_picked_at_first() -> None:
     result = result_of(build_file())
-    found = np.unravel_index(content_of(build_page_data(result, PLENTY))["shown"], result.converged.shape)
+    found = np.unravel_index(content_of(build_page_data(result, PLENTY))["shown"], result.computed.shape)
     assert dict(zip(result.axes, map(int, found), strict=True)) == result.shown_point()
 
 

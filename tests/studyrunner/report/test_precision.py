@@ -133,7 +133,7 @@ def test_smallest_rtol_of_the_adaptive_scheme_is_the_reference() -> None:
 def test_automatic_harmonics_use_rtol_and_rank_by_what_they_took() -> None:
     axes = {"harmonics": ["1", "auto"], "rtol": [0.1, 0.01], "step": STEPS}
     result = synthetic(axes, lambda point: 0.0 if point["harmonics"] == "auto" else 0.1, lambda _: 1.0)
-    used = np.full((*result.converged.shape, 3), 1)
+    used = np.full((*result.computed.shape, 3), 1)
     used[:, :, :, :, 1] = 7
     result.dataset["harmonics_used"] = ((*result.axes, "cycle"), used)
     result.dataset.attrs["study"] = "[solver]\nsamples = 64\n"

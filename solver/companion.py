@@ -1,0 +1,174 @@
+"""What a wear history is wrong by: a second, coarser history beside it.
+
+The companion starts from the state that the coarser sweep has come to and takes one step where the history takes two.
+Both are the same computation of the same case, so that whatever makes an error grow on the way - pairs that stick
+again, a resonance that passes, a branch that ends - makes their difference grow as well. That is what the sum of local
+errors does not see. Euler steps are of first order: those of twice the length are wrong by twice as much, and the
+difference is the error. Steps of second order are wrong by four times as much; where the wear rate has corners they
+are of first order, so that the difference is taken as it is.
+
+Explicit steps beyond what is stable for some pairs ratchet: with twice the length they may go the same wrong way. Their
+companion takes implicit steps, whose error has the other sign.
+
+The difference is that of the depths of all pairs, each by its magnitude: where the volumes of two histories cross their
+profiles still differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from solver.adaptive import AdaptiveSteps
+from solver.history import StartState
+from solver.joint import Case
+from solver.ladder import fewer
+from solver.linear import JacobianSolver
+from solver.model import FloatArray
+from solver.path import PathPoint
+from solver.record import depth_within
+from solver.settings import Scheme, SolverSettings
+from solver.sweep import move_point
+from solver.trajectory import Trajectory
+
+MOST_PARTS = 40
+"""Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
+
+COSTLY, LIGHT = 2500, 1600
+"""Unknowns from which the companion takes fewer harmonics than the history, and how many it has then at most: what
+these miss is in the difference, too."""
+
+AUTOMATIC = SolverSettings()
+
+_CARRIED = ("kept", "offset", "waiting", "followed")
+
+
+class Companion:
+    """The coarser history.
+
+    kept (n_output, n_contact): its depths at the counts asked for, m, NaN where it has not come to. offset
+    (n_contact,): m, difference of the depths at the last count at which it had to begin anew from the history itself.
+    waiting: steps of the history that it has still to follow. followed: harmonics and samples of the history for which
+    its own were chosen.
+    """
+
+    def __init__(self, main: Trajectory, start: StartState, cycles: FloatArray) -> None:
+        self.main = main
+        coarse = replace(start, state=start.coarse or start.state)
+        scheme: Scheme = "implicit" if main.scheme == "explicit" else main.scheme
+        self.way = Trajectory(main.case, coarse, main.wear_coefficient, scheme)
+        self.way.effort = main.effort
+        self.cycles = cycles
+        self.kept = np.full((cycles.size, main.still.size), np.nan)
+        self.offset = np.zeros_like(main.still)
+        self.waiting = 0
+        self.followed = main.case.resolution
+        self.steps: AdaptiveSteps | None = None
+
+    def begin(self) -> None:
+        """Take up its start state, behind that of the history."""
+        # the limit of its steps is that of the history
+        self.way.step_limit = self.main.step_limit
+        self.way.take_start()
+        self.kept[self.cycles == 0.0] = self.way.point.evaluation.wear_depth
+        if self.main.scheme == "adaptive":
+            self.steps = AdaptiveSteps(self.way, 1.0)
+        if self.main.case.resolution != self.way.case.resolution and not self._take_case():
+            self._begin_anew()
+
+    def carried(self) -> dict[str, Any]:
+        """What goes on from step to step, to be packed."""
+        own = {name: getattr(self, name) for name in _CARRIED}
+        return own | {"way": self.way.carried(), "steps": None if self.steps is None else self.steps.carried()}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has carried so far."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
+        self.way.take_up(carried["way"])
+        if self.main.scheme == "adaptive":
+            self.steps = AdaptiveSteps(self.way, 1.0)
+            self.steps.take_up(carried["steps"])
+
+    def follow(self, at_once: bool = False) -> None:
+        """The history has taken a step. at_once: it is not known whether another one follows."""
+        self.waiting += 1
+        if self.waiting < 2 and not at_once:
+            return
+        self.waiting = 0
+        if self.main.case.resolution != self.followed and not self._take_case():
+            self._begin_anew()
+            return
+        for _ in range(MOST_PARTS):
+            if self.way.cycle >= self.main.cycle * (1.0 - 1e-12):
+                return
+            if not self._step():
+                break
+        self._begin_anew()
+
+    def _step(self) -> bool:
+        """One step to the count of the history, or as far as its branch goes and behind its end."""
+        way = self.way
+        length = self.main.cycle - way.cycle
+        before = self._now()
+        if self.steps is not None and self.steps.follow(length):
+            self._keep(*before)
+            return True
+        arrived = way.advance(way.cycle + length)
+        self._keep(*before)
+        if self.steps is not None:
+            self.steps.restart()
+        if arrived:
+            return True
+        before = self._now()
+        landed = way.jump(length)
+        self._keep(*before)
+        return landed
+
+    def _now(self) -> tuple[float, FloatArray, FloatArray]:
+        return self.way.cycle, self.way.point.evaluation.wear_depth, self.way.rate()
+
+    def _keep(self, cycle: float, depth: FloatArray, rate: FloatArray) -> None:
+        """Depths at the counts of a step that began with these."""
+        way = self.way
+        wanted = (self.cycles > cycle) & (self.cycles <= way.cycle)
+        ends = (depth, rate), (way.point.evaluation.wear_depth, way.rate())
+        fraction = (self.cycles[wanted] - cycle) / max(way.cycle - cycle, 1e-300)
+        self.kept[wanted] = self.offset + depth_within(fraction, way.cycle - cycle, *ends, self.steps is not None)
+
+    def _take_case(self) -> bool:
+        """Go on with the harmonics and samples of the history, or with fewer where these are many; False where no
+        state is found with them.
+        """
+        way, main = self.way, self.main
+        resolution, n_rel = main.case.resolution, main.joint.slots.size
+        if n_rel * (2 * len(resolution.orders) + 1) > COSTLY:
+            while n_rel * (2 * len(resolution.orders) + 1) > LIGHT and resolution.highest > 1:
+                resolution = fewer(resolution, AUTOMATIC)
+        self.followed = main.case.resolution
+        case = main.case.at(resolution)
+        return self._move(way.case, case, way.point)
+
+    def _move(self, old: Case, case: Case, point: PathPoint) -> bool:
+        """Take up a state of another case with the harmonics and samples of this one."""
+        way = self.way
+        joint = case.joint(self.main.joint.omega, self.main.joint.excitation_amplitude)
+        moved = point if old is case else move_point(old, case, joint, point, way.effort)
+        if moved is not None:
+            way.case, way.joint, way.solver, way.last_change = case, joint, JacobianSolver(), None
+            way.point = moved
+        return moved is not None
+
+    def _begin_anew(self) -> None:
+        """Go on from the state of the history, with the difference that there is."""
+        way, main = self.way, self.main
+        wanted = (self.cycles > way.cycle) & (self.cycles <= main.cycle)
+        self.offset = self.offset + way.point.evaluation.wear_depth - main.point.evaluation.wear_depth
+        if not self._move(main.case, way.case, main.point):
+            self._move(main.case, main.case, main.point)
+        way.last_change, way.cycle = None, main.cycle
+        self.kept[wanted] = main.point.evaluation.wear_depth + self.offset
+        if self.steps is not None:
+            self.steps.restart()

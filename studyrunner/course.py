@@ -1,0 +1,147 @@
+"""How far the tasks of a study are, and what their results make possible."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from studyrunner.costs import LearnedCosts
+from studyrunner.crashes import Crash
+from studyrunner.evaluate import CRASHED
+from studyrunner.ledger import Ledger
+from studyrunner.progress import Standing
+from studyrunner.results import MarchResult, StartResult
+from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
+
+_RANKS_A_TASK = 2
+"""A task that as many ranks were at when they were lost is not given to another one."""
+
+_COST_AT_REST = 0.01
+"""Estimated time of a march where nothing wears, over that of one that takes its steps."""
+
+_LATE = 1.0  # a task that takes longer than expected goes on for such a share of the time that it has taken
+
+
+class Course:
+    """How far the tasks of a study are, and what their results make possible.
+
+    A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
+    order.
+    """
+
+    def __init__(self, ledger: Ledger) -> None:
+        self.costs = LearnedCosts()
+        self.branches = ledger.branches_left()
+        self.n_points = ledger.n_points_finished
+        self.n_starts_left = sum(branch.n_results for branch in self.branches)
+        self._ledger = ledger
+        self._n_lost: Counter[str] = Counter()
+        self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
+        self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
+        lines = ledger.plan.marches
+        self._left[MARCHES] = sum(march.cost for line in lines for march in line if not ledger.is_finished(march))
+
+    def begin(self) -> Iterator[BranchTask | MarchTask]:
+        """The tasks that are possible from the start."""
+        yield from self.branches
+        for branch in self._ledger.plan.branches:
+            for result in self._ledger.known_starts(branch):
+                yield from self._start(branch, result)
+
+    def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
+        """Takes a result; returns the tasks that it makes possible."""
+        self._left[task.kind] -= task.cost / task.n_results
+        if isinstance(task, BranchTask) and isinstance(result, StartResult):
+            self.n_starts_left -= 1
+            self._ledger.add_start(task, result)
+            return self._start(task, result)
+        if isinstance(task, MarchTask) and isinstance(result, MarchResult):
+            self._ledger.add_history(task, result)
+            self.n_points += len(result.points)
+        return ()
+
+    def take_back(
+        self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
+    ) -> list[BranchTask | MarchTask]:
+        """What is to be done in place of the tasks of a lost rank, each with the number of results still to be given.
+
+        The rank was at the first of them. crashes: by the key of the task. A task that crashes is not tried again, and
+        neither is one with which several ranks were lost, as it may need more memory than there is.
+        """
+        left: list[BranchTask | MarchTask] = []
+        for task, n_left in lost:
+            self._n_lost[task.key] += task is lost[0][0]
+            again = self._ledger.renew(task)
+            crash = crashes.get(task.key)
+            if crash is None and self._n_lost[task.key] >= _RANKS_A_TASK:
+                position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
+                crash = Crash(task.key, position, f"{_RANKS_A_TASK} ranks were lost while they were at it")
+            if crash is not None:
+                self.n_points += self._ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+            if isinstance(again, BranchTask):
+                if crash is not None and crash.position is not None:
+                    behind = again.order[again.order.index(crash.position) :]
+                    again = replace(again, known=again.known.union(behind))
+                again = replace(again, cost=task.cost * again.n_results / task.n_results)
+                self._left[task.kind] -= task.cost * n_left / task.n_results - again.cost
+                self.n_starts_left -= n_left - again.n_results
+                left += [again] if again.n_results else []
+            elif crash is not None:
+                self._left[task.kind] -= task.cost * n_left / task.n_results
+            else:
+                # it gives all of its histories again
+                n_given = task.n_results - n_left
+                self.n_points -= sum(len(share.points) for share in again.shares[:n_given])
+                self._left[task.kind] += task.cost * n_given / task.n_results
+                left.append(again)
+        return left
+
+    def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
+        planned = self._ledger.marches_from(branch.number, result.position)
+        new = start_marches(planned, result)
+        for before, march in zip(planned, new, strict=True):
+            self._left[MARCHES] -= before.cost
+            self._left[march.kind] += march.cost
+        return new
+
+    def look(self, running: Sequence[tuple[BranchTask | MarchTask, int, float]]) -> Standing:
+        """How far the tasks are. running: as `Dispatcher.running`."""
+        factors = {kind: self.costs.correction(((kind,),)) for kind in self._left}
+        left = sum(max(0.0, seconds) * factors[kind] for kind, seconds in self._left.items())
+        longest = 0.0
+        for task, _, elapsed in running:
+            expected = task.cost / task.n_results * factors[task.kind]
+            # one that is late takes some time more, nobody knows how much
+            still = max(expected - elapsed, _LATE * elapsed)
+            left += still - expected
+            longest = max(longest, still)
+        return Standing(
+            n_done=self.n_points,
+            n_points=self._ledger.plan.n_points,
+            seconds_left=max(longest, left / max(1, len(running))),
+            running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
+        )
+
+    def _describe(self, task: BranchTask | MarchTask, n_left: int) -> str:
+        """What a task is at."""
+        if isinstance(task, BranchTask):
+            place = task.order_left[task.n_results - n_left]
+            how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
+            return f"{how} to {task.frequencies[place]:.6g} Hz"
+        return f"{self._ledger.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
+
+
+def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:
+    """The marches from a start state. Where something moves they take about the same time, be it little or much.
+
+    The time grows with the unknowns of the state itself, not with a power: marches seldom factorise anew.
+    """
+    tasks = []
+    for task in planned:
+        n_unknowns = started.n_unknowns or task.n_unknowns
+        share = n_unknowns / task.n_unknowns
+        share *= 1.0 if started.moves else _COST_AT_REST
+        cost = task.cost * share
+        tasks.append(replace(task, start=started.start, cost=cost, n_unknowns=n_unknowns, moves=started.moves))
+    return tuple(tasks)

@@ -1,0 +1,43 @@
+"""Records of histories with given numbers, for what is collected from them at the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.records import pack, record_type
+from studyrunner.results import MarchResult
+from studyrunner.sharing import Index
+from studyrunner.study import Study
+from studyrunner.tasks import build_tasks
+from tests.studyrunner.fakes import FACTS, fake_histories
+
+Batch = tuple[list[tuple[Index, ...]], NDArray[np.void]]
+
+
+def results_of(study: Study, **given: Callable[[Index], object]) -> list[MarchResult]:
+    """A result for each history of a study; those named are what the functions say of its first point."""
+    plan = build_tasks(study, FACTS.n_displacements)
+    results = []
+    for _, result in fake_histories(plan):
+        values = dict(result.values)
+        # of states that are exact
+        for name in ("response_error", "wear_rate_error"):
+            values[name] = np.zeros(len(study.cycles_kept))
+        values |= {name: np.asarray(say(min(result.points))) for name, say in given.items() if name in values}
+        fields = {name: say(min(result.points)) for name, say in given.items() if name not in values}
+        results.append(replace(result, values=values, **fields))
+    return results
+
+
+def batches(study: Study, results: Sequence[MarchResult], size: int = 3) -> list[Batch]:
+    """Points and records of the results, some at a time."""
+    kind = record_type(study, FACTS)
+    found = []
+    for first in range(0, len(results), size):
+        some = results[first : first + size]
+        found.append(([result.points for result in some], np.concatenate([pack(kind, "", one) for one in some])))
+    return found

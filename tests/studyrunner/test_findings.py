@@ -1,0 +1,108 @@
+"""Points that failed or are less exact than asked for are named, with cycle and error, and not too many of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from solver.outcome import Outcome
+from studyrunner.findings import MOST_NAMED, Findings
+from studyrunner.sharing import Index
+from studyrunner.study_file import read_study
+from tests.studyrunner.fakes import FACTS
+from tests.studyrunner.results_of import batches, results_of
+
+GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit']")
+INACCURATE, MARCH_FAILED, EXCEPTION = int(Outcome.INACCURATE), int(Outcome.MARCH_FAILED), int(Outcome.EXCEPTION)
+
+
+def lines_of(
+    outcomes: dict[tuple[int, int], int],
+    messages: dict[tuple[int, int], str] | None = None,
+    *overrides: str,
+    largest_harmonics: int | None = None,
+    last_cycle: float = 20_000.0,
+) -> tuple[str, ...]:
+    """Findings of a study whose points end as is said by frequency and scheme; all others are to tolerance."""
+    study = read_study("sdof_slider", overrides or GRID)
+    said = messages or {}
+
+    def at(point: Index) -> tuple[int, int]:
+        return point[0], point[4]
+
+    results = results_of(
+        study,
+        outcome=lambda point: outcomes.get(at(point), 0),
+        message=lambda point: said.get(at(point), ""),
+        error_estimate=lambda _: 0.026,
+        last_cycle=lambda point: last_cycle if outcomes.get(at(point), 0) == MARCH_FAILED else 20_000.0,
+    )
+    numbers: dict[int, int] = {}
+    for result in results:
+        numbers[result.outcome] = numbers.get(result.outcome, 0) + len(result.points)
+    found = set()
+    for given in (results, results[::-1]):
+        findings = Findings(study, replace(FACTS, largest_harmonics=largest_harmonics))
+        for points, records in batches(study, given):
+            findings.add(points, records)
+        found.add(findings.format(numbers))
+    (lines,) = found
+    return lines
+
+
+def test_nothing_is_said_of_points_to_tolerance() -> None:
+    assert lines_of({}) == ()
+
+
+def test_point_cycle_and_error_are_named() -> None:
+    message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
+    assert lines_of({(1, 1): INACCURATE}, {(1, 1): message}) == (
+        f"1 x inaccurate: {Outcome.INACCURATE.sentence}",
+        f"  211.25 Hz, explicit: {message}",
+    )
+
+
+def test_how_far_a_point_came_that_ended_early() -> None:
+    assert lines_of({(2, 0): MARCH_FAILED}, last_cycle=12_500.0) == (
+        f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}",
+        "  212.5 Hz, implicit: computed up to cycle 12 500 of 20 000, the worn volume there to 2.6 %",
+    )
+    (_, line) = lines_of({(2, 0): MARCH_FAILED}, {(2, 0): "lost it"}, last_cycle=0.0)
+    assert line == "  212.5 Hz, implicit: computed up to cycle 0 of 20 000; lost it"
+    (_, line) = lines_of({(2, 0): MARCH_FAILED}, {(2, 0): "ended at cycle 12"}, last_cycle=12.0)
+    assert line == "  212.5 Hz, implicit: ended at cycle 12"
+    (_, line) = lines_of({(2, 0): MARCH_FAILED}, last_cycle=float("nan"))
+    assert line == "  212.5 Hz, implicit: no state was found"
+
+
+def test_outcomes_in_their_order_and_points_in_that_of_the_file() -> None:
+    found = lines_of({(2, 1): MARCH_FAILED, (0, 0): INACCURATE, (2, 0): MARCH_FAILED}, {(0, 0): "why"})
+    heads = [line.split(":")[0] for line in found]
+    reached = ["  212.5 Hz, implicit", "  212.5 Hz, explicit"]
+    assert heads == ["2 x march_failed", *reached, "1 x inaccurate", "  210 Hz, implicit"]
+
+
+def test_no_more_than_some_are_named() -> None:
+    many = "axes.frequency=" + str(list(range(100, 125)))
+    outcomes = {(place, 0): INACCURATE for place in range(20)}
+    found = lines_of(outcomes, None, many, "axes.scheme=implicit")
+    assert len(found) == 1 + MOST_NAMED + 1
+    assert found[1] == "  100 Hz"
+    assert found[-1] == f"  and {20 - MOST_NAMED} more"
+    both = lines_of(outcomes | {(22, 0): MARCH_FAILED}, None, many, "axes.scheme=implicit")
+    assert len(both) == 1 + 1 + 1 + MOST_NAMED // 2 + 1
+    assert both[-1] == f"  and {20 - MOST_NAMED // 2} more"
+
+
+def test_a_study_of_one_point_says_what_is_there_to_say() -> None:
+    one = ("axes.frequency=100", "axes.scheme=implicit")
+    assert lines_of({(0, 0): INACCURATE}, {(0, 0): "why"}, *one)[1:] == ("  why",)
+    assert lines_of({(0, 0): INACCURATE}, None, *one)[1:] == ()
+
+
+def test_nodal_diameters_are_spoken_of_where_the_scene_lacks_them_only() -> None:
+    inaccurate, failed = {(0, 0): INACCURATE}, {(0, 0): MARCH_FAILED}
+    assert "nodal diameters" not in lines_of(inaccurate)[0]
+    assert "nodal diameters of 13 harmonics" in lines_of(inaccurate, largest_harmonics=13)[0]
+    assert "nodal diameters" not in lines_of(failed, largest_harmonics=13)[0]
+    given = lines_of(inaccurate, None, *GRID, "solver.harmonics=3", largest_harmonics=13)
+    assert "nodal diameters" not in given[0]

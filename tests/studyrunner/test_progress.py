@@ -1,0 +1,153 @@
+"""What a user sees while a study runs: a bar on a terminal, a line every half minute elsewhere."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from studyrunner import progress, run
+from studyrunner.cli import main
+from studyrunner.progress import RunProgress, Standing
+from studyrunner.results import Kept, MarchResult, StartResult
+from studyrunner.scene import describe_scene
+from studyrunner.tasks import BranchTask, MarchTask
+from tests.studyrunner.fakes import fake_evaluate
+
+LINE = re.compile(
+    r"\[ *[\d.]+ (?:s|min|h)\] (?P<done>\d+) of (?P<all>\d+) points?, (?P<percent>\d+) %"
+    r"(?:, about (?P<left>[\d.]+ (?:s|min|h)) left)?(?:, running: (?P<running>.*))?"
+)
+
+
+class Clock:
+    """Stands for `time.monotonic`."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    found = Clock()
+    monkeypatch.setattr("studyrunner.progress.time.monotonic", found)
+    return found
+
+
+def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    looks = []
+
+    def look() -> Standing:
+        looks.append(clock.now)
+        return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
+
+    with RunProgress() as shown:
+        shown.say("marching")
+        shown.begin_tasks()
+        for tenth in range(36_000):
+            clock.now = 1000.0 + 0.1 * tenth
+            shown.tick(look)
+    first, *lines = capsys.readouterr().err.splitlines()
+    assert first == "[    0 s] marching"
+    assert lines[0] == ("[    2 s] 5 of 20 points, 25 %, about 6 s left, running: sweep up to 211 Hz, 210 Hz implicit")
+    gaps = [later - before for before, later in itertools.pairwise(looks)]
+    assert len(lines) == len(looks)
+    assert 2.0 - 1e-6 <= min(gaps) <= max(gaps) <= 30.2
+    # not more often than that either
+    assert len(lines) < 3600 / 30 + 12
+
+
+def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    with RunProgress() as shown:
+        shown.say("finding the natural frequencies")
+        clock.now += 300.0
+        shown.begin_tasks()
+        clock.now += 10.0
+        shown.tick(lambda: Standing(0, 4, 90.0, ("ramp to 5 Hz",)))
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "0 of 4 points, 10 %, about 1.5 min left" in line
+
+
+def test_all_is_done_at_the_end_only() -> None:
+    assert Standing(3, 4, 0.0, ()).share(50.0) == 0.99
+    assert Standing(4, 4, 0.0, ()).share(50.0) == 1.0
+    assert Standing(4, 4, 0.0, ()).describe(50.0) == "4 of 4 points, 100 %"
+    assert Standing(0, 4, 0.0, ()).share(0.0) < 0.01
+
+
+def test_of_many_tasks_some_are_named() -> None:
+    names = tuple(f"{place} Hz implicit" for place in range(64))
+    assert (
+        Standing(0, 99, 1.0, names)
+        .describe(1.0)
+        .endswith("running: 0 Hz implicit, 1 Hz implicit, 2 Hz implicit and 61 more")
+    )
+
+
+def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    screen = io.StringIO()
+    looks = []
+
+    def look() -> Standing:
+        looks.append(clock.now)
+        return Standing(5, 20, 30.0, ("210 Hz implicit",))
+
+    monkeypatch.setattr(progress, "Console", lambda **_: Console(file=screen, force_terminal=True, width=160))
+    with RunProgress() as shown:
+        shown.say("marching")
+        shown.begin_tasks()
+        for _ in range(1000):
+            clock.now += 0.01
+            shown.tick(look)
+        assert shown._bar is not None
+        shown._bar.refresh()
+    assert capsys.readouterr().err == ""
+    seen = screen.getvalue()
+    assert "0%" in seen
+    assert "25%" in seen
+    assert "5 of 20 points, 25 %, about 30 s left, running: 210 Hz implicit" in seen
+    # a look costs something, a tick does not
+    assert 90 <= len(looks) <= 101
+
+
+def build_slow(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+    """The stand-in for the solver; each start state and each march takes a while."""
+    facts = describe_scene(model)
+
+    def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        for result in fake_evaluate(task, keep, facts):
+            time.sleep(0.15)
+            yield result
+
+    return evaluate
+
+
+def test_the_run_itself_says_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run, "build_evaluator", build_slow)
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.05)
+    monkeypatch.setattr(progress, "LONGEST_SILENCE", 0.05)
+    study = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "-o", str(tmp_path / "out.nc")]
+    assert main(study) == 0
+    said = capsys.readouterr().err.splitlines()
+    found = [match for line in said if (match := LINE.fullmatch(line))]
+    assert len(found) >= 8, said
+    percents = [int(match["percent"]) for match in found]
+    assert percents[0] < 50 < percents[-1]
+    done = [int(match["done"]) for match in found]
+    assert done == sorted(done)
+    assert done[0] == 0 < done[-1]
+    assert all(match["left"] for match in found)
+    running = [match["running"] for match in found if match["running"]]
+    assert any(name.startswith("sweep up to 1") for name in running)
+    assert any(name in ("100 Hz implicit", "110 Hz explicit", "120 Hz explicit", "120 Hz implicit") for name in running)
