@@ -75,6 +75,8 @@ class Trajectory:
         self.last_change: tuple[float, FloatArray] | None = None
         self.unresolved = 0.0
         self.jumps = 0
+        # whether a step that is too long ends it; that of a companion only shows in the error
+        self.bounded = True
         self.failure = Outcome.MARCH_FAILED
         self.step_limit = float("nan")
         # m3 per cycle, of every pair and of all together
@@ -238,7 +240,8 @@ class Trajectory:
             return False
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
-        check_step(self.joint, self.point.evaluation, worn, self.cycle, beyond)
+        if self.bounded:
+            check_step(self.joint, self.point.evaluation, worn, self.cycle, beyond)
         self.last_change = None
         self.effort.limit = self.effort.iterations + JUMP_ITERATIONS
         landed = self._land(beyond, worn)
@@ -292,7 +295,8 @@ class Trajectory:
     def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
         """Make the state at a share of a step the current one. Raises StepTooLongError."""
         before, ahead = self.point.evaluation, point.parameter * length
-        check_step(self.joint, before, point.evaluation.wear_depth, self.cycle, ahead)
+        if self.bounded:
+            check_step(self.joint, before, point.evaluation.wear_depth, self.cycle, ahead)
         balance = balance_at(point.parameter, self.point.history)
         self.accept(PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), ahead)
 
