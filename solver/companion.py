@@ -60,6 +60,7 @@ class Companion:
         scheme: Scheme = "implicit" if main.scheme == "explicit" else main.scheme
         self.way = Trajectory(main.case, coarse, main.wear_coefficient, scheme)
         self.way.effort = main.effort
+        self.way.bounded = False
         self.cycles = cycles
         self.kept = np.full((cycles.size, main.still.size), np.nan)
         self.offset = np.zeros_like(main.still)

@@ -20,6 +20,7 @@ from solver.packing import pack, unpack
 from solver.path import OutOfTimeError
 from solver.record import Recorder
 from solver.settings import Scheme, SolverSettings
+from solver.step_size import StepTooLongError
 from solver.trajectory import Trajectory
 
 MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
@@ -122,6 +123,8 @@ def march_wear(
         outcome = Outcome.SINGULAR
     except OutOfTimeError:
         outcome = Outcome.TIME_LIMIT
+    except StepTooLongError as error:
+        outcome, message = Outcome.STEP_TOO_LONG, str(error)
     except Exception as error:
         # one bad point is one bad point: the study goes on
         outcome, message = Outcome.EXCEPTION, describe_error(error)

@@ -29,6 +29,7 @@ class Outcome(IntEnum):
     NOT_COMPUTED = 13
     PERIOD_DOUBLED = 14
     SENSITIVE = 15
+    STEP_TOO_LONG = 16
 
     @property
     def complete(self) -> bool:
@@ -64,6 +65,8 @@ _SENTENCES = {
     " direction, use more frequencies or start elsewhere.",
     Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two periods of the excitation or more,"
     " which is not computed: the state that repeats after one is unstable.",
+    Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that more than half of the normal"
+    " forces move: its end is no result. The variable message says which step, and how long it may be.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",

@@ -10,6 +10,7 @@ from numba import njit
 from solver.arc import follow_arc
 from solver.balance import Balance, Evaluation
 from solver.certificate import Certificate
+from solver.friction_path import solve_from_less_friction
 from solver.harmonics import build_basis, change_orders, from_complex, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
@@ -24,6 +25,7 @@ from solver.settling import settle
 from solver.stability import is_stable
 
 LOAD_STEPS = 20
+FEW_ITERATIONS = 5  # of a load step from the state before, grown with its load
 RELIEF = (0.1, 0.4)  # of the static friction forces, where vibration cannot be raised from the static state
 PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
 
@@ -32,7 +34,8 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
     """Frictional unilateral state under the static load, raised gradually from nothing; None where there is none.
 
     The state depends on the path of the load, so it is raised in equal steps and each starts from the tangential state
-    of the one before. The first evaluation lets the pairs stick.
+    of the one before. The first evaluation lets the pairs stick. Steps that Newton's method does not find are found by
+    way of less friction (`friction_path`).
     """
     idle = np.zeros(joint.contact.n_contact)
     solver = JacobianSolver()
@@ -43,14 +46,26 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
     history = np.zeros((joint.contact.n_contact, 2))
     first = balance_at(1.0 / LOAD_STEPS, history)
     start = first.joint.structure.force_h()
-    result = solve_balance(first, start, solver, tolerance, effort, 60)
-    if not result.converged:
+    found = solve_from_less_friction(first, start, solver, tolerance, effort)
+    if found is None:
         return None
-    point = PathPoint(1.0 / LOAD_STEPS, result.evaluation, final_history(first, result.evaluation))
+    point = PathPoint(1.0 / LOAD_STEPS, found.evaluation, final_history(first, found.evaluation))
     for step in range(2, LOAD_STEPS + 1):
-        point, arrived = follow_naturally(balance_at, point, step / LOAD_STEPS, solver, tolerance, effort)
+        share = step / LOAD_STEPS
+        whole = balance_at(share, point.history)
+        # without gaps and wear the state grows with its load; much friction allows others that do not
+        grown = point.evaluation.predicted_h * (step / (step - 1.0))
+        result = solve_balance(whole, grown, solver, tolerance, effort, FEW_ITERATIONS)
+        if result.converged:
+            point = PathPoint(share, result.evaluation, final_history(whole, result.evaluation))
+            continue
+        point, arrived = follow_naturally(balance_at, point, share, solver, tolerance, effort)
         if not arrived:
-            return None
+            whole = balance_at(share, point.history)
+            found = solve_from_less_friction(whole, point.evaluation.predicted_h, solver, tolerance, effort)
+            if found is None:
+                return None
+            point = PathPoint(share, found.evaluation, final_history(whole, found.evaluation))
     return point
 
 

@@ -34,6 +34,7 @@ from solver.path import (
 from solver.response import StateReport, report_state
 from solver.settings import Scheme
 from solver.stability import is_stable
+from solver.step_size import check_step
 from solver.sweep import move_point
 
 RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
@@ -74,6 +75,8 @@ class Trajectory:
         self.last_change: tuple[float, FloatArray] | None = None
         self.unresolved = 0.0
         self.jumps = 0
+        # whether a step that is too long ends it; that of a companion only shows in the error
+        self.bounded = True
         self.failure = Outcome.MARCH_FAILED
         self.step_limit = float("nan")
         # m3 per cycle, of every pair and of all together
@@ -231,13 +234,14 @@ class Trajectory:
 
     def jump(self, length: float) -> bool:
         """The branch has ended at the current count, in a step of the given length: land on another stable state a
-        little beyond; False where there is none.
+        little beyond; False where there is none. Raises StepTooLongError.
         """
-        self.jumps += 1
-        if self.jumps > MOST_JUMPS:
+        if self.jumps >= MOST_JUMPS:
             return False
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
+        if self.bounded:
+            check_step(self.joint, self.point.evaluation, worn, self.cycle, beyond)
         self.last_change = None
         self.effort.limit = self.effort.iterations + JUMP_ITERATIONS
         landed = self._land(beyond, worn)
@@ -258,8 +262,10 @@ class Trajectory:
             )
             if not arrived or not self.is_stable(point.evaluation):
                 continue
-            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED and np.isnan(self.jump_cycle):
-                self.jump_cycle = self.cycle
+            if vibration_change(self.point.evaluation, point.evaluation) > JUMPED:
+                # corners at which the branch folds back a little are no jumps, and there may be many of them
+                self.jumps += 1
+                self.jump_cycle = self.cycle if np.isnan(self.jump_cycle) else self.jump_cycle
             self.point = PathPoint(
                 0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation)
             )
@@ -287,11 +293,12 @@ class Trajectory:
         return is_stable(held.linearise(evaluation), self.solver)
 
     def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
-        """Make the state at a share of a step the current one."""
+        """Make the state at a share of a step the current one. Raises StepTooLongError."""
+        before, ahead = self.point.evaluation, point.parameter * length
+        if self.bounded:
+            check_step(self.joint, before, point.evaluation.wear_depth, self.cycle, ahead)
         balance = balance_at(point.parameter, self.point.history)
-        self.accept(
-            PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), point.parameter * length
-        )
+        self.accept(PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), ahead)
 
     def accept(self, point: PathPoint, length: float) -> None:
         """Make a state that is so many cycles ahead the current one."""

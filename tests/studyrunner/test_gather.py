@@ -188,6 +188,7 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "not_computed",
             "period_doubled",
             "sensitive",
+            "step_too_long",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:

@@ -1,0 +1,113 @@
+"""Steps that wear off too much: seen by the share of the preload that they move, and never reported as results."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.history import StartState
+from solver.joint import build_case
+from solver.march import march_wear
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.path import Effort
+from solver.response import solve_static_state
+from solver.settings import Scheme, SolverSettings
+from solver.step_size import LARGEST, StepTooLongError, check_step, moved_share
+from tests.solver.models import OMEGA, branch_states, dovetail, random_model
+
+SETTINGS = SolverSettings(harmonics=3, samples=64)
+FREQUENCY = 212.5  # Hz
+FRICTION = 0.5
+CYCLES = np.array([0.0, 1000.0, 5000.0])
+
+
+@lru_cache
+def start() -> StartState:
+    omegas = 2.0 * np.pi * np.array([FREQUENCY])
+    (state,) = branch_states(dovetail(), FRICTION, 0.5, omegas, SETTINGS)
+    assert state.outcome is Outcome.CONVERGED
+    return state
+
+
+def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
+    # without friction the pairs stay closed and slide freely: the static state is linear in the depth
+    case = build_case(dovetail(), 0.0, 2.0 * np.pi * FREQUENCY, SETTINGS)
+    joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
+    depth = 2e-7 * np.random.default_rng(1).uniform(size=16)
+    states = []
+    for worn in (np.zeros(16), depth):
+        point = solve_static_state(joint, worn, 1e-10, Effort())
+        assert point is not None
+        states.append(point.evaluation)
+    before, after = (state.force_h[:, 0, 0] for state in states)
+    change = np.linalg.norm(after - before) / np.linalg.norm(before)
+    assert change > 0.01
+    assert moved_share(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
+
+
+def test_wear_that_does_not_act_back_moves_nothing() -> None:
+    model = random_model(2, ("constant_load", "constant_load"))
+    joint = build_case(model, 0.3, OMEGA, SETTINGS).joint(OMEGA, 0.0)
+    point = solve_static_state(joint, np.zeros(2), 1e-10, Effort())
+    assert point is not None
+    assert moved_share(joint, point.evaluation, np.ones(2)) == 0.0
+
+
+def test_the_error_names_the_step_and_one_that_would_do() -> None:
+    case = build_case(dovetail(), FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS)
+    joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
+    point = solve_static_state(joint, np.zeros(16), 1e-10, Effort())
+    assert point is not None
+    one = np.zeros(16)
+    one[0] = 1e-9
+    unit = moved_share(joint, point.evaluation, one)
+    check_step(joint, point.evaluation, 0.9 * LARGEST / unit * one, 3000.0, 1000.0)
+    sentence = r"1e\+03 cycles at once from cycle 3000 on moves 2 times.*at most 50 cycles"
+    with pytest.raises(StepTooLongError, match=sentence):
+        check_step(joint, point.evaluation, 2.0 / unit * one, 3000.0, 1000.0)
+
+
+def last_volume(wear_coefficient: float, scheme: Scheme, step: float, cycles: FloatArray) -> tuple[Outcome, float, str]:
+    history = march_wear(dovetail(), FRICTION, start(), wear_coefficient, step, scheme, cycles, SETTINGS)
+    return history.outcome, float(history.worn_volume[-1]), history.message
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
+@pytest.mark.parametrize("wear_coefficient", [1.1e-5, 1.1e-7])
+def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(wear_coefficient: float, scheme: Scheme) -> None:
+    outcome, _, message = last_volume(wear_coefficient, scheme, 1000.0, CYCLES)
+    assert outcome is Outcome.STEP_TOO_LONG
+    assert "from cycle 0 on" in message
+
+
+def test_the_step_that_is_advised_is_none_too_long() -> None:
+    _, _, message = last_volume(1.1e-7, "explicit", 1000.0, CYCLES)
+    advised = float(message.split("at most ")[1].split()[0])
+    assert 0.01 < advised < 1.0
+    outcome, _, message = last_volume(1.1e-7, "explicit", advised, 20.0 * advised * np.array([0.0, 1.0]))
+    assert outcome is Outcome.CONVERGED, message
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
+def test_usual_steps_are_none_too_long(scheme: Scheme) -> None:
+    outcome, volume, _ = last_volume(1.1e-11, scheme, 2000.0, np.array([0.0, 2e4]))
+    assert outcome is Outcome.CONVERGED
+    assert volume > 1e-11
+
+
+def test_an_open_pair_carries_nothing_and_holds_nothing() -> None:
+    model = dovetail()
+    gap = np.zeros(16)
+    gap[:2] = 1e-3
+    loose = replace(model, contact=replace(model.contact, gap=gap))
+    joint = build_case(loose, FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS).joint(2.0 * np.pi * FREQUENCY, 0.0)
+    point = solve_static_state(joint, np.zeros(16), 1e-10, Effort())
+    assert point is not None
+    assert point.evaluation.force_h[:2, 0, 0].max() == 0.0
+    worn = np.zeros(16)
+    worn[:2] = 1e-6
+    assert moved_share(joint, point.evaluation, worn) == 0.0

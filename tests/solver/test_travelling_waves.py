@@ -1,0 +1,122 @@
+"""Travelling waves on the coarse dovetail sector: states over the resonances, what they wear, and how it all ends."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.balance import Balance
+from solver.history import StartState, WearHistory
+from solver.joint import Case, build_case
+from solver.linear import JacobianSolver
+from solver.march import march_wear
+from solver.outcome import Outcome
+from solver.path import Effort, PathPoint, final_history
+from solver.response import solve_first_state
+from solver.settings import SolverSettings
+from solver.settling import settle
+from solver.stability import is_stable
+from tests.solver.models import branch_states, dovetail
+
+SETTINGS = SolverSettings(harmonics=3, samples=64)
+FRICTION = 0.5
+WEAR = 1.1e-11  # 1/Pa
+CYCLES = np.linspace(0.0, 2e4, 5)
+RESONANCE = {3: 214.638, 7: 215.034, 20: 215.031}  # Hz, of the glued structure
+OFFSETS = (-0.2, 0.0, 1.0)  # Hz
+
+
+@lru_cache
+def starts(nodal_diameter: int, amplitude: float) -> tuple[StartState, ...]:
+    omegas = 2.0 * np.pi * (RESONANCE[nodal_diameter] + np.array(OFFSETS))
+    return tuple(branch_states(dovetail(3, nodal_diameter), FRICTION, amplitude, omegas, SETTINGS))
+
+
+@lru_cache
+def histories(nodal_diameter: int, amplitude: float) -> tuple[WearHistory, ...]:
+    return tuple(
+        march_wear(dovetail(3, nodal_diameter), FRICTION, start, WEAR, 1000.0, "adaptive", CYCLES, SETTINGS)
+        for start in starts(nodal_diameter, amplitude)
+    )
+
+
+@lru_cache
+def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
+    """A state in which pairs slip, a little below the resonance."""
+    omega = 2.0 * np.pi * (RESONANCE[nodal_diameter] - 0.3)
+    case = build_case(dovetail(3, nodal_diameter), FRICTION, omega, SETTINGS)
+    outcome, point = solve_first_state(case, omega, 0.5, np.zeros(16), JacobianSolver(), Effort())
+    assert outcome is Outcome.CONVERGED
+    assert point is not None
+    assert point.evaluation.slip_work.sum() > 1e-9
+    return case, PathPoint(omega, point.evaluation, point.history)
+
+
+@pytest.mark.parametrize(("nodal_diameter", "amplitude"), [(3, 0.5), (7, 0.5), (20, 0.5), (20, 2.0)])
+def test_every_point_over_the_resonance_has_a_state(nodal_diameter: int, amplitude: float) -> None:
+    assert [start.outcome for start in starts(nodal_diameter, amplitude)] == [Outcome.CONVERGED] * len(OFFSETS)
+
+
+@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+def test_every_point_is_marched_to_its_end_or_keeps_what_it_had(nodal_diameter: int) -> None:
+    for offset, history in zip(OFFSETS, histories(nodal_diameter, 0.5), strict=True):
+        assert history.last_cycle >= 0.0
+        reached = history.cycles <= history.last_cycle
+        assert np.isfinite(history.worn_volume[reached]).all(), f"{offset} Hz"
+        if history.outcome.complete:
+            assert history.last_cycle == CYCLES[-1]
+        assert (np.diff(history.worn_volume[reached]) >= 0.0).all()
+    finished = [history.outcome is Outcome.CONVERGED for history in histories(nodal_diameter, 0.5)]
+    assert finished == [True] * len(OFFSETS)
+
+
+@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+def test_what_wears_does_so_at_the_resonance(nodal_diameter: int) -> None:
+    volumes = [float(history.worn_volume[-1]) for history in histories(nodal_diameter, 0.5)]
+    assert 1e-11 < volumes[1] < 1e-8
+    assert volumes[2] < 1e-6 * volumes[1]
+
+
+@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+def test_the_sign_of_the_determinant_is_that_of_the_whole_jacobian(nodal_diameter: int) -> None:
+    case, point = state(nodal_diameter)
+    joint = case.joint(point.parameter, 0.5)
+    assert (
+        np.abs(joint.structure.dynamic_stiffness[0].imag).max() > 1e-3 * np.abs(joint.structure.static_stiffness).max()
+    )
+    balance = Balance(joint, point.evaluation.history, np.zeros(16), np.zeros(16))
+    tangent = balance.linearise(point.evaluation)
+    whole = tangent.dense(np.arange(16))
+    sign, _ = np.linalg.slogdet(whole)
+    assert JacobianSolver().determinant_sign(tangent) == sign
+    assert is_stable(tangent, JacobianSolver()) == (sign > 0.0)
+
+
+@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+def test_the_structure_settles_to_the_state_that_the_balance_has(nodal_diameter: int) -> None:
+    """Steps in time know nothing of the balance of a travelling wave but its matrices: from rest they lead to a state
+    whose motion differs from that raised gradually by the friction history alone.
+    """
+    case, point = state(nodal_diameter)
+    omega = point.parameter
+    joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
+    outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Effort())
+    assert outcome is Outcome.CONVERGED
+    assert rest is not None
+    outcome, settled = settle(
+        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Effort()
+    )
+    assert outcome is Outcome.CONVERGED
+    assert settled is not None
+    one, other = (
+        joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)
+    )
+    assert np.linalg.norm(one - other) < 0.05 * np.linalg.norm(one)
+    kept = Balance(joint, settled.evaluation.history, np.zeros(16), np.zeros(16)).evaluate(
+        settled.evaluation.predicted_h
+    )
+    assert kept.scaled_residual() < 2.0 * SETTINGS.tolerance
+    again = final_history(Balance(joint, settled.history, np.zeros(16), np.zeros(16)), settled.evaluation)
+    assert np.abs(again - settled.history).max() <= 1e-9 * np.abs(settled.history).max()
