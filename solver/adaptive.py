@@ -37,7 +37,7 @@ SHORTEST_RATIO = 0.2
 SAFETY = 0.85
 CAREFUL = 0.8  # a step that was refused is cut by at least so much
 FIRST = 0.05  # of the explicit step limit: the first step, before anything is known of the error
-FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears where there is no limit
+FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears at most
 ITERATIONS = 10  # of a step: one that takes more is halved
 SHORTEST = 1e-4  # of the first step
 ZERO_STABLE = 2.4  # ratio of two steps below 1 + sqrt(2)
@@ -61,13 +61,12 @@ class AdaptiveSteps:
 
     def __post_init__(self) -> None:
         way = self.trajectory
-        limit, fastest = way.step_limit, float(way.rate().max(initial=0.0))
-        if np.isfinite(limit):
-            self._length = FIRST * limit
-        elif fastest > 0.0:
-            self._length = FIRST_DEPTH * float(np.abs(way.point.evaluation.displacement_h[:, :, 1:]).max()) / fastest
-        else:
-            self._length = 1.0
+        fastest = float(way.rate().max(initial=0.0))
+        self._length = 1.0
+        if fastest > 0.0:
+            moved = float(np.abs(way.point.evaluation.displacement_h[:, :, 1:]).max())
+            # the limit is far off where next to nothing slips
+            self._length = min(FIRST * way.step_limit, FIRST_DEPTH * moved / fastest)
         self._shortest = SHORTEST * self._length
 
     def advance(self) -> tuple[bool, float]:

@@ -161,13 +161,15 @@ class Recorder:
         error = np.fmax(difference @ area, local) + truncation * np.fmax(late, 1.0)
         relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
         relative[np.isnan(volume)] = np.nan
+        # what the volume is wrong by beyond the difference of the histories falls to the pairs as they are worn
+        rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
         reached = np.flatnonzero(np.isfinite(volume))
         return WearHistory(
             outcome=outcome,
             cycles=self.cycles,
             worn_volume=volume,
             worn_volume_error=relative,
-            wear_depth_error=difference + of_pairs,
+            wear_depth_error=difference + of_pairs + rest[:, None] * kept["wear_depth"],
             jump_cycle=jump_cycle,
             error_estimate=float(relative[reached[-1]]) if reached.size else float("nan"),
             newton_iterations=self.start_iterations + iterations,
