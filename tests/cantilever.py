@@ -1,8 +1,8 @@
 """A cantilever with friction at its tip: its model, and its exact motion from event to event.
 
 An Euler beam of length and mass one in its first five modes, `phi_i(1)^2 = 4` with unit modal masses, under a harmonic
-force inside and with constant normal load at the tip. The friction element is rigid and sits either on the tip itself or
-on a massless displacement that a spring ties to it, as a reduction with residual flexibility gives it. SI units.
+force inside and with constant normal load at the tip. The friction element is rigid and sits either on the tip itself
+or on a massless displacement that a spring ties to it, as a reduction with residual flexibility gives it. SI units.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Cantilever:
         return self._sprung(force * load[1:], limit, omega)
 
     def _sprung(self, load: FloatArray, limit: float, omega: float) -> Orbit:
-        """Displacements 0 to 4 are the modes, 5 is the stretch of the spring: of the place itself, which is a difference
+        """Displacements 0 to 4 are the modes, 5 is the stretch of the spring: of the place of the element, a difference
         of larger numbers, too few digits would be left where slip turns into stick.
         """
         n, tip = N_MODES + 1, self.shape(1.0)

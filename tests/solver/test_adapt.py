@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from solver import adapt
-from solver.adapt import Refined, refine, transfer
+from solver.adapt import Refined, refine
 from solver.estimate import Estimate
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
 from solver.kernels import SLIP, STICK
 from solver.ladder import LADDER
+from solver.level import transfer
 from solver.linear import JacobianSolver
 from solver.model import ReducedModel
 from solver.path import Effort, PathPoint, final_history, solve_balance
