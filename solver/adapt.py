@@ -56,6 +56,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
     here = here.at_rest(effort)
     begun = effort.iterations
     leads, faint = MOST_LEADS, False
+    richer: Level | None = None
     while True:
         if nothing_happens(here.point.evaluation):
             if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
@@ -74,7 +75,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             here = here.without_even(effort) or here
         resolution = here.case.resolution
         by_samples, finer = here.samples_error(effort)
-        by_harmonics, richer = here.harmonics_error(effort)
+        by_harmonics, richer = here.harmonics_error(effort, richer)
         above = on_ladder(resolution, 1)
         cheap = here.unknowns(above) <= DEAR and _allowed(here, above)
         if richer is None and settings.harmonics == "auto" and leads and cheap:
@@ -107,6 +108,9 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
                 next_level = richer
             else:
                 next_level = here.solve_at(wanted, effort)
+            if next_level is None and richer is not None and richer.case.resolution.highest > wanted.highest:
+                # what is not found from below may be found from above
+                next_level = richer.solve_at(wanted, effort)
             if next_level is None and settings.harmonics == settings.samples and richer is not None:
                 next_level = richer if _allowed(here, richer.case.resolution) else None
         if next_level is None:

@@ -172,7 +172,7 @@ class Level:
         coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
-    def harmonics_error(self, effort: Effort) -> tuple[Estimate, Level | None]:
+    def harmonics_error(self, effort: Effort, known: Level | None = None) -> tuple[Estimate, Level | None]:
         """Estimated error for want of harmonics, and the state with more of them that it comes from.
 
         It is the difference to the state two steps up the ladder; where that is not found, takes too many unknowns, or
@@ -180,6 +180,8 @@ class Level:
         down, which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
         and where none such is found the error is unknown, whatever the other states say; and to one with so many that
         the structure answers those beyond as the penalty does (`reach`): below, a few more may change nothing.
+
+        known: a richer state that was compared before, which is not solved again where it reaches so far.
         """
         contact = shortest_contact(self.point.evaluation.status_t)
         # a whole period of the highest harmonic in the contact shows it well, half a period shows it
@@ -198,7 +200,8 @@ class Level:
             other = on_ladder(self.case.resolution, steps)
             affordable = self.unknowns(other) <= MOST_COMPARED
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
-                level = self.solve_at(other, effort)
+                level = known if 2 < steps <= reaching and known is not None and known.covers(other) else None
+                level = level or self.solve_at(other, effort)
                 if level is None and 2 < steps <= reaching:
                     level = self.climbed(steps, effort)
                 if level is not None:
@@ -207,6 +210,11 @@ class Level:
                         return UNKNOWN, richer
                     return self.difference(level).times(NEAR_SAFETY if steps == 1 else HARMONICS_SAFETY), richer
         return UNKNOWN, None
+
+    def covers(self, resolution: Resolution) -> bool:
+        """Whether this has these harmonics and at least so many samples."""
+        own = self.case.resolution
+        return own.orders == resolution.orders and own.samples >= resolution.samples
 
     def climbed(self, steps: int, effort: Effort) -> Level | None:
         """The same state so many steps up the ladder, where it is not found at once; None where a step fails."""

@@ -15,7 +15,7 @@ from solver.model import ReducedModel
 from solver.penalty import build_penalty, compliance_at
 from solver.structure import relative_indices
 
-MISMATCH = 0.5  # of |1 - E G|
+MISMATCH = 0.25  # of |1 - E G|
 RATES = 2.0 ** np.arange(0.0, 8.5, 0.5)  # times that of the first harmonic left out
 
 
