@@ -77,6 +77,10 @@ class Cantilever:
         linear = LinearModel(mass, damping, stiffness, np.zeros(len(load)), load.astype(complex), tip[None])
         return ReducedModel({0: linear}, contact, ("tip",))
 
+    def tip_of_orbit(self) -> FloatArray:
+        """What gives the tip from the displacements of `orbit`."""
+        return np.append(self.shape(1.0), 0.0) if np.isfinite(self.spring) else np.eye(N_MODES)[0]
+
     def orbit(self, force: float, omega: float) -> Orbit:
         """Periodic motion from rest under force cos(omega t), N. Raises NoPeriodicMotionError."""
         mass, damping, stiffness, load, _ = self.matrices()
