@@ -55,8 +55,8 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
     inertial = has_tangent & (high > INERTIAL * low)
-    if inertial.any():
-        # a mass behind a spring: the harmonics above that see the spring alone are not left to the mass
+    if inertial.any() and highest + 1 > INERTIAL_RATE:
+        # a mass behind a spring: harmonics that see the spring alone are not left to the mass
         inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
