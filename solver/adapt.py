@@ -23,9 +23,10 @@ from solver.period import nothing_happens
 from solver.settings import Resolution
 
 MOST_SAMPLES = 8192
-MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
 MOST_LEADS = 5  # ways to more harmonics in one refinement
 MOST_REFINEMENT = 200  # iterations of one refinement in all
+MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
+CHEAP = 2000  # unknowns up to which they are that few, two steps up the ladder
 MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
 MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
 AIM = 0.8  # of rtol: an estimate is one within a factor
@@ -100,7 +101,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         if more_samples:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
-        most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= DEAR else MOST_REFINEMENT)
+        most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= CHEAP else MOST_REFINEMENT)
         if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
             if finer is not None and finer.case.resolution == wanted:
                 next_level = finer
