@@ -138,5 +138,8 @@ def _allowed(here: Level, resolution: Resolution) -> bool:
         return False
     most = MOST_OF_FEW if here.joint.slots.size <= FEW_ROWS else MOST_UNKNOWNS
     if resolution.highest > MOST_HARMONICS:
+        # friction alone: motions that hit something take their time in vain
+        if not all(order % 2 for order in resolution.orders):
+            return False
         most = min(most, DEAR)
     return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and here.unknowns(resolution) <= most

@@ -5,7 +5,7 @@ from __future__ import annotations
 from solver.settings import Resolution, SolverSettings, all_orders, samples_for
 
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
-"""Highest harmonics; "auto" uses all but the last two, and those above `MOST_HARMONICS` where the unknowns are few."""
+"""Highest harmonics; "auto" uses all but the last two, those above `MOST_HARMONICS` only where they are odd and few."""
 MOST_HARMONICS = 79
 RESOLVED = 0.5  # periods of the highest harmonic that the shortest contact takes, from where on harmonics see it
 
