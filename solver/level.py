@@ -32,6 +32,7 @@ MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
 FEW_ITERATIONS = 30  # where they are dear
 DEAR = 1000  # unknowns
 MOST_FAR = 200  # of a balance that is solved to see a short contact
+MOST_REACHED = 400  # the same to see where the structure answers as the penalty does: found in a few iterations
 MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
@@ -79,9 +80,9 @@ class Level:
         """Unknowns of the balance with other harmonics."""
         return self.joint.slots.size * (2 * len(resolution.orders) + 1)
 
-    def may_look_at(self, resolution: Resolution) -> bool:
+    def may_look_at(self, resolution: Resolution, most: int = MOST_FAR) -> bool:
         """Whether a state of so many more harmonics is so cheap that it may be asked what these miss."""
-        return self.unknowns(resolution) <= MOST_FAR and self.case.model.holds(resolution.highest)
+        return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
     def led_to(self, resolution: Resolution, effort: Effort) -> Level | None:
         """The same state with more harmonics, these raised from nothing; None where that way ends."""
@@ -190,11 +191,11 @@ class Level:
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        if self.unknowns(on_ladder(self.case.resolution, 2)) <= MOST_FAR:
+        if self.may_look_at(on_ladder(self.case.resolution, 2), MOST_REACHED):
             reaching = steps_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
             )
-            while reaching > 2 and not self.may_look_at(on_ladder(self.case.resolution, reaching)):
+            while not self.may_look_at(on_ladder(self.case.resolution, reaching), MOST_REACHED):
                 reaching -= 1
         for steps in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
             other = on_ladder(self.case.resolution, steps)
