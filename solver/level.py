@@ -32,7 +32,8 @@ MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
 FEW_ITERATIONS = 30  # where they are dear
 DEAR = 1000  # unknowns
 MOST_FAR = 200  # of a balance that is solved to see a short contact
-MOST_REACHED = 400  # the same to see where the structure answers as the penalty does: found in a few iterations
+FEW_PLACES = 2  # relative displacements: where there are more, states far up the ladder are rarely found at once
+MOST_REACHED = 400  # of a balance of so few that is solved to see how the structure goes on
 MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
 HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
 NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
@@ -191,11 +192,12 @@ class Level:
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        if self.may_look_at(on_ladder(self.case.resolution, 2), MOST_REACHED):
+        most = MOST_REACHED if self.joint.slots.size <= FEW_PLACES else MOST_FAR
+        if self.may_look_at(on_ladder(self.case.resolution, 2), most):
             reaching = steps_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
             )
-            while not self.may_look_at(on_ladder(self.case.resolution, reaching), MOST_REACHED):
+            while not self.may_look_at(on_ladder(self.case.resolution, reaching), most):
                 reaching -= 1
         for steps in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
             other = on_ladder(self.case.resolution, steps)
