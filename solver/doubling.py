@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.adapt import transfer
 from solver.balance import Balance, Evaluation, Linearisation
 from solver.harmonics import build_basis, change_orders
 from solver.joint import Case, Joint
 from solver.kernels import SEPARATED
+from solver.level import transfer
 from solver.linear import JacobianSolver
 from solver.model import FloatArray, ReducedModel
 from solver.path import Effort, solve_balance
@@ -42,7 +42,7 @@ def doubles_period(case: Case, joint: Joint, evaluation: Evaluation, effort: Eff
     if case.resolution.highest < SHARP.highest and _unknowns(joint, SHARP.orders) <= MOST_UNKNOWNS:
         sharp = case.at(replace(SHARP, samples=max(SHARP.samples, case.resolution.samples)))
         finer = sharp.joint(joint.omega, joint.excitation_amplitude)
-        balance, start = transfer(sharp, finer, evaluation, joint.basis.orders)
+        balance, start = transfer(sharp, finer, evaluation, joint.basis.orders, joint.penalty.inertial)
         result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
         if result.converged:
             joint, evaluation = finer, result.evaluation

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.balance import Balance, Evaluation
-from solver.harmonics import build_basis, change_orders, to_complex
+from solver.harmonics import build_basis, change_orders, synthesis, to_complex
 from solver.joint import Case, Joint
 from solver.linear import JacobianSolver
-from solver.model import ComplexArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, follow_naturally, solve_balance
 from solver.settings import Resolution
 
@@ -48,13 +48,35 @@ def lead_to(
     return last.evaluation if arrived else None
 
 
-def start_with_tail(joint: Joint, evaluation: Evaluation, old: tuple[int, ...]) -> tuple[Balance, FloatArray]:
+def carried_history(evaluation: Evaluation, orders: tuple[int, ...], inertial: BoolArray, joint: Joint) -> FloatArray:
+    """History (n_contact, 2), m, of a state in the terms of another joint: pairs may be marched with their mass in one
+    of them only.
+
+    inertial (n_contact,): where they were in the state, of harmonics `orders`. A pair that is now takes its mean
+    position along; one that no longer is its place at the end of the period, which its corrected slip equals
+    (`kernels`: the tangential state is the penalty times the motion).
+    """
+    now = joint.penalty.inertial
+    if np.array_equal(inertial, now):
+        return evaluation.history
+    tangential = evaluation.displacement_h[:, 1:]
+    n_samples = evaluation.force_t.shape[2]
+    at_end = (tangential @ synthesis(orders, np.array([-2.0 * np.pi / n_samples])))[:, :, 0]
+    changed = np.where(now[:, None], tangential[:, :, 0], at_end)
+    return np.where((inertial == now)[:, None], evaluation.history, changed)
+
+
+def start_with_tail(
+    joint: Joint, evaluation: Evaluation, old: tuple[int, ...], inertial: BoolArray | None = None
+) -> tuple[Balance, FloatArray]:
     """Balance and predicted force (n_rel, m), N, with which a state of harmonics `old` is solved with more of them.
 
-    joint: with all harmonics, of the case. The new ones are those of the force samples and what the structure does
-    under them: zeros would take back the impacts that the samples have.
+    joint: with all harmonics, of the case. inertial: as in `carried_history`, by default those of the joint. The new
+    harmonics are those of the force samples and what the structure does under them: zeros would take back the impacts
+    that the samples have.
     """
-    balance = Balance(joint, evaluation.history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
+    history = carried_history(evaluation, old, joint.penalty.inertial if inertial is None else inertial, joint)
+    balance = Balance(joint, history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
     orders = joint.basis.orders
     force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
     motion_h, force_h = (

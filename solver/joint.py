@@ -18,10 +18,12 @@ from solver.structure import CondensedStructure, build_structure, relative_indic
 class Joint:
     """Everything that stays the same while a periodic state is sought, with H harmonics.
 
+    model: what the structure was condensed from.
     slots (n_rel,): place `3 pair + component` of each relative displacement. has_normal (n_contact,): False where the
     normal force is constant. line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
     """
 
+    model: ReducedModel
     omega: float
     excitation_amplitude: float
     friction_coefficient: float
@@ -45,10 +47,7 @@ class Joint:
 
     def step_share(self) -> FloatArray:
         """Harmonics (2H+1,) of the mean over a step around each sample, over those of the samples."""
-        share = np.ones(2 * self.basis.n_harmonics + 1)
-        angle = np.pi * np.array(self.basis.orders) / self.basis.n_samples
-        share[1::2] = share[2::2] = np.sin(angle) / angle
-        return share
+        return step_share(self.basis.orders, self.basis.n_samples)
 
     def _inertial_compliance(self) -> ComplexArray:
         """Displacement per force (n_inertial, H), m/N, of the marched masses, exactly as the steps see it."""
@@ -102,6 +101,14 @@ class Joint:
         return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.slots]
 
 
+def step_share(orders: tuple[int, ...], n_samples: int) -> FloatArray:
+    """Harmonics (2H+1,) of the mean over a step around each of the samples, over those of the samples."""
+    share = np.ones(2 * len(orders) + 1)
+    angle = np.pi * np.array(orders) / n_samples
+    share[1::2] = share[2::2] = np.sin(angle) / angle
+    return share
+
+
 @dataclass(frozen=True)
 class Case:
     """What all states of one computation have in common; `joint` gives the joint at a frequency and amplitude.
@@ -125,6 +132,7 @@ class Case:
         tangents = self.model.contact.dofs[:, 1:] >= 0
         one = tangents.sum(axis=1) == 1
         return Joint(
+            model=self.model,
             omega=omega,
             excitation_amplitude=excitation_amplitude,
             friction_coefficient=self.friction_coefficient,

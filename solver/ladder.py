@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from solver.settings import Resolution, SolverSettings, all_orders, samples_for
 
-LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165)  # highest harmonics; "auto" uses all but the last two
+LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
+"""Highest harmonics; "auto" uses all but the last two, those above `MOST_HARMONICS` only where they are odd and few."""
+MOST_HARMONICS = 79
 RESOLVED = 0.5  # periods of the highest harmonic that the shortest contact takes, from where on harmonics see it
 
 
@@ -39,3 +41,8 @@ def steps_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
     above = [step for step in LADDER if step > resolution.highest]
     blind = sum(step * contact < RESOLVED for step in above)
     return max(fewest, min(blind + 1, len(above)))
+
+
+def steps_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
+    """Steps up the ladder, at least `fewest`, to harmonics up to `highest`."""
+    return max(fewest, sum(resolution.highest < step <= highest for step in LADDER))

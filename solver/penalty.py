@@ -8,7 +8,9 @@ highest harmonic:
 - a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
   E_n = eps near that stiffness, Eq. (10);
 - a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is marched with its mass (`solver.inertia`),
-  `E_n = -(n w)^2 m + i n w c`.
+  `E_n = -(n w)^2 m + i n w c`;
+- a mass that a stiff spring ties to its slider is marched with its mass as long as the harmonics left out see that, and
+  taken at displacement level from where they see the spring.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure import condense, relative_indices
 
 INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
-INERTIAL_RATE = 8.0  # of the frequency: where that is judged, for any number of harmonics alike
+INERTIAL_RATE = 8.0  # of the frequency: where that is judged first, for any number of harmonics alike
 DRAG = 0.1  # of m w: forgets the start of a period to a half within the next
 STATIC_SHARE = 1e-5  # of the stiffness at the frequency: what holds the mean position of a marched mass
 
@@ -53,6 +55,9 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
     inertial = has_tangent & (high > INERTIAL * low)
+    if inertial.any() and highest + 1 > INERTIAL_RATE:
+        # a mass behind a spring: harmonics that see the spring alone are not left to the mass
+        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
         mass[inertial] = _mass_at(model, rate)[inertial]
@@ -84,11 +89,16 @@ def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
     """Mass (n_contact,), kg, that a pair moves against a force along a tangent, all other pairs being free."""
     _, slots = relative_indices(model.contact)
     # 1 / G grows as k + m s^2 where it is inertial, G the compliance
-    low, high = (1.0 / np.real(np.diag(np.linalg.inv(_condensed_at(model, s)))) for s in (rate, 2.0 * rate))
+    low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
     mass = np.full(model.contact.n_contact, np.inf)
     tangent = slots % 3 > 0
     np.minimum.at(mass, slots[tangent] // 3, ((high - low) / (3.0 * rate**2))[tangent])
     return mass
+
+
+def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
+    """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, all others being free."""
+    return np.asarray(np.real(np.diag(np.linalg.inv(_condensed_at(model, rate)))))
 
 
 def _condensed_at(model: ReducedModel, rate: float) -> Matrix:

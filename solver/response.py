@@ -11,7 +11,7 @@ from solver.arc import follow_arc
 from solver.balance import Balance, Evaluation
 from solver.certificate import Certificate
 from solver.friction_path import solve_from_less_friction
-from solver.harmonics import build_basis, change_orders, from_complex, to_complex
+from solver.harmonics import change_orders, from_complex, to_complex
 from solver.history import PeriodicState
 from solver.joint import Case, Joint, static_joint
 from solver.kernels import SEPARATED
@@ -20,6 +20,7 @@ from solver.loops import contact_loops
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance
+from solver.peak import largest_responses
 from solver.settings import Resolution
 from solver.settling import settle
 from solver.stability import is_stable
@@ -27,7 +28,6 @@ from solver.stability import is_stable
 LOAD_STEPS = 20
 FEW_ITERATIONS = 5  # of a load step from the state before, grown with its load
 RELIEF = (0.1, 0.4)  # of the static friction forces, where vibration cannot be raised from the static state
-PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
 
 
 def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
@@ -203,7 +203,6 @@ def report_state(
     """Pressures, slip and responses of a converged state. loops: pairs whose fretting loops are reported, too."""
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
-    response_t = response_h @ build_basis(joint.basis.orders, PEAK_POINTS).synthesis
     return StateReport(
         wear_depth=evaluation.wear_depth,
         slip_work=evaluation.slip_work,
@@ -212,7 +211,7 @@ def report_state(
         slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
-        response_peak=np.abs(response_t).max(axis=1),
+        response_peak=largest_responses(joint, evaluation),
         loop_displacement=loop_displacement,
         loop_force=loop_force,
         certificate=certificate,

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from solver.adapt import Refined, lighter, refine, transfer
+from solver.adapt import Refined, lighter, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.joint import Case, Joint
+from solver.level import transfer
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.outcome import Outcome
@@ -330,7 +331,7 @@ class Sweep:
 
 def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, effort: Effort) -> PathPoint | None:
     """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
-    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders)
+    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
     result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
     if not result.converged:
         return None

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import adapt
 from solver.balance import Balance
 from solver.certificate import certify
 from solver.continuation import follow_branch
 from solver.creep import creep_work, creeps, rest_masses
 from solver.history import StartState
 from solver.joint import Joint, build_case
+from solver.level import Level
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
 from solver.settings import SolverSettings
@@ -32,12 +32,12 @@ def creeping(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoi
     """The first state that is refined, before anything is done about its creep."""
     seen: list[tuple[Joint, PathPoint]] = []
 
-    def note(level: adapt._Level, _: Effort) -> adapt._Level:
+    def note(level: Level, _: Effort) -> Level:
         seen.append((level.joint, level.point))
         return level
 
     with monkeypatch.context() as patched:
-        patched.setattr(adapt._Level, "at_rest", note)
+        patched.setattr(Level, "at_rest", note)
         started(seed)
     return seen[0]
 
@@ -68,7 +68,7 @@ def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.
 @pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
 def test_states_whose_slip_was_creep_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert started(seed).outcome is Outcome.CONVERGED
-    monkeypatch.setattr(adapt._Level, "at_rest", lambda level, _: level)
+    monkeypatch.setattr(Level, "at_rest", lambda level, _: level)
     assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
 
 

@@ -12,6 +12,7 @@ from solver.continuation import follow_branch
 from solver.enrich import _compliances, _Way, lead_to, start_with_tail
 from solver.harmonics import change_orders
 from solver.joint import Case
+from solver.level import Level, transfer
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint
 from solver.settings import Resolution, SolverSettings, all_orders
@@ -49,7 +50,7 @@ def test_the_way_begins_at_the_state_and_ends_at_the_balance(which: int) -> None
 def test_a_state_is_led_to_the_one_that_a_warm_start_finds(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
-    led = adapt._Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
+    led = Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
     assert led is not None
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(led.case, omega, amplitude, led.point)
@@ -64,7 +65,7 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
     other = case.at(RICH)
     joint = other.joint(omega, amplitude)
     balance, tailed = start_with_tail(joint, point.evaluation, case.resolution.orders)
-    plain, padded = adapt.transfer(other, joint, point.evaluation, case.resolution.orders)
+    plain, padded = transfer(other, joint, point.evaluation, case.resolution.orders)
     assert balance.evaluate(tailed).scaled_residual() < plain.evaluate(padded).scaled_residual()
 
 

@@ -15,7 +15,8 @@ from solver.history import PeriodicState
 from solver.joint import Case, Joint, build_case
 from solver.model import FloatArray, ReducedModel
 from solver.path import Effort, PathPoint
-from solver.response import PEAK_POINTS, largest_distance, periodic_state, report_state, solve_static_state
+from solver.peak import PEAK_POINTS
+from solver.response import largest_distance, periodic_state, report_state, solve_static_state
 from solver.settings import SolverSettings, all_orders
 from tests.solver.contact_twin import pair_period, status
 from tests.solver.models import OMEGA, dovetail, first_point, random_model

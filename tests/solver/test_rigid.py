@@ -1,0 +1,156 @@
+"""Rigid friction at the tip of a cantilever, and the peak of a slider, against exact motions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.enrich import carried_history
+from solver.harmonics import synthesis
+from solver.history import StartState
+from solver.joint import build_case
+from solver.level import Level
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.path import Effort
+from solver.peak import largest_responses, tail_orders
+from solver.penalty import build_penalty
+from solver.reach import reach, reaches
+from solver.settings import Resolution, SolverSettings
+from tests.cantilever import FRICTION, Cantilever
+from tests.references import den_hartog_amplitude
+from tests.solver.exact import NATURAL
+from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
+
+SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
+CASES = [  # spring, force, N, frequency, rad/s
+    ("rigid", 3.0, 0.7),
+    ("rigid", 6.0, 0.7),
+    ("rigid", 3.0, 0.96),
+    ("rigid", 6.0, 1.6),
+    ("soft spring", 6.0, 0.7),
+    ("soft spring", 3.0, 1.0),
+    ("stiff spring", 6.0, 0.85),
+    ("stiff spring", 3.0, 0.96),
+    ("stiff spring", 6.0, 1.2),
+]
+
+
+@lru_cache
+def exact(name: str, force: float, omega: float) -> tuple[complex, float]:
+    """First harmonic and largest displacement of the tip, m."""
+    beam = Cantilever(spring=SPRINGS[name])
+    orbit, tip = beam.orbit(force, omega), beam.tip_of_orbit()
+    first = sum(share * orbit.harmonic(dof) for dof, share in enumerate(tip))
+    return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
+
+
+def reported(
+    model: ReducedModel, friction: float, start: StartState, settings: SolverSettings
+) -> tuple[complex, float]:
+    """First harmonic and largest value, m, that are reported of the response of an unworn state."""
+    history = march_wear(model, friction, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
+    return complex(history.response[0, 0]), float(history.response_peak[0, 0])
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+@pytest.mark.parametrize(("name", "force", "omega"), CASES)
+def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
+    name: str, force: float, omega: float, rtol: float
+) -> None:
+    model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
+    (start,) = branch_states(model, FRICTION, force, [omega], settings)
+    assert start.outcome is Outcome.CONVERGED
+    first, peak = exact(name, force, omega)
+    found, largest = reported(model, FRICTION, start, settings)
+    error, peak_error = abs(found / first - 1.0), abs(largest / peak - 1.0)
+    assert 1e-8 < error < rtol
+    assert peak_error < rtol
+    assert 0.5 * max(error, peak_error) < start.response_error <= rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+@pytest.mark.parametrize("ratio", [0.62, 0.9])
+def test_the_peak_of_den_hartogs_slider(ratio: float, rtol: float) -> None:
+    model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(rtol=rtol)
+    (start,) = branch_states(model, 0.5, 10.0, [ratio * NATURAL], settings)
+    largest = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, ratio * NATURAL)
+    error = abs(reported(model, 0.5, start, settings)[1] / largest - 1.0)
+    assert error < rtol
+    assert 0.5 * error < start.response_error <= rtol
+
+
+def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
+    # the spring of 200 N/m and the tip's 0.05 kg are in resonance at 63 rad/s
+    sprung, rigid = Cantilever(spring=200.0).model(), Cantilever().model()
+    assert [bool(build_penalty(sprung, 1.0, highest).inertial[0]) for highest in (3, 27, 79, 165)] == [1, 1, 0, 0]
+    assert all(build_penalty(rigid, 1.0, highest).inertial[0] for highest in (3, 27, 79, 165))
+    # from there on the penalty is the spring
+    assert build_penalty(sprung, 1.0, 1000).tangential[0] == pytest.approx(200.0, rel=1e-2)
+
+
+def test_how_many_harmonics_reach_beyond_the_structure() -> None:
+    slider = scene("sdof_slider", normal_stiffness=0.0)
+    # k / (k + m s^2) of a mass on a spring is a quarter at sqrt(3) times its natural frequency
+    assert not reaches(slider, NATURAL / 10.0, 15)
+    assert reaches(slider, NATURAL / 10.0, 17)
+    assert reach(slider, NATURAL, 1) == 1
+    # the modes of the beam end at 57 rad/s
+    assert 27 <= reach(Cantilever().model(), 1.0, 3) <= 79
+    assert reach(Cantilever().model(), 1.0, 115) == 115
+
+
+def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
+    omega, settings = 0.62 * NATURAL, SolverSettings(harmonics=9, samples=512)
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    case = build_case(model, 0.5, omega, settings)
+    at = first_point(case, omega, 10.0, np.zeros(1)).evaluation
+    joint = case.joint(omega, 10.0)
+    exact_peak = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, omega)
+    series = np.abs(at.displacement_h[0, 1] @ synthesis(joint.basis.orders, np.linspace(0.0, 2.0 * np.pi, 1025))).max()
+    assert abs(series / exact_peak - 1.0) > 1e-3
+    assert largest_responses(joint, at) == pytest.approx([exact_peak], rel=1e-4)
+    # odd ones go on odd
+    odd = case.at(Resolution((1, 3, 5, 7, 9), 512)).joint(omega, 10.0)
+    assert tail_orders(odd) == tuple(range(11, 28, 2))
+    assert tail_orders(joint) == tuple(range(10, 28))
+
+
+def test_an_elastic_joint_has_no_tail() -> None:
+    model = random_model(4, ("constant_load",))
+    assert tail_orders(build_case(model, 0.4, OMEGA, SolverSettings()).joint(OMEGA, 1.0)) == ()
+
+
+@pytest.mark.parametrize(("first", "second"), [(27, 79), (79, 27)])
+def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, second: int) -> None:
+    beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
+    rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))
+    case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
+    point = first_point(case, omega, force, np.zeros(1))
+    other = Level(case, case.joint(omega, force), point).solve_at(poor, Effort())
+    assert other is not None
+    assert case.penalty.inertial[0] != other.case.penalty.inertial[0]
+    # both are within their errors of the exact motion
+    level = Level(case, case.joint(omega, force), point)
+    for each in (level, other):
+        assert abs(each.response()[0] / exact("stiff spring", force, omega)[0] - 1.0) < 0.02
+
+
+def test_what_a_state_carries_into_the_terms_of_another_penalty() -> None:
+    omega, force = 0.85, 6.0
+    case = build_case(Cantilever(spring=200.0).model(), FRICTION, omega, SolverSettings(), Resolution((1, 3, 5), 64))
+    joint = case.joint(omega, force)
+    at = first_point(case, omega, force, np.zeros(1)).evaluation
+    marched = case.penalty.inertial
+    assert marched.tolist() == [True]
+    assert np.array_equal(carried_history(at, (1, 3, 5), marched, joint), at.history)
+    elastic = replace(joint, penalty=replace(joint.penalty, inertial=~marched))
+    carried = carried_history(at, (1, 3, 5), marched, elastic)
+    last = at.displacement_h[0, 1:] @ synthesis((1, 3, 5), np.array([2.0 * np.pi * 63 / 64]))
+    assert carried[0] == pytest.approx(last[:, 0], rel=1e-12)
+    back = carried_history(at, (1, 3, 5), ~marched, joint)
+    assert np.array_equal(back, at.displacement_h[:, 1:, 0])
