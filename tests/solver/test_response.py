@@ -199,7 +199,7 @@ def test_the_random_states_stick_slip_and_open() -> None:
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     joint, point, state = periodic(kinds, 1)
-    report = report_state(joint, point.evaluation, certify(joint, point.evaluation))
+    report = report_state(joint, point.evaluation, certify(joint, point.evaluation), np.zeros(joint.contact.n_contact))
     model = case_of(kinds, 1).model
     at = point.evaluation
     motion = full_motion(model, state)
