@@ -122,7 +122,7 @@ class AxesSection(Section):
     excitation_amplitude: PositiveAxis = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
     step: PositiveAxis = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
     scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
-        ("implicit",), description="of the wear steps"
+        ("adaptive",), description="of the wear steps"
     )
     sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down", "ramp")))] = Field(
         ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"

@@ -1,0 +1,165 @@
+"""Estimated over true errors of worn volumes: bundled dovetail and random small joints, all schemes and steps.
+
+    python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
+
+The truth of a dovetail is the adaptive scheme with a tolerance ten times smaller and harmonics given, from the start
+state of a sweep in steps five times as fine; that of a random joint implicit steps 32 times as short. What is wanted:
+at least half the true error everywhere, in the median not more than ten times it. Where both are below `FLOOR` of the
+volume nothing is compared: the truth is not known better.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver import sweep as sweeps
+from solver.continuation import follow_branch
+from solver.history import StartState, WearHistory
+from solver.march import march_wear
+from solver.model import ReducedModel
+from solver.settings import Scheme, SolverSettings
+from tests.solver.models import branch_states, random_model, scene
+
+WEAR = 1.1e-11  # 1/Pa
+STEPS = (250.0, 500.0, 1000.0, 2000.0)
+FREQUENCIES = {1: (212.5, 212.75, 213.0, 213.25), 2: (211.0, 211.25, 211.5, 211.75, 212.0, 212.25, 212.5), 3: (211.0,)}
+FLOOR = 2e-3
+KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d"))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One history: its name, its estimated and true error at the end, the smallest ratio of both on the way."""
+
+    name: str
+    estimated: float
+    true: float
+    smallest: float
+    seconds: float
+
+    def line(self) -> str:
+        """A row of the table."""
+        ratio = self.estimated / self.true if self.true > 0.0 else float("nan")
+        return (
+            f"{self.name:<44} {self.estimated:9.2e} {self.true:9.2e} {ratio:7.2f} {self.smallest:7.2f} "
+            f"{self.seconds:6.1f} s"
+        )
+
+
+def compare(name: str, history: WearHistory, truth: WearHistory, seconds: float) -> Compared:
+    """Errors of a history against the true one at the same counts."""
+    true = np.abs(history.worn_volume - truth.worn_volume)
+    estimated = history.worn_volume_error * history.worn_volume
+    # only where something has worn and the truth is known
+    last = np.nanmax(truth.worn_volume)
+    seen = (truth.worn_volume > 1e-3 * last) & (true > FLOOR * truth.worn_volume) & np.isfinite(true)
+    ratios = estimated[seen] / true[seen]
+    volume = history.worn_volume[-1]
+    return Compared(
+        name,
+        history.error_estimate,
+        float(true[-1] / volume) if volume > 0.0 else 0.0,
+        ratios.min(initial=np.inf),
+        seconds,
+    )
+
+
+def dovetail_starts(model: ReducedModel, frequencies: tuple[float, ...], fine: bool) -> list[StartState]:
+    """Start states with automatic settings, or for the truth."""
+    settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3) if fine else SolverSettings()
+    before = sweeps.SMALLEST_CHANGE, sweeps.LARGEST_CHANGE
+    if fine:
+        sweeps.SMALLEST_CHANGE = sweeps.LARGEST_CHANGE = 0.02
+    try:
+        found = dict(follow_branch(model, 0.5, 0.5, np.array(frequencies), "up", settings))
+    finally:
+        sweeps.SMALLEST_CHANGE, sweeps.LARGEST_CHANGE = before
+    return [found[place] for place in range(len(frequencies))]
+
+
+def dovetail(mesh: int, steps: tuple[float, ...]) -> list[Compared]:
+    """All schemes and steps at the frequencies at which the dovetail wears."""
+    model = scene("dovetail_sector", 13, mesh=mesh)
+    frequencies, cycles = FREQUENCIES[mesh], np.linspace(0.0, 1e5, 101)
+    runs: list[tuple[Scheme, float]] = [("adaptive", 1e-2)]
+    runs += [(scheme, step) for scheme in ("implicit", "explicit") for step in steps]
+    compared = []
+    exact = SolverSettings(harmonics=9, samples=128, rtol=1e-3)
+    for frequency, fine, start in zip(
+        frequencies, dovetail_starts(model, frequencies, True), dovetail_starts(model, frequencies, False), strict=True
+    ):
+        truth = march_wear(model, 0.5, fine, WEAR, 1000.0, "adaptive", cycles, exact)
+        print(
+            f"mesh {mesh}, {frequency} Hz: {1e9 * truth.worn_volume[-1]:.5f} mm3, by itself known to "
+            f"{truth.error_estimate:.1e}, {truth.outcome.meaning}",
+            flush=True,
+        )
+        for scheme, step in runs:
+            begun = time.thread_time()
+            history = march_wear(model, 0.5, start, WEAR, step, scheme, cycles, SolverSettings())
+            name = f"mesh {mesh}, {frequency} Hz, {scheme} {step:g} {history.outcome.meaning}"
+            compared.append(compare(name, history, truth, time.thread_time() - begun))
+            print(compared[-1].line(), flush=True)
+    return compared
+
+
+def random_joints(n: int) -> list[Compared]:
+    """Small joints of random structures, steps from a twentieth of the explicit limit to half of it."""
+    compared = []
+    settings = SolverSettings(harmonics=5, samples=64)
+    for seed in range(n):
+        random = np.random.default_rng(seed)
+        model = random_model(seed, KINDS[seed % len(KINDS)])
+        (start,) = branch_states(model, 0.4, float(random.uniform(40.0, 150.0)), [600.0], settings)
+        if start.state is None:
+            continue
+        limit = march_wear(model, 0.4, start, WEAR, 1.0, "implicit", np.array([0.0]), settings).step_limit
+        if not np.isfinite(limit):
+            continue
+        step = float(limit * random.choice([0.05, 0.15, 0.5]))
+        cycles = np.linspace(0.0, 24.0 * step, 13)
+        truth = march_wear(model, 0.4, replace(start, coarse=None), WEAR, step / 32.0, "implicit", cycles, settings)
+        for scheme in ("implicit", "explicit", "adaptive"):
+            begun = time.thread_time()
+            history = march_wear(model, 0.4, start, WEAR, step, scheme, cycles, settings)
+            name = f"joint {seed}, {scheme} {step / limit:.2g} of the limit"
+            compared.append(compare(name, history, truth, time.thread_time() - begun))
+    return compared
+
+
+def summarise(title: str, compared: list[Compared]) -> None:
+    """The worst of all, and the median."""
+    known = [one for one in compared if np.isfinite(one.smallest)]
+    ratios = [one.estimated / one.true for one in known if one.true > FLOOR]
+    if not known:
+        return
+    worst = min(known, key=lambda one: one.smallest)
+    n_low = sum(one.smallest < 0.5 for one in known)
+    print(
+        f"{title}: {len(known)} histories, ratio at the end in the median {np.median(ratios):.2f}, at least "
+        f"{min(ratios):.2f}; on the way at least {worst.smallest:.2f}; {n_low} below 0.5"
+    )
+    for one in sorted(known, key=lambda one: one.smallest)[:5]:
+        print("   ", one.line())
+
+
+def main() -> None:
+    """Everything that is asked for."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--mesh", type=int, nargs="*", default=[1])
+    parser.add_argument("--random", type=int, default=0)
+    parser.add_argument("--step", type=float, nargs="*", default=list(STEPS))
+    given = parser.parse_args()
+    print(f"{'history':<44} estimated      true   ratio  on the way")
+    for mesh in given.mesh:
+        summarise(f"mesh {mesh}", dovetail(mesh, tuple(given.step)))
+    if given.random:
+        summarise("random joints", random_joints(given.random))
+
+
+if __name__ == "__main__":
+    main()
