@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.machines --mesh 2 --noise 3
 
-Every variant runs in a process of its own. OpenBLAS takes its kernels by OPENBLAS_CORETYPE; noise of 1e-13 of their size,
-symmetric, is put on the matrices of the scene. Printed are the outcome of every point and the largest difference to the
+Every variant runs in a process of its own. OpenBLAS takes its kernels by OPENBLAS_CORETYPE; symmetric noise of relative
+size 1e-13 is put on the matrices of the scene. Printed are the outcome of every point and the largest difference to the
 first variant over the sum of both errors: at most 1 is wanted.
 """
 

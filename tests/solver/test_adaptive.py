@@ -61,6 +61,7 @@ def test_a_step_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None
     # no error is refused, so that the steps are known: the first one Euler's, the second one by the formula with w
     monkeypatch.setattr(adaptive, "SHARE", 1e9)
     monkeypatch.setattr(adaptive, "FIRST", 1e-2)
+    monkeypatch.setattr(adaptive, "FIRST_DEPTH", 1e9)
     first = 1e-2 * adaptive_march(1.0).step_limit
     w = adaptive.LONGEST_RATIO
     history = adaptive_march(1.0, cycles=np.array([0.0, first, (1 + w) * first, END]))
