@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver import march as march_module
 from solver.history import StartState, WearHistory
 from solver.march import march_wear
 from solver.model import ReducedModel
@@ -124,9 +125,12 @@ def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch: pytest.Mo
     assert ended.error_estimate == ended.worn_volume_error[known][-1] > 0.0
 
 
-def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive() -> None:
+def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = worn("explicit", 4000.0)
+    monkeypatch.setattr(march_module, "SENSITIVE_ERROR", 0.9 * usual.error_estimate)
     model, found = start()
-    history = march_wear(model, 0.5, found, 40.0 * WEAR, 1000.0, "explicit", np.array([0.0, 1000.0]), GIVEN)
+    history = march_wear(model, 0.5, found, WEAR, 4000.0, "explicit", CYCLES, GIVEN)
     assert history.outcome is Outcome.SENSITIVE
-    assert "mm3" in history.message
-    assert np.isfinite(history.worn_volume).all()
+    # both values, in words
+    assert f"worn volume {1e9 * history.worn_volume[-1]:.3g} mm3, but " in history.message
+    assert np.array_equal(history.worn_volume, usual.worn_volume)
