@@ -135,6 +135,7 @@ class _Line:
         self.effort = Effort()
         self.origin: Origin | None = None
         self.walk: Sweep | None = None
+        self._walked = 0
 
     @property
     def penalty_omega(self) -> float:
@@ -162,12 +163,14 @@ class _Line:
         assert self.walk is not None
         assert self.origin is not None
         own = {"own_iterations": self.effort.iterations, "omega": self.walk.omega}
+        own["walked"] = max(self.walk.effort.iterations, self._walked)
         return self.walk.saved | own | {"origin": (self.origin.starts, self.origin.penalty, self.origin.cell)}
 
     def load_state(self, carried: dict[str, Any]) -> None:
         """Go on from what another one has carried so far."""
         self.origin = Origin(*carried.pop("origin"))
         self.effort.iterations = carried.pop("own_iterations")
+        self._walked = carried.pop("walked")
         self.walk = self._new_walk(self.origin, carried.pop("omega"))
         self.walk.load_state(carried)
 
@@ -183,7 +186,9 @@ class _Line:
         other_cell = self.origin is None or origin.cell != self.origin.cell
         if self.walk is None or self.sweep == "ramp" or other_cell or self.walk.has_passed(omega):
             self.origin = origin
-            self.effort.iterations += 0 if self.walk is None else self.walk.effort.iterations
+            # one that was loaded has not gone again to where it was
+            self.effort.iterations += max(0 if self.walk is None else self.walk.effort.iterations, self._walked)
+            self._walked = 0
             self.walk = self._new_walk(origin, omega if self.sweep == "ramp" else None)
             self._begin(self.walk, origin)
         walk, target = self.walk, 1.0 if self.sweep == "ramp" else omega

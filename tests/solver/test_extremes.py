@@ -140,9 +140,11 @@ def judge_start(case: Case, start: StartState) -> None:
 def judge_history(case: Case, start: StartState, history: WearHistory) -> None:
     numbers = ("wear_depth", "wear_rate", "worn_volume", "mean_pressure", "slip_range", "open_fraction")
     numbers += ("response", "response_peak")
-    if history.outcome is not Outcome.CONVERGED:
+    if not history.outcome.complete:
+        behind = ~(history.cycles <= history.last_cycle)
         for name in numbers:
-            assert np.isnan(getattr(history, name)).all(), f"{name} has numbers where the outcome is a failure"
+            assert np.isnan(getattr(history, name)[behind]).all(), f"{name} has numbers behind the last cycle"
+            assert np.isfinite(getattr(history, name)[~behind]).all(), f"{name} has lost numbers"
         assert start.outcome is Outcome.CONVERGED or history.outcome is start.outcome
         return
     for name in numbers:
@@ -160,7 +162,7 @@ def run_converged(case: Case) -> WearHistory:
     """A case whose states exist."""
     ended = run(case)
     assert ended.start.outcome is Outcome.CONVERGED, ended.start.outcome.sentence
-    assert ended.history.outcome is Outcome.CONVERGED, ended.history.outcome.sentence
+    assert ended.history.outcome.complete, ended.history.outcome.sentence
     return ended.history
 
 
@@ -172,10 +174,9 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
     if scheme == "implicit":
         run_converged(case)
         return
-    # steps of a tenth of all cycles are too long for some of these, and are said to be
     ended = run(case)
     assert ended.start.outcome is Outcome.CONVERGED
-    assert ended.history.outcome in (Outcome.CONVERGED, Outcome.SENSITIVE, Outcome.STEP_TOO_LONG)
+    assert ended.history.outcome.complete or ended.history.outcome is Outcome.STEP_TOO_LONG
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -184,8 +185,10 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
 def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
     ended = run(replace(base, wear=factor * base.wear, scheme=scheme))
     assert ended.start.outcome is Outcome.CONVERGED
-    if scheme == "implicit":
-        assert ended.history.outcome is Outcome.CONVERGED, ended.history.outcome.sentence
+    if scheme == "implicit" and factor <= 1.0:
+        assert ended.history.outcome.complete, ended.history.outcome.sentence
+    # a first step that wears all load off is no answer
+    assert ended.history.outcome.complete or (factor > 1.0 and ended.history.outcome is Outcome.STEP_TOO_LONG)
 
 
 @pytest.mark.parametrize("factor", [1e-4, 1e-2, 1.0, 5.0, 50.0])
@@ -346,7 +349,7 @@ def run_converged_at_steps(case: Case) -> WearHistory:
     start = run(case).start
     cycles = np.arange(round(case.cycles / case.step) + 1) * case.step
     history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
-    assert history.outcome is Outcome.CONVERGED
+    assert history.outcome.complete
     return history
 
 

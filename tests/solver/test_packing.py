@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from solver import continuation, march
+from solver import sweep as sweeps
 from solver.continuation import follow_branch
 from solver.history import StartState, WearHistory
 from solver.march import march_wear
@@ -137,30 +138,38 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_start_state_comes_back() -> None:
     (start,) = branch_states(dovetail(3), 0.5, 0.5, [2 * np.pi * 212.0], SolverSettings(3, 64))
     found = unpack(pack(start))
-    assert_same(replace(found, state=None), replace(start, state=None))
+    assert_same(replace(found, state=None, coarse=None), replace(start, state=None, coarse=None))
     assert_same(found.state, start.state)
-    failed = replace(start, state=None, outcome=Outcome.BRANCH_LOST)
+    assert_same(found.coarse, start.coarse)
+    failed = replace(start, state=None, coarse=None, outcome=Outcome.BRANCH_LOST)
     assert_same(unpack(pack(failed)), failed)
 
 
 @pytest.mark.parametrize("sweep", ["up", "down"])
 def test_a_sweep_goes_on_to_the_same_numbers(sweep: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""
-    monkeypatch.setattr(continuation, "REFRESH", 1)
+    monkeypatch.setattr(continuation, "KEEP", 1)
     for model, friction, amplitude, frequencies in (
         (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
         (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
     ):
-        monkeypatch.setattr(continuation, "COSTLY", 200)
-        kept: list[Packed] = []
-        arguments = (model, friction, amplitude, frequencies, sweep, AUTO)
-        whole = dict(follow_branch(*arguments, keep=kept.append))
+        monkeypatch.setattr(sweeps, "COSTLY", 200)
+        kept: list[tuple[frozenset[int], Packed]] = []
+        whole: dict[int, StartState] = {}
+
+        def note(progress: Packed, kept: list = kept, whole: dict = whole) -> None:
+            kept.append((frozenset(whole), progress))
+
+        for index, start in follow_branch(model, friction, amplitude, frequencies, sweep, AUTO, keep=note):
+            whole[index] = start
         assert len(kept) >= 2
-        for progress in kept:
-            done = unpack(progress)[0]
-            again = dict(follow_branch(*arguments, resume=progress))
-            assert len(again) == len(whole) - done
-            for index, start in again.items():
-                assert_same(replace(start, state=None), replace(whole[index], state=None))
-                if start.state is not None:
-                    assert_same(start.state, whole[index].state)
+        for done, progress in kept:
+            left = [index for index in range(frequencies.size) if index not in done]
+            again = follow_branch(model, friction, amplitude, frequencies[left], sweep, AUTO, resume=progress)
+            for place, start in again:
+                wanted = whole[left[place]]
+                assert_same(replace(start, state=None, coarse=None), replace(wanted, state=None, coarse=None))
+                for one, other in ((start.state, wanted.state), (start.coarse, wanted.coarse)):
+                    assert (one is None) == (other is None)
+                    if one is not None:
+                        assert_same(one, other)
