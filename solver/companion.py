@@ -36,6 +36,9 @@ from solver.trajectory import Trajectory
 MOST_PARTS = 40
 """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
 
+SPARE = 500
+"""Newton iterations that it may take beyond those of the history."""
+
 COSTLY, LIGHT = 2500, 1600
 """Unknowns from which the companion takes fewer harmonics than the history, and how many it has then at most: what
 these miss is in the difference, too."""
@@ -59,7 +62,7 @@ class Companion:
         coarse = replace(start, state=start.coarse or start.state)
         scheme: Scheme = "implicit" if main.scheme == "explicit" else main.scheme
         self.way = Trajectory(main.case, coarse, main.wear_coefficient, scheme)
-        self.way.effort = main.effort
+        self.effort = self.way.effort
         self.way.bounded = False
         self.cycles = cycles
         self.kept = np.full((cycles.size, main.still.size), np.nan)
@@ -81,7 +84,7 @@ class Companion:
 
     def carried(self) -> dict[str, Any]:
         """What goes on from step to step, to be packed."""
-        own = {name: getattr(self, name) for name in _CARRIED}
+        own: dict[str, Any] = {name: getattr(self, name) for name in _CARRIED}
         return own | {"way": self.way.carried(), "steps": None if self.steps is None else self.steps.carried()}
 
     def take_up(self, carried: dict[str, Any]) -> None:
@@ -99,6 +102,11 @@ class Companion:
         if self.waiting < 2 and not at_once:
             return
         self.waiting = 0
+        self.effort.deadline = self.main.effort.deadline
+        if self.effort.iterations > self.main.effort.iterations + SPARE:
+            # it has lost its way from jump to jump
+            self._begin_anew()
+            return
         if self.main.case.resolution != self.followed and not self._take_case():
             self._begin_anew()
             return

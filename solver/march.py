@@ -131,7 +131,8 @@ def march_wear(
     spent = spent_before + computing_time() - started
     # adaptive steps go beyond the end
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
-    history = recorder.finish(outcome, jump_cycle, march.effort.iterations, spent, companion.kept)
+    n_iterations = march.effort.iterations + companion.effort.iterations
+    history = recorder.finish(outcome, jump_cycle, n_iterations, spent, companion.kept)
     if outcome is Outcome.CONVERGED:
         outcome, message = _judge(march, history, companion)
     return replace(

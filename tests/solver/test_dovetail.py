@@ -132,7 +132,7 @@ def test_wear_at_resonance_only_grows(step: float, scheme: Scheme) -> None:
     assert history.worn_volume == pytest.approx(history.wear_depth @ dovetail().contact.area, rel=1e-14, abs=0.0)
     assert (history.open_fraction >= 0).all()
     assert (history.open_fraction <= 1).all()
-    assert 0 < history.error_estimate < 0.1
+    assert 0 < history.error_estimate < 0.2
 
 
 def test_both_schemes_are_of_first_order_and_have_one_limit() -> None:

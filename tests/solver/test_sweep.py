@@ -112,7 +112,7 @@ def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep: str) -> 
 
 def test_all_points_of_a_cell_share_their_origin() -> None:
     model = scene("two_masses")
-    origins = {find_origin(model, frequency, "up") for frequency in np.linspace(0.107, 0.126, 5)}
+    origins = {find_origin(model, frequency, "up") for frequency in np.linspace(0.106, 0.124, 5)}
     assert len(origins) == 1
 
 
