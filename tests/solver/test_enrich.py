@@ -70,13 +70,17 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
 
 
 def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = random_scene(THROWN_OFF)
+    scene, led = random_scene(THROWN_OFF), []
+    led_to = adapt.Level.led_to
 
-    def outcome() -> Outcome:
-        frequencies = np.array([scene.frequency_hz])
-        states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
-        return next(states)[1].outcome
+    def noted(level: adapt.Level, resolution: Resolution, effort: Effort) -> adapt.Level | None:
+        found = led_to(level, resolution, effort)
+        led.append(found is not None)
+        return found
 
-    assert outcome() is Outcome.CONVERGED
-    monkeypatch.setattr(adapt, "MOST_LEADS", 0)
-    assert outcome() is Outcome.INACCURATE
+    monkeypatch.setattr(adapt.Level, "led_to", noted)
+    frequencies = np.array([scene.frequency_hz])
+    states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
+    assert next(states)[1].outcome is Outcome.CONVERGED
+    # on the way to it warm starts fail, and states are led to more harmonics
+    assert any(led)
