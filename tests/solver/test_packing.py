@@ -27,7 +27,7 @@ from tests.solver.test_jump import start as impacting_start
 from tests.solver.test_jump import worn_wall
 
 AUTO = SolverSettings(rtol=3e-2)
-MOST_STOPS = 3  # from which a march is taken up again
+MOST_STOPS = 3
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_sweep_goes_on_to_the_same_numbers(sweep: str, monkeypatch: pytest.Mon
         for index, start in follow_branch(model, friction, amplitude, frequencies, sweep, AUTO, keep=note):
             whole[index] = start
         assert len(kept) >= 2
-        for done, progress in kept:
+        for done, progress in kept[:: max(1, len(kept) // 2)]:
             left = [index for index in range(frequencies.size) if index not in done]
             again = follow_branch(model, friction, amplitude, frequencies[left], sweep, AUTO, resume=progress)
             for place, start in again:

@@ -32,6 +32,7 @@ title = "Fretting wear of a dovetail root around the first bending mode"
 model = "files/scene.h5"
 friction_coefficient = 0.5
 [axes]
+scheme = "implicit"
 frequency = [211.5, 212.0]
 excitation_amplitude = 0.5
 [slow_time]
