@@ -34,8 +34,8 @@ from solver.sweep import MOST_ITERATIONS, Step, Sweep, move_point
 
 OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
 FEW_PAIRS = 12  # up to which a state that is not accurate is sought from nothing as well: impacts have many others
-AGAIN = 0.01  # of the frequency: how far behind the end of a walk, and how far apart, it is begun anew
-MOST_AGAIN = 40  # attempts to begin it anew
+AGAIN = 0.05  # of the frequency: how far behind the end of a walk, and how far apart, it is begun anew
+MOST_AGAIN = 6  # attempts to begin it anew
 FIRST_SHARE = 1e-3  # of the excitation: where a ramp begins
 KEEP = 100  # iterations after which the progress is handed out
 

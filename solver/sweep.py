@@ -41,6 +41,9 @@ SMALLEST_CHANGE, LARGEST_CHANGE = 0.02, 0.2
 LONGEST, SHORTEST = 0.03, 2e-5
 """Of the parameter: lengths of a step."""
 
+MOST_IN_ALL = 8000
+"""Newton iterations of a walk: one that takes more, in jumps and searches, leads nowhere (the dovetail: 1500)."""
+
 MANY_NODES = 300
 """From here on the shortest step grows with the square of their number: no walk takes for ever."""
 
@@ -155,7 +158,8 @@ class Sweep:
         while self.here is not None:
             if self.ahead is None:
                 self.effort.limit = self.effort.iterations + MOST_ITERATIONS
-                self.ahead = self._look_ahead()
+                lost = self.effort.iterations > MOST_IN_ALL
+                self.ahead = None if lost else self._look_ahead()
                 if self.ahead is None:
                     self.lost_at, self.here, self.coarse = self.here.parameter, None, None
                     return
