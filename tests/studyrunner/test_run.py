@@ -125,7 +125,9 @@ def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.M
     use_fake(monkeypatch, lambda _, result: result)
     assert main(SMALL) == 0
     assert main([*SMALL[:-2], "--write-scene", "scene.h5"]) == 0
-    frequency = "[study]\nname = 'file'\n[axes]\nfrequency = [100, 110, 120]\nexcitation_amplitude = 10\n"
+    frequency = (
+        "[study]\nname = 'file'\n[axes]\nscheme = 'implicit'\nfrequency = [100, 110, 120]\nexcitation_amplitude = 10\n"
+    )
     slow_time = "[slow_time]\ncycles = 20000\noutputs = 21\n"
     scene = "[scene]\nmodel = 'scene.h5'\nfriction_coefficient = 0.5\n"
     (folder / "sub").mkdir()

@@ -26,7 +26,7 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
         "wear_coefficient": (1.1e-11,),
         "excitation_amplitude": (1.0,),
         "step": (1000.0,),
-        "scheme": ("implicit",),
+        "scheme": ("adaptive",),
         "sweep": ("up",),
     }
     assert study.solver.model_dump() == {
