@@ -52,7 +52,7 @@ _SENTENCES = {
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
     Outcome.START_FAILED: "No periodic state was found at the start of the sweep, not even with the excitation raised"
     " gradually: use more harmonics or start elsewhere.",
-    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more frequencies or more harmonics.",
+    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more harmonics or another sweep.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller"
     " step or more harmonics.",
     Outcome.INACCURATE: "Computed to the end, but the estimated error of response or wear rate stays above rtol for"
@@ -62,11 +62,11 @@ _SENTENCES = {
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits:"
     " use more samples or a smaller tolerance.",
     Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"
-    " direction, use more frequencies or start elsewhere.",
+    " direction or raise the excitation at fixed frequency.",
     Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two periods of the excitation or more,"
     " which is not computed: the state that repeats after one is unstable.",
-    Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that more than half of the normal"
-    " forces move: its end is no result. The variable message says which step, and how long it may be.",
+    Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
+    " of the joint would move: its end is no result. The variable message says which step, and how long it may be.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",

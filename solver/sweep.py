@@ -231,9 +231,8 @@ class Sweep:
             self.coarse = step.point if coarse is None or coarse.folds else coarse.point
         before, now = self.checked, step.point
         assert before is not None
-        if max(
-            vibration_change(before.evaluation, now.evaluation), vibration_change(now.evaluation, before.evaluation)
-        ) > (RECHECK):
+        old, new = before.evaluation, now.evaluation
+        if max(vibration_change(old, new), vibration_change(new, old)) > RECHECK:
             self._choose_harmonics()
         if self.n_nodes % REFRESH == 0:
             self._save()

@@ -339,5 +339,5 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
 def test_readme_and_ci_have_the_same_test_command() -> None:
     root = Path(__file__).parents[2]
     readme, script = (root.joinpath(name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
-    (command,) = [line for line in readme.splitlines() if line.endswith("-m pytest")]
+    (command,) = [line for line in readme.splitlines() if line.endswith("-m pytest -n auto")]
     assert command in script.splitlines()
