@@ -29,8 +29,8 @@ from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.path import PathPoint
 from solver.record import depth_within
+from solver.route import move_point
 from solver.settings import Scheme, SolverSettings
-from solver.sweep import move_point
 from solver.trajectory import Trajectory
 
 MOST_PARTS = 40

@@ -29,8 +29,9 @@ from solver.packed import Packed
 from solver.packing import pack, unpack
 from solver.path import Effort, OutOfTimeError, PathPoint
 from solver.response import periodic_state, solve_first_state
+from solver.route import Step, move_point
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
-from solver.sweep import MOST_ITERATIONS, Step, Sweep, move_point
+from solver.sweep import MOST_ITERATIONS, Sweep
 
 OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
 FEW_PAIRS = 12  # up to which a state that is not accurate is sought from nothing as well: impacts have many others
@@ -210,15 +211,17 @@ class _Line:
         # those of a ramp are no frequencies
         fold = float("nan") if self.sweep == "ramp" else (walk.fold, *reached.folds)[-1]
         found = _Found(Outcome.CONVERGED, walk.branch + len(reached.folds), fold)
-        return self._judge(refined, omega, found, case, coarse)
+        return self._judge(refined, omega, found, walk.coarse_route.case, coarse)
 
-    def _judge(self, refined: Refined, omega: float, found: _Found, case: Case, coarse: PathPoint | None) -> _Found:
+    def _judge(
+        self, refined: Refined, omega: float, found: _Found, coarse_case: Case, coarse: PathPoint | None
+    ) -> _Found:
         """Whether a refined state is a result, with its error and what the coarse walk has come to."""
         joint = refined.case.joint(omega, self.excitation_amplitude)
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
         if coarse is not None:
-            moved = move_point(case, refined.case, joint, coarse, self.effort)
+            moved = move_point(coarse_case, refined.case, joint, coarse, self.effort)
             if moved is not None:
                 found.coarse = periodic_state(joint, moved)
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
@@ -246,8 +249,7 @@ class _Line:
             return False
         if point is None:
             return False
-        walk.case, walk.solver = case, JacobianSolver()
-        walk.begin(PathPoint(place, point.evaluation, point.history))
+        walk.begin(case, PathPoint(place, point.evaluation, point.history))
         return True
 
     def _walk_to(self, walk: Sweep, target: float) -> None:

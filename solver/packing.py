@@ -22,8 +22,8 @@ from solver.outcome import Outcome
 from solver.packed import Packed
 from solver.path import PathPoint
 from solver.response import StateReport
+from solver.route import Step
 from solver.settings import Resolution
-from solver.sweep import Step
 
 _CLASSES: dict[str, type[Any]] = {
     known.__name__: known

@@ -5,31 +5,28 @@ which the pairs stick, and these on all vibration before. A sweep therefore walk
 by what happens to the tangential history, and by nothing else. A state that is asked for between two nodes is reached
 from the node before it and leaves the walk as it is, so that a point has the same state whatever else is asked for.
 
-Every second node is also reached in one step from the second but last. This coarse walk, which is never corrected by
-the other one, shows what the steps of the sweep are wrong by: the error falls with their length, so that the
-difference of both is the error of the coarse one, and at least that of the fine one.
+Every second node is also reached in one step from the second but last, with fewer harmonics and samples where these
+are automatic. This coarse walk, which is never corrected by the other one, shows what the steps of the sweep and its
+harmonics are wrong by: the error falls with the length of the steps, so that the difference of both is the error of
+the coarse one, and at least that of the fine one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from solver.adapt import Refined, lighter, refine
-from solver.arc import JUMP, follow_arc
-from solver.balance import Balance
-from solver.joint import Case, Joint
+from solver.joint import Case
 from solver.kernels import STICK
-from solver.level import transfer
+from solver.ladder import fewer
 from solver.linear import JacobianSolver
-from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance, vibration_change
+from solver.path import Effort, PathPoint, vibration_change
+from solver.route import Route, Step, move_point
 from solver.settings import first_resolution
-from solver.settling import settle
-from solver.stability import is_stable
 
 HISTORY = 10.0
 """Change of the tangential history in a step over the friction limits, over rtol. Measured on the dovetail beside its
@@ -50,21 +47,12 @@ MANY_NODES = 300
 JUMPING = 1e-3
 """Of the parameter: length of a step in which the branch may end."""
 
-FINE = 1e-3
-"""Of the parameter: steps that may always be taken within a step, however much the vibration changes."""
-
-SPAN = 0.05
-"""Of the parameter: natural length of arc-length steps."""
-
 RECHECK = 0.3
 """Change of the vibration over the smaller one, after which harmonics and samples are chosen anew. Measured on
 the dovetail: with 1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
 
 COSTLY, LIGHT = 2500, 1600
 """Unknowns from which nodes take fewer harmonics than their error asks for, and how many they have then."""
-
-MOST_LANDINGS = 6
-"""Ends of branches within a step."""
 
 MOST_ITERATIONS = 2500
 """From one node to the next."""
@@ -73,14 +61,6 @@ REFRESH = 8
 """Nodes after which the factorisation that is kept from node to node is given up: a walk can go on from there."""
 
 _STATE = ("here", "coarse", "checked", "length", "n_nodes", "n_walked", "branch", "fold", "failure", "lost_at")
-
-
-@dataclass(frozen=True)
-class Step:
-    """A state reached by a step and the folds that were jumped over in it (values of the parameter)."""
-
-    point: PathPoint
-    folds: tuple[float, ...] = ()
 
 
 class Sweep:
@@ -92,12 +72,9 @@ class Sweep:
 
     def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
         """direction: 1 or -1, of the parameter. omega: rad/s, of a ramp; None for a sweep along the frequency."""
-        self.case = case
-        self.excitation_amplitude = excitation_amplitude
+        self.route = self.coarse_route = Route(case, excitation_amplitude, omega)
         self.direction = direction
-        self.omega = omega
-        self.unworn = np.zeros(case.model.contact.n_contact)
-        self.solver = JacobianSolver()
+        self.solver, self.coarse_solver = JacobianSolver(), JacobianSolver()
         self.effort = Effort()
         self.here: PathPoint | None = None
         self.coarse: PathPoint | None = None
@@ -113,7 +90,8 @@ class Sweep:
 
     def state_dict(self) -> dict[str, Any]:
         """What goes on from node to node, to be packed."""
-        own = {"resolution": self.case.resolution, "iterations": self.effort.iterations}
+        resolutions = (self.case.resolution, self.coarse_route.case.resolution)
+        own = {"resolutions": resolutions, "iterations": self.effort.iterations}
         return {name: getattr(self, name) for name in _STATE} | own
 
     def load_state(self, saved: dict[str, Any]) -> None:
@@ -121,31 +99,50 @@ class Sweep:
         self.saved = saved
         for name in _STATE:
             setattr(self, name, saved[name])
-        self.case = self.case.at(saved["resolution"])
+        self._take_cases(*(self.case.at(resolution) for resolution in saved["resolutions"]))
         self.effort.iterations = saved["iterations"]
-        self.solver, self.ahead = JacobianSolver(), None
+        self.solver, self.coarse_solver, self.ahead = JacobianSolver(), JacobianSolver(), None
 
-    def joint_at(self, parameter: float) -> Joint:
-        """Joint at a value of the parameter."""
-        if self.omega is None:
-            return self.case.joint(parameter, self.excitation_amplitude)
-        return self.case.joint(self.omega, parameter * self.excitation_amplitude)
+    @property
+    def case(self) -> Case:
+        """Harmonics and samples of the nodes."""
+        return self.route.case
 
-    def balance_at(self, parameter: float, history: FloatArray) -> Balance:
-        """Unworn balance at a value of the parameter."""
-        return Balance(self.joint_at(parameter), history, self.unworn, np.zeros_like(self.unworn))
+    @property
+    def omega(self) -> float | None:
+        """rad/s, of a ramp."""
+        return self.route.omega
 
-    def begin(self, point: PathPoint) -> None:
-        """Take up the first state."""
-        self.here = self.coarse = point
-        self.n_nodes, self.length = 0, LONGEST * self._scale(point.parameter)
+    def _take_cases(self, case: Case, coarse: Case) -> None:
+        self.route, self.coarse_route = (replace(self.route, case=one) for one in (case, coarse))
+
+    def begin(self, case: Case, point: PathPoint) -> None:
+        """Take up the first state, which has the harmonics and samples of a case."""
+        self.solver, self.coarse_solver = JacobianSolver(), JacobianSolver()
+        self._take_cases(case, case)
+        self.here = point
+        self.length = LONGEST * self.route.scale(point.parameter)
+        self._begin_coarse()
         self._choose_harmonics()
         self._save()
+
+    def _begin_coarse(self) -> None:
+        """Both walks are at the current node."""
+        assert self.here is not None
+        self.n_nodes = 0
+        coarse = self.case.at(fewer(self.case.resolution, self.case.settings))
+        joint = self.route.joint_at(self.here.parameter)
+        moved = None
+        if coarse.resolution != self.case.resolution:
+            joint = replace(self.route, case=coarse).joint_at(self.here.parameter)
+            moved = move_point(self.case, coarse, joint, self.here, self.effort)
+        self._take_cases(self.case, self.case if moved is None else coarse)
+        self.coarse = moved or self.here
 
     def _save(self) -> None:
         """Keep the current node: the walk goes on from it as another one would that knows no more than this."""
         self.here, self.coarse, self.checked = (_in_rows(point) for point in (self.here, self.coarse, self.checked))
-        self.solver = JacobianSolver()
+        self.solver, self.coarse_solver = JacobianSolver(), JacobianSolver()
         self.saved = self.state_dict()
 
     def has_passed(self, parameter: float) -> bool:
@@ -179,20 +176,26 @@ class Sweep:
         beyond = [at for at in self.ahead.folds if (parameter - at) * self.direction > 0.0]
         reached = None
         if beyond and parameter != self.ahead.point.parameter:
-            back = self._step(self.ahead.point, parameter, solver, effort)
-            reached = None if back is None or back.folds else Step(back.point, tuple(beyond))
+            back = self.route.step(self.ahead.point, parameter, solver, effort)
+            reached = None if isinstance(back, Outcome) or back.folds else Step(back.point, tuple(beyond))
         reached = reached or self._step(self.here, parameter, solver, effort)
-        coarse = None if self.coarse is None or reached is None else self._step(self.coarse, parameter, solver, effort)
-        return reached, None if coarse is None else coarse.point
+        if reached is None or self.coarse is None:
+            return reached, None
+        coarse = self.coarse_route.step(self.coarse, parameter, JacobianSolver(), effort)
+        return reached, None if isinstance(coarse, Outcome) else coarse.point
 
-    def _scale(self, parameter: float) -> float:
-        return abs(parameter) if self.omega is None else 1.0
+    def _step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | None:
+        step = self.route.step(start, target, solver, effort)
+        if isinstance(step, Outcome):
+            self.failure = step
+            return None
+        return step
 
     def _look_ahead(self) -> Step | None:
         """The next node: as far as the tangential history lets it be."""
         here = self.here
         assert here is not None
-        scale = self._scale(here.parameter)
+        scale = self.route.scale(here.parameter)
         shortest = SHORTEST * scale * max(1.0, self.n_walked / MANY_NODES) ** 2
         most = float(np.clip(HISTORY * self.case.settings.rtol, SMALLEST_CHANGE, LARGEST_CHANGE))
         while True:
@@ -223,12 +226,15 @@ class Sweep:
         self.n_walked += 1
         if step.folds:
             # behind a jump both walks begin anew: where the coarse one jumps says nothing of the steps
-            self.coarse = step.point
-            self.n_nodes = 0
+            self._begin_coarse()
         elif self.n_nodes % 2 == 0 and self.coarse is not None:
-            coarse = self._step(self.coarse, step.point.parameter, self.solver, self.effort)
-            # one that is thrown off goes on from the other
-            self.coarse = step.point if coarse is None or coarse.folds else coarse.point
+            target = step.point.parameter
+            coarse = self.coarse_route.step(self.coarse, target, self.coarse_solver, self.effort)
+            if isinstance(coarse, Outcome) or coarse.folds:
+                # one that is thrown off goes on from the other
+                self._begin_coarse()
+            else:
+                self.coarse = coarse.point
         before, now = self.checked, step.point
         assert before is not None
         old, new = before.evaluation, now.evaluation
@@ -256,7 +262,7 @@ class Sweep:
         self.checked = self.here
         if not self.case.settings.automatic:
             return
-        joint = self.joint_at(self.here.parameter)
+        joint = self.route.joint_at(self.here.parameter)
         refined = refine(self.case, joint.omega, joint.excitation_amplitude, self.here, self.effort)
         fewest = first_resolution(self.case.settings)
         if refined.case.resolution.highest < fewest.highest:
@@ -279,74 +285,17 @@ class Sweep:
 
     def _change_case(self, refined: Refined) -> None:
         assert self.here is not None
-        parameter, coarse, old = self.here.parameter, self.coarse, self.case
-        same = coarse is not None and np.array_equal(coarse.evaluation.predicted_h, self.here.evaluation.predicted_h)
-        self.here = replace(refined.point, parameter=parameter)
-        self.case, self.solver = refined.case, JacobianSolver()
-        if coarse is None or same:
-            self.coarse = self.here
-            return
-        moved = move_point(old, self.case, self.joint_at(coarse.parameter), coarse, self.effort)
-        self.coarse = moved or self.here
+        parameter, old, before = self.here.parameter, self.coarse_route.case, self.coarse
+        self.here, self.solver = replace(refined.point, parameter=parameter), JacobianSolver()
+        self.coarse_solver = JacobianSolver()
+        coarse = refined.case.at(fewer(refined.case.resolution, refined.case.settings))
+        self._take_cases(refined.case, coarse)
+        moved = None
+        if before is not None and self.n_nodes > 0:
+            moved = move_point(old, coarse, self.coarse_route.joint_at(before.parameter), before, self.effort)
         if moved is None:
-            self.n_nodes = 0
-
-    def _step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | None:
-        """Stable state at a target from a state of the same walk: naturally, through folds, or where it settles."""
-        tolerance = self.case.settings.tolerance
-        scale = self._scale(target)
-        folds: list[float] = []
-
-        def stays(point: PathPoint) -> bool:
-            balance = self.balance_at(point.parameter, point.evaluation.history)
-            return is_stable(balance.linearise(point.evaluation), solver)
-
-        for _ in range(MOST_LANDINGS):
-            if effort.exhausted:
-                break
-            point, arrived = follow_naturally(
-                self.balance_at, start, target, solver, tolerance, effort, fine=FINE * scale
-            )
-            if arrived and stays(point):
-                return Step(point, tuple(folds))
-            # natural steps may have led onto an unstable part, nobody knows where: then the walk begins before them
-            end = start if arrived else point
-            arc = follow_arc(self.balance_at, end, target, SPAN * scale, solver, tolerance, effort, stays)
-            if arc.point is not None:
-                return Step(arc.point, (*folds, *arc.jumps))
-            landed = self._settled(end, target, arc.folds, solver, effort)
-            if landed is None:
-                return None
-            folds.extend(landed.folds)
-            if landed.point.parameter == target:
-                return Step(landed.point, tuple(folds))
-            start = landed.point
-        return None
-
-    def _settled(
-        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
-    ) -> Step | None:
-        """State that the structure settles to from the end of a branch, a little beyond it on the way to the target."""
-        fine = FINE * self._scale(end.parameter)
-        beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-        joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-        self.failure, found = settle(self.case, joint, self.unworn, end.evaluation, before, end.history, solver, effort)
-        if found is None:
-            return None
-        landed = PathPoint(beyond, found.evaluation, found.history)
-        if vibration_change(end.evaluation, found.evaluation) <= JUMP:
-            return Step(landed)
-        # an arc that broke off behind the fold has found it all the same
-        return Step(landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * self.direction),))
-
-
-def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, effort: Effort) -> PathPoint | None:
-    """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
-    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
-    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
-    if not result.converged:
-        return None
-    return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
+            self._begin_coarse()
+        self.coarse = moved or self.coarse
 
 
 def _in_rows(point: PathPoint | None) -> PathPoint | None:

@@ -32,10 +32,10 @@ from solver.path import (
     vibration_change,
 )
 from solver.response import StateReport, report_state
+from solver.route import move_point
 from solver.settings import Scheme
 from solver.stability import is_stable
 from solver.step_size import check_step
-from solver.sweep import move_point
 
 RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
 SMALLEST_RESOLUTION = 2.0**-10  # of a step

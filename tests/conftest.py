@@ -1,8 +1,16 @@
-"""How hypothesis draws its examples: always the same ones, and however slow the machine is."""
+"""How hypothesis draws its examples: always the same ones, and however slow the machine is. One BLAS thread a process,
+as on every rank: processes that share cores wait for the threads of each other.
+"""
 
 from __future__ import annotations
 
+import os
+
 from hypothesis import HealthCheck, settings
+
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    # before numpy is imported
+    os.environ.setdefault(name, "1")
 
 # a failure has to be one that the next run shows, too; a busy machine is none
 settings.register_profile(
