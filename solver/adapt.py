@@ -16,7 +16,7 @@ import numpy as np
 from solver.estimate import NOTHING, UNKNOWN, Estimate
 from solver.factor import FEW_ROWS
 from solver.joint import Case, Joint
-from solver.ladder import LADDER, MOST_HARMONICS, fewer, on_ladder
+from solver.ladder import LADDER, MOST_HARMONICS, fewer, n_unknowns, on_ladder
 from solver.level import DEAR, NEAR_SAFETY, SAMPLES_SAFETY, Level
 from solver.path import Effort, PathPoint
 from solver.period import nothing_happens
@@ -124,7 +124,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
 def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort) -> Refined | None:
     """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
     here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
-    while here.joint.slots.size * (2 * len(here.case.resolution.orders) + 1) > most:
+    while n_unknowns(here.case.resolution, here.joint.slots.size) > most:
         lower = fewer(here.case.resolution, here.case.settings)
         level = here.solve_at(lower, effort) if lower != here.case.resolution else None
         if level is None:

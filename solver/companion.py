@@ -24,7 +24,7 @@ import numpy as np
 from solver.adaptive import AdaptiveSteps
 from solver.history import StartState
 from solver.joint import Case
-from solver.ladder import fewer
+from solver.ladder import COSTLY, LIGHT, fewer, n_unknowns
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.path import PathPoint
@@ -39,11 +39,8 @@ MOST_PARTS = 40
 SPARE = 500
 """Newton iterations that it may take beyond those of the history."""
 
-COSTLY, LIGHT = 2500, 1600
-"""Unknowns from which the companion takes fewer harmonics than the history, and how many it has then at most: what
-these miss is in the difference, too."""
-
 AUTOMATIC = SolverSettings()
+"""With these harmonics may be left out: what the companion misses is in the difference, too."""
 
 _CARRIED = ("kept", "offset", "waiting", "followed")
 
@@ -153,8 +150,8 @@ class Companion:
         """
         way, main = self.way, self.main
         resolution, n_rel = main.case.resolution, main.joint.slots.size
-        if n_rel * (2 * len(resolution.orders) + 1) > COSTLY:
-            while n_rel * (2 * len(resolution.orders) + 1) > LIGHT and resolution.highest > 1:
+        if n_unknowns(resolution, n_rel) > COSTLY:
+            while n_unknowns(resolution, n_rel) > LIGHT and resolution.highest > 1:
                 resolution = fewer(resolution, AUTOMATIC)
         self.followed = main.case.resolution
         case = main.case.at(resolution)

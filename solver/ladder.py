@@ -7,7 +7,14 @@ from solver.settings import Resolution, SolverSettings, all_orders, samples_for
 LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
 """Highest harmonics; "auto" uses all but the last two, those above `MOST_HARMONICS` only where they are odd and few."""
 MOST_HARMONICS = 79
+COSTLY, LIGHT = 2500, 1600
+"""Unknowns from which a state on the way takes fewer harmonics than its error asks for, and how many it has then."""
 RESOLVED = 0.5  # periods of the highest harmonic that the shortest contact takes, from where on harmonics see it
+
+
+def n_unknowns(resolution: Resolution, n_rel: int) -> int:
+    """Unknowns of a balance of so many relative displacements."""
+    return n_rel * (2 * len(resolution.orders) + 1)
 
 
 def on_ladder(resolution: Resolution, steps: int) -> Resolution:

@@ -46,6 +46,7 @@ CREEP = 0.1  # of rtol: share of the slip work that may be creep
 SMALL_SHARE = 0.01  # of the largest peak: responses that move less are judged against this
 SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
 SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
+FAINT = 0.1  # of rtol: share of the largest normal force below which it does not matter whether a contact is seen
 
 
 def transfer(
@@ -185,7 +186,11 @@ class Level:
 
         known: a richer state that was compared before, which is not solved again where it reaches so far.
         """
-        contact = shortest_contact(self.point.evaluation.status_t)
+        evaluation = self.point.evaluation
+        pressed = np.abs(evaluation.force_t[:, 0]).max(axis=1)
+        # pairs that hardly touch matter as little as their forces do
+        felt = pressed >= FAINT * self.case.settings.rtol * pressed.max()
+        contact = shortest_contact(evaluation.status_t[felt])
         # a whole period of the highest harmonic in the contact shows it well, half a period shows it
         far, seeing = (steps_to_see(self.case.resolution, share * contact, 2) for share in (0.5, 1.0))
         while far > 2 and not self.may_look_at(on_ladder(self.case.resolution, far)):

@@ -21,7 +21,7 @@ import numpy as np
 from solver.adapt import Refined, lighter, refine
 from solver.joint import Case
 from solver.kernels import STICK
-from solver.ladder import fewer
+from solver.ladder import COSTLY, LIGHT, fewer, n_unknowns
 from solver.linear import JacobianSolver
 from solver.outcome import Outcome
 from solver.path import Effort, PathPoint, vibration_change
@@ -50,9 +50,6 @@ JUMPING = 1e-3
 RECHECK = 0.3
 """Change of the vibration over the smaller one, after which harmonics and samples are chosen anew. Measured on
 the dovetail: with 1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
-
-COSTLY, LIGHT = 2500, 1600
-"""Unknowns from which nodes take fewer harmonics than their error asks for, and how many they have then."""
 
 MOST_ITERATIONS = 2500
 """From one node to the next."""
@@ -274,8 +271,7 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        n_rel = joint.slots.size
-        if n_rel * (2 * len(refined.case.resolution.orders) + 1) > COSTLY:
+        if n_unknowns(refined.case.resolution, joint.slots.size) > COSTLY:
             refined = lighter(refined, joint.omega, joint.excitation_amplitude, LIGHT, self.effort) or refined
         if refined.case is not self.case:
             self._change_case(refined)

@@ -16,11 +16,11 @@ from solver.explicit_limit import explicit_step_limit
 from solver.history import StartState
 from solver.joint import Case, Joint
 from solver.jump import landings
-from solver.ladder import on_ladder
 from solver.linear import JacobianSolver
 from solver.model import FloatArray
 from solver.oscillation import WearRates
 from solver.outcome import Outcome
+from solver.pair_error import slip_work_error
 from solver.path import (
     SMALLEST_SHARE,
     BalanceAt,
@@ -32,7 +32,6 @@ from solver.path import (
     vibration_change,
 )
 from solver.response import StateReport, report_state
-from solver.route import move_point
 from solver.settings import Scheme
 from solver.stability import is_stable
 from solver.step_size import check_step
@@ -44,7 +43,6 @@ MOST_JUMPS = 12
 JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
 ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
 NO_WEAR = 1e-12  # of the same: such a joint sticks
-COSTLY = 2500  # unknowns from which pairs are compared with fewer harmonics rather than with more
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
 
 _CARRIED = (
@@ -165,21 +163,10 @@ class Trajectory:
         return refined.accurate
 
     def _compare_pairs(self) -> None:
-        """What the slip work of each pair is wrong by: its change with more harmonics, or fewer where they are many.
-
-        The pairs at the edge of the slip zone are wrong by far more than all of them together.
-        """
-        evaluation = self.point.evaluation
+        """What the slip work of each pair is wrong by; nothing where nothing wears."""
         self.slip_work_error = np.zeros_like(self.still)
-        costly = evaluation.predicted_h.size > COSTLY
-        wanted = on_ladder(self.case.resolution, -1 if costly else 2)
-        if not self.wears() or wanted == self.case.resolution or not self.case.model.holds(wanted.highest):
-            return
-        finer = self.case.at(wanted)
-        joint = finer.joint(self.joint.omega, self.joint.excitation_amplitude)
-        moved = move_point(self.case, finer, joint, self.point, self.effort)
-        if moved is not None:
-            self.slip_work_error = np.abs(moved.evaluation.slip_work - evaluation.slip_work)
+        if self.wears():
+            self.slip_work_error = slip_work_error(self.case, self.joint, self.point, self.effort)
 
     def report(self) -> StateReport:
         """What is reported of the current state, which has been checked."""
