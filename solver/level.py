@@ -187,10 +187,8 @@ class Level:
         known: a richer state that was compared before, which is not solved again where it reaches so far.
         """
         evaluation = self.point.evaluation
-        pressed = np.abs(evaluation.force_t[:, 0]).max(axis=1)
-        # pairs that hardly touch matter as little as their forces do
-        felt = pressed >= FAINT * self.case.settings.rtol * pressed.max()
-        contact = shortest_contact(evaluation.status_t[felt])
+        felt = FAINT * self.case.settings.rtol
+        contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
         # a whole period of the highest harmonic in the contact shows it well, half a period shows it
         far, seeing = (steps_to_see(self.case.resolution, share * contact, 2) for share in (0.5, 1.0))
         while far > 2 and not self.may_look_at(on_ladder(self.case.resolution, far)):

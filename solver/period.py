@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.balance import Evaluation
 from solver.kernels import SEPARATED, STICK
-from solver.model import IntArray
+from solver.model import FloatArray, IntArray
 
 SYMMETRIC = 1e-9
 STILL = 1e-9  # of the tangential state: less is no slip
@@ -30,14 +30,16 @@ def half_wave_symmetric(evaluation: Evaluation) -> bool:
     return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
 
 
-def shortest_contact(status_t: IntArray) -> float:
+def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
     """Share of the period that the shortest contact of a pair takes that opens; 1 where none does.
 
-    status_t (n_contact, N): states of the pairs at the samples.
+    status_t (n_contact, N): states of the pairs at the samples. normal_force_t (n_contact, N): N. felt: share of the
+    largest normal force that a pair has to reach; those that hardly touch matter as little as their forces do.
     """
     n_samples = status_t.shape[1]
     shortest = n_samples
-    for closed in status_t != SEPARATED:
+    pressed = normal_force_t.max(axis=1, initial=0.0)
+    for closed in status_t[pressed >= felt * pressed.max(initial=0.0)] != SEPARATED:
         begins = np.flatnonzero(closed & ~np.roll(closed, 1))
         ends = np.flatnonzero(~closed & np.roll(closed, 1))
         if begins.size:

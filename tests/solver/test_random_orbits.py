@@ -90,15 +90,24 @@ def test_the_pair_moves_like_the_mass_at_a_wall() -> None:
 
 
 def test_the_shortest_contact_is_counted_around_the_period() -> None:
-    status = np.full((3, 16), STICK)
-    assert shortest_contact(status) == 1.0
+    status, force = np.full((3, 16), STICK), np.ones((3, 16))
+    assert shortest_contact(status, force, 0.1) == 1.0
     status[1, 3:13] = SEPARATED
-    assert shortest_contact(status) == 6.0 / 16.0
+    assert shortest_contact(status, force, 0.1) == 6.0 / 16.0
     status[2, :9] = status[2, 11:] = SEPARATED
     status[2, 9] = SLIP
-    assert shortest_contact(status) == 2.0 / 16.0
+    assert shortest_contact(status, force, 0.1) == 2.0 / 16.0
     status[0] = SEPARATED
-    assert shortest_contact(status) == 2.0 / 16.0
+    assert shortest_contact(status, force, 0.1) == 2.0 / 16.0
+
+
+def test_a_pair_that_hardly_touches_is_no_short_contact() -> None:
+    status, force = np.full((2, 16), STICK), np.zeros((2, 16))
+    status[1, 1:] = SEPARATED
+    force[0] = 100.0
+    for touch, contact in ((9.0, 1.0), (11.0, 1.0 / 16.0)):
+        force[1, 0] = touch
+        assert shortest_contact(status, force, 0.1) == contact
 
 
 def test_harmonics_that_see_a_short_contact_are_far_up() -> None:
