@@ -44,10 +44,23 @@ JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that tak
 ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
 NO_WEAR = 1e-12  # of the same: such a joint sticks
 RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
+RATE_RECHECK = 0.1  # the same of the wear rate, where the worn volume has grown by such a share as well (measured on
+# the dovetail at 211.5 Hz: without it the wear rate is 8 % off on the way where 0.8 % were told)
+
 
 _CARRIED = (
     *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
-    *("estimate", "estimated_for", "accurate", "slip_work_error", "inaccurate_from", "worst", "certificate", "point"),
+    *(
+        "estimate",
+        "estimated_for",
+        "estimated_at",
+        "accurate",
+        "slip_work_error",
+        "inaccurate_from",
+        "worst",
+        "certificate",
+        "point",
+    ),
 )
 
 
@@ -119,14 +132,14 @@ class Trajectory:
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
         self._note()
-        self.estimated_for = evaluation.predicted_h
+        self.estimated_for, self.estimated_at = evaluation.predicted_h, self._worn()
 
     def check(self) -> Outcome:
         """Whether the current state may be reported: a certificate that holds. `accurate`: with errors below rtol."""
         now = self.point.evaluation.predicted_h[:, 1:]
         changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
         accurate, anew = True, False
-        if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])):
+        if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])) or self._wears_otherwise():
             accurate, anew = self._refine(), True
         holds = self._certify()
         if not holds and accurate and self.case.settings.automatic:
@@ -141,6 +154,18 @@ class Trajectory:
         if not holds:
             return Outcome.CERTIFICATE_FAILED
         return self._doubling() if anew else Outcome.CONVERGED
+
+    def _wears_otherwise(self) -> bool:
+        """Whether so much has worn at another rate that errors may have become others, however alike the vibration."""
+        (rate, volume), (rate_then, volume_then) = self._worn(), self.estimated_at
+        return (
+            abs(rate - rate_then) > RATE_RECHECK * max(rate, rate_then) and volume - volume_then > RATE_RECHECK * volume
+        )
+
+    def _worn(self) -> tuple[float, float]:
+        """Wear rate, m3 per cycle, and worn volume, m3."""
+        area = self.joint.contact.area
+        return float(self.rate() @ area), float(self.point.evaluation.wear_depth @ area)
 
     def _certify(self) -> bool:
         """Certificate of the current state, and whether it holds."""
@@ -158,7 +183,7 @@ class Trajectory:
         if refined.case is not self.case:
             self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None
             self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        self.estimated_for = self.point.evaluation.predicted_h
+        self.estimated_for, self.estimated_at = self.point.evaluation.predicted_h, self._worn()
         self._compare_pairs()
         return refined.accurate
 

@@ -104,7 +104,7 @@ def test_a_sweep_goes_on_to_the_last_bit() -> None:
 
 def test_progress_beyond_a_frequency_is_not_used_for_it() -> None:
     kept: list[Packed] = []
-    list(follow_branch(dovetail(13), 0.5, 0.5, np.array([212.75]), "up", AUTOMATIC, keep=kept.append))
+    list(follow_branch(dovetail(13), 0.5, 0.5, np.array([212.6]), "up", AUTOMATIC, keep=kept.append))
     ((_, again),) = follow_branch(dovetail(13), 0.5, 0.5, np.array([BESIDE]), "up", AUTOMATIC, resume=kept[-1])
     assert again.state is not None
     assert alone().state is not None
