@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from solver import march as march_module
+from solver import trajectory
+from solver.adapt import Refined, refine
 from solver.history import StartState, WearHistory
 from solver.march import march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
+from solver.record import _nearby
 from solver.settings import Scheme, SolverSettings
 from solver.trajectory import Trajectory
 from tests.references import slider_amplitude, slider_wear_depth
@@ -134,3 +138,35 @@ def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive(monkeypa
     # both values, in words
     assert f"worn volume {1e9 * history.worn_volume[-1]:.3g} mm3, but " in history.message
     assert np.array_equal(history.worn_volume, usual.worn_volume)
+
+
+def test_histories_that_cross_are_wrong_by_what_they_differ_nearby() -> None:
+    cycles = np.linspace(0.0, 10.0, 11)
+    difference = np.abs(cycles - 6.0)
+    difference[9:] = np.nan
+    error = _nearby(cycles, difference)
+    assert error[6] == 2.0
+    assert error[0] == difference[0]
+    assert (error >= np.nan_to_num(difference)).all()
+    assert np.isnan(_nearby(cycles, np.full(11, np.nan))).all()
+
+
+def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {}
+    for change in (0.1, 10.0):
+        estimated: list[float] = []
+
+        def note(*given: Any, estimated: list[float] = estimated) -> Refined:
+            estimated.append(float(given[3].evaluation.slip_work.sum()))
+            return refine(*given)
+
+        monkeypatch.setattr(trajectory, "RATE_RECHECK", change)
+        monkeypatch.setattr(trajectory, "refine", note)
+        model, state = start()
+        march_wear(model, 0.5, state, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+        found[change] = estimated
+    assert len(found[0.1]) > len(found[10.0])
+    # from one to the next by little more than a tenth, as far as a single step goes, while much is worn
+    rates = np.array(found[0.1])
+    rates = rates[rates > 0.3 * rates.max()]
+    assert (np.abs(np.diff(rates)) < 0.3 * np.maximum(rates[1:], rates[:-1])).all()
