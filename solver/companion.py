@@ -42,7 +42,7 @@ SPARE = 500
 AUTOMATIC = SolverSettings()
 """With these harmonics may be left out: what the companion misses is in the difference, too."""
 
-_CARRIED = ("kept", "offset", "waiting", "followed")
+_CARRIED = ("kept", "offset", "waiting", "followed", "start_share")
 
 
 class Companion:
@@ -50,7 +50,9 @@ class Companion:
 
     kept (n_output, n_contact): its depths at the counts asked for, m, NaN where it has not come to. offset
     (n_contact,): m, difference of the depths at the last count at which it had to begin anew from the history itself.
-    waiting: steps of the history that it has still to follow. followed: harmonics and samples of the history for which
+    start_share: difference of the wear rates of both start states, pair by pair, over that of the joint: a later state
+    that happens to be the same does not make the start better known. waiting: steps of the history that it has still to
+    follow. followed: harmonics and samples of the history for which
     its own were chosen.
     """
 
@@ -64,6 +66,7 @@ class Companion:
         self.cycles = cycles
         self.kept = np.full((cycles.size, main.still.size), np.nan)
         self.offset = np.zeros_like(main.still)
+        self.start_share = 0.0
         self.waiting = 0
         self.followed = main.case.resolution
         self.steps: AdaptiveSteps | None = None
@@ -78,6 +81,10 @@ class Companion:
             self.steps = AdaptiveSteps(self.way, 1.0)
         if self.main.case.resolution != self.way.case.resolution and not self._take_case():
             self._begin_anew()
+        if self.main.wears():
+            area = self.main.joint.contact.area
+            rate, other = self.main.rate() * area, self.way.rate() * area
+            self.start_share = float(np.abs(rate - other).sum() / rate.sum())
 
     def carried(self) -> dict[str, Any]:
         """What goes on from step to step, to be packed."""

@@ -150,11 +150,18 @@ class Recorder:
         return self.finish(outcome, np.nan, 0, run_time, self._kept["wear_depth"])
 
     def finish(
-        self, outcome: Outcome, jump_cycle: float, iterations: int, run_time: float, companion: FloatArray
+        self,
+        outcome: Outcome,
+        jump_cycle: float,
+        iterations: int,
+        run_time: float,
+        companion: FloatArray,
+        start_share: float = 0.0,
     ) -> WearHistory:
         """The history as far as it was computed.
 
         companion (n_output, n_contact): m, depths of the coarser history, NaN at counts that it has not come to.
+        start_share: error of the wear rates of the start state, which is at least that of what they wear.
         """
         kept, area = dict(self._kept), self.model.contact.area
         local, truncation, of_pairs = (kept.pop(name) for name in ("local", "truncation", "pair_truncation"))
@@ -163,7 +170,8 @@ class Recorder:
         # rates that are all wrong by one share are those of another time: this counts where the wear rises steeply
         late = np.divide(self.cycles * kept["wear_rate"], volume, out=np.ones_like(volume), where=volume > 0.0)
         # in the first steps both histories are wrong by the same, which only the rates at their ends show
-        error = np.fmax(_nearby(self.cycles, difference @ area), local) + truncation * np.fmax(late, 1.0)
+        differs = np.fmax(_nearby(self.cycles, difference @ area), start_share * volume)
+        error = np.fmax(differs, local) + truncation * np.fmax(late, 1.0)
         relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
         relative[np.isnan(volume)] = np.nan
         # what the volume is wrong by beyond the difference of the histories falls to the pairs as they are worn
