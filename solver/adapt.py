@@ -73,7 +73,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             here, faint = missed, True
             continue
         if settings.harmonics == "auto":
-            here = here.without_even(effort) or here
+            here = here.without_even(effort) or here.with_even(effort) or here
         resolution = here.case.resolution
         by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort, richer)

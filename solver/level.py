@@ -23,9 +23,9 @@ from solver.linear import JacobianSolver
 from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.path import Effort, PathPoint, final_history, solve_balance
 from solver.peak import largest_responses
-from solver.period import half_wave_symmetric, nothing_happens, shortest_contact
+from solver.period import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
 from solver.reach import reach
-from solver.settings import Resolution
+from solver.settings import Resolution, all_orders
 
 SEEN_SAMPLES = 2048  # a sine overtops a limit unseen by 1e-6 of its size then
 MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
@@ -143,6 +143,13 @@ class Level:
         if odd == orders or not half_wave_symmetric(self.point.evaluation):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
+
+    def with_even(self, effort: Effort) -> Level | None:
+        """The same state with all harmonics up to its highest, where it has odd ones alone and needs the others."""
+        resolution = self.case.resolution
+        if resolution.highest == 1 or not lacks_even(resolution.orders, self.point.evaluation):
+            return None
+        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), effort)
 
     def missed_event(self, effort: Effort) -> Level | None:
         """The same state with as many samples as it takes to see a pair slip or open, or the contact be made, between

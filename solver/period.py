@@ -8,7 +8,8 @@ from solver.balance import Evaluation
 from solver.kernels import SEPARATED, STICK
 from solver.model import FloatArray, IntArray
 
-SYMMETRIC = 1e-9
+SYMMETRIC = 1e-9  # of the largest force: without even harmonics goes what has less of them
+ASYMMETRIC = 1e-6  # of the same: what has more of them takes them again
 STILL = 1e-9  # of the tangential state: less is no slip
 
 
@@ -20,14 +21,19 @@ def nothing_happens(evaluation: Evaluation) -> bool:
     return bool((sticks | still | separated.all(axis=1)).all())
 
 
-def half_wave_symmetric(evaluation: Evaluation) -> bool:
-    """Whether the contact force has no even harmonics but the static one."""
+def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
+    """Whether a state of odd harmonics alone has contact forces with even ones: it was symmetric and no longer is."""
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ASYMMETRIC)
+
+
+def half_wave_symmetric(evaluation: Evaluation, share: float = SYMMETRIC) -> bool:
+    """Whether the contact force has no even harmonics but the static one, to a share of the largest force."""
     half = evaluation.force_t.shape[2] // 2
     if evaluation.force_t.shape[2] % 2:
         return False
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
-    return bool(np.ptp(total, axis=2).max(initial=0.0) <= SYMMETRIC * size)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= share * size)
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:

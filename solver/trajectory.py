@@ -31,6 +31,7 @@ from solver.path import (
     solve_balance,
     vibration_change,
 )
+from solver.period import lacks_even
 from solver.response import StateReport, report_state
 from solver.settings import Scheme
 from solver.stability import is_stable
@@ -47,20 +48,10 @@ RECHECK = 0.3  # relative change of the vibration after which errors are estimat
 RATE_RECHECK = 0.1  # the same of the wear rate, where the worn volume has grown by such a share as well (measured on
 # the dovetail at 211.5 Hz: without it the wear rate is 8 % off on the way where 0.8 % were told)
 
-
 _CARRIED = (
     *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
-    *(
-        "estimate",
-        "estimated_for",
-        "estimated_at",
-        "accurate",
-        "slip_work_error",
-        "inaccurate_from",
-        "worst",
-        "certificate",
-        "point",
-    ),
+    *("estimate", "estimated_for", "estimated_at", "accurate", "slip_work_error", "inaccurate_from", "worst"),
+    *("certificate", "point"),
 )
 
 
@@ -139,7 +130,10 @@ class Trajectory:
         now = self.point.evaluation.predicted_h[:, 1:]
         changed = float(np.linalg.norm(now - self.estimated_for[:, 1:]))
         accurate, anew = True, False
-        if changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:])) or self._wears_otherwise():
+        automatic = self.case.settings.harmonics == "auto"
+        unseen = automatic and lacks_even(self.case.resolution.orders, self.point.evaluation)
+        vibrates_otherwise = changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:]))
+        if vibrates_otherwise or unseen or self._wears_otherwise():
             accurate, anew = self._refine(), True
         holds = self._certify()
         if not holds and accurate and self.case.settings.automatic:

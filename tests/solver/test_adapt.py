@@ -9,6 +9,7 @@ import pytest
 
 from solver import adapt
 from solver.adapt import Refined, refine
+from solver.certificate import certify
 from solver.estimate import Estimate
 from solver.harmonics import to_complex
 from solver.joint import Case, build_case
@@ -249,3 +250,15 @@ def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: floa
     error = true_error(refined, amplitude, Resolution(all_orders(fine), 4096))
     assert 1e-6 < error.response <= min(rtol, 2.0 * refined.estimate.response)
     assert error.wear_rate <= min(rtol, 2.0 * refined.estimate.wear_rate)
+
+
+def test_a_state_of_odd_harmonics_takes_even_ones_again_where_its_forces_have_them() -> None:
+    # as after a state so faint that it looked symmetric: with odd harmonics alone friction exceeds its limit
+    model, settings = random_model(1, ("3d", "one_tangent")), SolverSettings()
+    case, whole = started(model, FRICTION, OMEGA, SLIPPING, settings, Resolution(all_orders(9), 128))
+    odd = case.at(Resolution((1, 3, 5, 7, 9), 128))
+    point = solved_at(case, OMEGA, SLIPPING, whole, odd.resolution)
+    assert certify(odd.joint(OMEGA, SLIPPING), point.evaluation).cone_violation > 0.01
+    refined = refine(odd, OMEGA, SLIPPING, point, Effort())
+    assert 2 in refined.case.resolution.orders
+    assert certify(refined.case.joint(OMEGA, SLIPPING), refined.point.evaluation).holds(settings.tolerance)
