@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import studyrunner.search_path  # noqa: F401 - where all others are looked for
+
+# isort: split
 import argparse
 import os
 import sys

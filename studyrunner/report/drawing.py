@@ -97,8 +97,10 @@ class Table:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Inside, figures are built and saved in the one style of the report."""
-    with mpl.rc_context(_STYLE):
+    """Inside, figures are built and saved in the one style of the report, whatever a file matplotlibrc says."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
         yield
 
 
