@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+from studyrunner.streams import keep_talking
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit status."""
+    keep_talking()
     try:
         return _report(parse_options(sys.argv[1:] if arguments is None else arguments))
     except UserError as error:
