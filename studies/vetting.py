@@ -86,8 +86,11 @@ def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
 def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
     """Reads all of a scene; exit status and what is said. This process can do nothing else afterwards."""
     # loaded before there are limits, as it is no fault of the file how long that takes
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute, read_result_through
+    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
     from studies.scene_file import read_through
+
+    if group == _WHOLE_RESULT:
+        from studies.netcdf_guard import read_result_through
 
     seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
     if path.is_file():
