@@ -75,6 +75,8 @@ def _check_attribute(item: h5py.HLObject, name: str, key: str) -> None:
         raise SceneError(key, f"type {kind}", "give numbers or text")
     elif len(attribute.shape) > 1 or attribute.shape > (_MOST_VALUES,) or attribute.get_storage_size() > LARGEST_TEXT:
         raise SceneError(key, f"shape {attribute.shape}", "give a single value, or a short row of them")
+    elif name in ("scale_factor", "add_offset") and (kind.kind not in "iuf" or attribute.shape not in ((), (1,))):
+        raise SceneError(key, f"type {kind} of shape {attribute.shape}", "give a single number")
     elif name in ("_Netcdf4Dimid", "_Netcdf4Coordinates") and kind.kind not in "iu":
         raise SceneError(key, f"type {kind}", _REMEDY)
     elif name in ("CLASS", "NAME") and attribute.shape != ():

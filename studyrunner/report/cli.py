@@ -98,15 +98,14 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
-        from studyrunner.archive import check_result_file
         from studyrunner.progress import count, format_seconds
+        from studyrunner.report.door import reading_errors
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page import write_page
         from studyrunner.report.result import open_result
 
-        check_result_file(options.result, str(options.result))
         result = open_result(options.result)
-        with result.dataset:
+        with result.dataset, reading_errors(str(options.result)):
             _make_folder(options.folder)
             page = options.folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)

@@ -42,6 +42,8 @@ _STYLE: Any = {
     "axes.formatter.limits": (-4, 5),
     # Formulas as tick labels take most of the time of a figure.
     "axes.formatter.use_mathtext": False,
+    # Names of a file are text, whatever signs they have.
+    "text.parse_math": False,
     "grid.color": "#d9d9d9",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,

@@ -59,8 +59,7 @@ def _draw_frequencies(result: Result, panel: Axes) -> str:
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     text = f"Natural frequencies of the sector with its joint stuck, {frequencies.shape[1]} modes"
     first = f"The lowest is {np.nanmin(frequencies):.5g} Hz"
-    scene = result.study.get("scene", {})
-    diameter = scene.get("nodal_diameter") if isinstance(scene, dict) else None
+    diameter = result.study.get("scene", {}).get("nodal_diameter")
     if isinstance(diameter, int) and "frequency" in result.dataset.coords:
         studied = result.dataset["frequency"].values
         low, high = float(studied.min()), float(studied.max())
