@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -341,7 +342,7 @@ def open_result(path: Path | str) -> Result:
     if not path.is_file():
         raise UserError(source, "OUT.nc", None, "there is no such file; give a result file of run-study")
     check_result_file(path, source)
-    with reading_errors(source, every=True):
+    with reading_errors(source, every=True), warnings.catch_warnings(action="ignore"):
         # the same file as before, whatever its name looks like
         opened = xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
         return Result(path, check_dataset(opened, source))
