@@ -99,13 +99,14 @@ def _report(options: Options) -> int:
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.progress import count, format_seconds
-        from studyrunner.report.door import reading_errors
+        from studyrunner.report.door import check_numbers, reading_errors
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page import write_page
         from studyrunner.report.result import open_result
 
         result = open_result(options.result)
         with result.dataset, reading_errors(str(options.result)):
+            check_numbers(result.dataset, str(options.result))
             _make_folder(options.folder)
             page = options.folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)

@@ -15,12 +15,15 @@ import xarray as xr
 
 from studyrunner.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, SCENE, Variable
+from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, KEPT, LOOPS, SCENE, Variable
 
 MOST_POINTS = 10**6
 """As many as a study may have."""
 
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
+_LARGEST_READ = 2**24  # bytes
+_LARGEST_NUMBER = 1e30
+_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", *CERTIFICATE)
 _MOST_NAMES = 2**20  # values along any dimension
 _LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
 _DEEPEST = 3  # of what is nested in a study
@@ -67,6 +70,19 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     checked.set_close(dataset.close)
     read_study(checked.attrs, source)
     return checked
+
+
+def check_numbers(dataset: xr.Dataset, source: str) -> None:
+    """Raises UserError where a number is none of a joint that vibrates, and could not be drawn. NaN is no number.
+
+    Of what is too large to be read as a whole, nothing is looked at.
+    """
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
+            sizes = np.abs(variable.values)
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (name not in _INFINITE))]
+            if wrong.size:
+                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
 
 
 @contextmanager
@@ -177,6 +193,8 @@ def _check_values(kept: Mapping[str, xr.Variable]) -> None:
     flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
     if flags.dtype.kind not in "iu":
         raise _WrongError("outcome:flag_values", "no whole numbers")
+    if not all(np.isfinite(kept[name].values).all() for name in kept if name in ("mesh_x", "mesh_y", "mesh_z")):
+        raise _WrongError("mesh_x", "no finite number, here or beside it")
     if "mesh_quad" in kept:
         n_nodes = min((kept[f"mesh_{axis}"].size for axis in "xyz" if f"mesh_{axis}" in kept), default=0)
         quad = kept["mesh_quad"]

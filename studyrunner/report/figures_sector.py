@@ -130,6 +130,8 @@ def _draw_scale_bar(panel: Axes, seen: NDArray[np.float64]) -> None:
     """A bar of a round length under the mesh, in place of axes."""
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float((high - low).max())
+    if not size > 0.0:
+        return
     length = 10.0 ** np.floor(np.log10(0.4 * size))
     length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
     bottom = low[1] - 0.05 * size

@@ -14,7 +14,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.archive import check_result_file
 from studyrunner.progress import count
 from studyrunner.report.door import check_dataset, read_study, reading_errors
 from studyrunner.report.units import show_cycles, show_number
@@ -338,6 +337,9 @@ def open_result(path: Path | str) -> Result:
     UserError
         Where there is no such file or it is no result of `run-study`.
     """
+    # the report itself knows nothing of studies and scenes
+    from studyrunner.archive import check_result_file
+
     path, source = Path(path), str(path)
     if not path.is_file():
         raise UserError(source, "OUT.nc", None, "there is no such file; give a result file of run-study")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
+from studyrunner.report.door import check_numbers
 from studyrunner.report.result import open_result
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
@@ -79,7 +80,7 @@ def dimension_of_no_scale(file: h5py.File) -> None:
     attributes["DIMENSION_LIST"] = rows
 
 
-def values(name: str, place: tuple[int, ...] | int, value: float) -> Callable[[h5py.File], None]:
+def values(name: str, place: object, value: float) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         file[name][place] = value
 
@@ -118,6 +119,9 @@ REFUSED = {
     "flags as text": attribute("flag_values", "0 1", "outcome"),
     "cycles that do not rise": values("cycle", 1, 1e9),
     "a frequency that is none": values("frequency", 0, np.nan),
+    "a worn volume of 1e308": values("worn_volume", ..., 1e308),
+    "an infinite pressure": values("mean_pressure", ..., np.inf),
+    "an infinite last cycle": values("last_cycle", ..., np.inf),
     "outcome of floating numbers": other_kind("outcome", 0.5),
     "worn volume of complex numbers": other_kind("worn_volume", 1j),
 }
@@ -140,7 +144,7 @@ def test_refused_in_a_sentence(
     assert len(line) < 1000
     assert not (folder / "out-report").exists()
     with pytest.raises(UserError, match="give"):
-        open_result("out.nc")
+        check_numbers(open_result("out.nc").dataset, "out.nc")
 
 
 def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
