@@ -68,34 +68,16 @@ def find_datasets(group: h5py.Group, file_size: int) -> dict[str, h5py.Dataset]:
 
     Those that only give a dimension its name, and named types, are left out. Raises SceneError.
     """
-    found = dict(_walk(group, "", [0]))
+    walked = walk(group)
+    found = {key: item for key, item in walked if isinstance(item, h5py.Dataset) and not only_names_a_dimension(item)}
     allowed = min(LARGEST_TOTAL, _WITHOUT_PROOF + _PACKED * file_size)
     for key, dataset in found.items():
         check_dataset(dataset, key)
-        allowed -= _declared(dataset)
+        allowed -= declared_bytes(dataset)
         if allowed < 0:
             remedy = f"reduce the model to {LARGEST_TOTAL / 2**20:g} MiB, and compress it by no more than {_PACKED:g}"
             raise SceneError(key, f"shape {dataset.shape} is too much for this file", remedy)
     return found
-
-
-def read_result_through(path: Path) -> None:
-    """Looks at all that a result file holds, and reads what is not large. Raises SceneError.
-
-    Large variables are left to their readers, who take parts of them: their chunks are small.
-    """
-    with open_hdf5(path, LARGEST_RESULT) as file:
-        try:
-            for name in file.attrs:
-                read_attribute(file, name)
-            for key, dataset in _walk(file, "", [0]):
-                check_dataset(dataset, key)
-                if dataset.shape is not None and _declared(dataset) < _WITHOUT_PROOF / 8:
-                    dataset[()]
-        except SceneError:
-            raise
-        except (OSError, RuntimeError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
-            raise SceneError("model", f"{path.name} is damaged", "give a result file that is whole") from error
 
 
 def check_dataset(dataset: h5py.Dataset, key: str) -> None:
@@ -162,7 +144,12 @@ def read_attribute(group: h5py.Group, name: str) -> NDArray[np.generic] | None:
     return np.asarray(group.attrs[name])
 
 
-def _walk(group: h5py.Group, prefix: str, seen: list[int]) -> Iterator[tuple[str, h5py.Dataset]]:
+def walk(group: h5py.Group, prefix: str = "", seen: list[int] | None = None) -> Iterator[tuple[str, h5py.HLObject]]:
+    """All groups and datasets below a group by name with the groups above; no link is followed. Raises SceneError.
+
+    prefix, seen: of the groups above, and how many objects were met on the way.
+    """
+    seen = [0] if seen is None else seen
     for name in group:
         seen[0] += 1
         key = f"{prefix}{name}"
@@ -174,13 +161,23 @@ def _walk(group: h5py.Group, prefix: str, seen: list[int]) -> Iterator[tuple[str
             raise SceneError(key, "a link", "store the data itself under this name")
         item = _open(group, name, key)
         if isinstance(item, h5py.Group) and key.count("/") < _DEEPEST - 1:
-            yield from _walk(item, f"{key}/", seen)
+            yield key, item
+            yield from walk(item, f"{key}/", seen)
         elif isinstance(item, h5py.Dataset):
-            # what NetCDF calls a dimension without a variable
-            if not (item.ndim == 1 and item.is_scale and "_Netcdf4Dimid" in item.attrs and "NAME" in item.attrs):
-                yield key, item
+            yield key, item
         elif not isinstance(item, h5py.Datatype):
             raise SceneError(key, "unknown", "remove it")
+
+
+def only_names_a_dimension(item: h5py.HLObject) -> bool:
+    """Whether a dataset is what NetCDF calls a dimension without a variable."""
+    return (
+        isinstance(item, h5py.Dataset)
+        and item.ndim == 1
+        and item.is_scale
+        and "_Netcdf4Dimid" in item.attrs
+        and "NAME" in item.attrs
+    )
 
 
 def _open(group: h5py.Group, name: str | bytes, key: str) -> h5py.HLObject:
@@ -192,8 +189,8 @@ def _open(group: h5py.Group, name: str | bytes, key: str) -> h5py.HLObject:
         raise SceneError(key, "damaged or of an unknown type", "write it again as numbers or text") from error
 
 
-def _declared(dataset: h5py.Dataset) -> int:
-    """Bytes that its values take in memory, as numbers of 8 bytes or complex ones of 16 at least."""
+def declared_bytes(dataset: h5py.Dataset) -> int:
+    """Bytes that the values of a dataset take in memory, as numbers of 8 bytes or complex ones of 16 at least."""
     kind = dataset.dtype
     if not is_number(kind):
         return _bytes(dataset.shape or (), kind)

@@ -1,9 +1,9 @@
 """Reads a file of unknown origin in a process of its own before this one does.
 
 The HDF5 library was not made for bytes that somebody has tampered with: some crash it, some keep it busy for ever, and
-a few unpack to any size. The process that finds out has a limit of its time and memory, and its end is the answer.
-`python -m studies.vetting PATH GROUP ATTRIBUTE ...` is that process: exit status 0 for a file that can be read, 3 with
-a reason for one that can not, anything else where it came to a bad end.
+a few unpack to any size. The process that finds out has a limit of its time and memory, and its end is the answer:
+exit status 0 for a file that can be read, 3 with a reason for one that can not, anything else where it came to a bad
+end. It looks for modules where this one does, but never in the current folder.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from studies.scene_error import SceneError
+from studies.search_path import search_path
 
 LARGEST_MEMORY = 2**30
 """Bytes of address space for reading a file."""
@@ -27,6 +29,7 @@ LONGEST = 2
 _BYTES_A_SECOND = 2**25
 _REFUSED = 3
 _WHOLE_RESULT = "*"
+_START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from studies.vetting import main; main(sys.argv[2:])"
 _WALL_SECONDS = 60.0  # a folder on the network may be slow, which is no fault of the file
 
 
@@ -62,8 +65,9 @@ def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
     """Exit status of the process that reads a file, and what it says."""
     # one thread: the memory that others set aside counts, too
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    environment["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
-    command = [sys.executable, "-m", __name__, *arguments]
+    # isolated: neither the current folder nor the environment says where its modules are, but for this list
+    path = [str(Path(__file__).parents[1]), *search_path()]
+    command = [sys.executable, "-I", "-c", _START, json.dumps(path), *arguments]
     try:
         done = subprocess.run(
             command,
@@ -82,8 +86,11 @@ def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
 def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
     """Reads all of a scene; exit status and what is said. This process can do nothing else afterwards."""
     # loaded before there are limits, as it is no fault of the file how long that takes
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute, read_result_through
+    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
     from studies.scene_file import read_through
+
+    if group == _WHOLE_RESULT:
+        from studies.netcdf_guard import read_result_through
 
     seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
     if path.is_file():
@@ -114,7 +121,8 @@ def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = 
     return 0, ""
 
 
-if __name__ == "__main__":
-    exit_status, answer = read_within_limits(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
+def main(arguments: Sequence[str]) -> NoReturn:
+    """The process that reads. arguments: path, group, names of attributes."""
+    exit_status, answer = read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
     print(answer, flush=True)
     sys.exit(exit_status)

@@ -6,7 +6,6 @@ Importing this module gives every `xarray.Dataset` read from a result file the a
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,6 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from studyrunner.toml_text import read_toml
+from studyrunner.user_error import UserError
 
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
 _SAME = 1e-9  # relative: two values of an axis that differ by less are one
@@ -238,9 +240,13 @@ def _join_variable(
 
 def _with_axis(dataset: xr.Dataset, key: str) -> xr.Dataset:
     """The result with a key of its study as the first axis of all but the mesh, which is no result."""
-    study = tomllib.loads(dataset.attrs["study"])
+    try:
+        study = read_toml(str(dataset.attrs["study"]).encode(), f"the study of {dataset.attrs.get('title')!r}")
+    except UserError as error:
+        raise ValueError(str(error)) from None
     *table, name = key.split(".")
-    found = [keys[name] for title, keys in study.items() if name in keys and title in (table or study)]
+    tables = {title: keys for title, keys in study.items() if isinstance(keys, dict)}
+    found = [keys[name] for title, keys in tables.items() if name in keys and title in (table or study)]
     if len(found) != 1 or name in dataset.dims:
         raise ValueError(f"{key} is not one value in the study of {dataset.attrs.get('title')!r}.")
     expanded = [each for each, array in dataset.data_vars.items() if not str(each).startswith("mesh_")]

@@ -76,7 +76,7 @@ def check_result_file(path: Path, name: str) -> None:
         if not path.exists():
             raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
         if not path.is_file() or not is_hdf5(path):
-            raise UserError(name, "the file", None, "is no NetCDF-4 file, give a result file of run-study")
+            raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
         vet_result(path)
     except SceneError as error:
         where = "the file" if error.key == "model" else error.key

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import studyrunner.search_path  # noqa: F401 - where all others are looked for
+
+# isort: split
 import argparse
 import os
 import signal
@@ -23,6 +26,7 @@ from studyrunner.ranks import (
     start_ranks,
     wait_for_message,
 )
+from studyrunner.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
@@ -130,6 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments: None for those of the process, which ends here if the run did not come to its end.
     """
+    keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -250,7 +255,10 @@ def _show_plan(study: Study) -> int:
     from studyrunner.tasks import build_tasks
 
     facts = describe_scene(build_study_scene(study))
-    _say(format_plan(study, facts, build_tasks(study, facts.n_displacements)))
+    print(format_plan(study, facts, build_tasks(study, facts.n_displacements)), flush=True)
+    error = last_error(sys.stdout)
+    if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
+        raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
     return CONVERGED
 
 
@@ -260,7 +268,7 @@ def _write_scene(study: Study, path: Path) -> int:
 
     target = check_output("--write-scene", path, study.files)
     write_study_scene(study, target)
-    _say(f"{path}: the scene of study {study.study.name}")
+    print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
 
@@ -291,22 +299,10 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
             f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
         ) from None
     failed = summary.n_points - summary.n_complete
-    _say(
-        f"{path}: {summary.n_points} points, {summary.n_complete} computed, {failed} failed,"
-        f" {format_seconds(progress.seconds)}",
-        summary.certificates,
-        *summary.findings,
-    )
+    counts = f"{summary.n_points} points, {summary.n_complete} computed, {failed} failed"
+    lines = (f"{path}: {counts}, {format_seconds(progress.seconds)}", summary.certificates, *summary.findings)
+    print(*lines, sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
-
-
-def _say(*lines: str) -> None:
-    """Prints lines. A reader that has gone, as `head` does, is no failure of a run whose results are saved."""
-    try:
-        print(*lines, sep="\n", flush=True)
-    except BrokenPipeError:
-        # what is left in the buffer would be tried once more at the end of the process
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

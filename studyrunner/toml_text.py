@@ -15,6 +15,10 @@ _PART = r"(?>[A-Za-z0-9_-]+|\"[^\"\n]*\"|'[^'\n]*')"
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?>[ \t]*\.[ \t]*{_PART}){{{_MOST_PARTS},}}")
 
 
+class NoTomlError(UserError):
+    """A text without harm that is no TOML."""
+
+
 def read_toml_file(path: Path, source: str) -> dict[str, object]:
     """The table in a file. Raises UserError, and OSError where it cannot be read."""
     with path.open("rb") as file:
@@ -39,7 +43,7 @@ def read_toml(content: bytes, source: str) -> dict[str, object]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise wrong(f"give valid TOML: {error}") from None
+        raise NoTomlError(source, "the file", None, f"give valid TOML: {error}") from None
     except RecursionError:
         raise wrong("give valid TOML: this is nested too deeply") from None
     except ValueError as error:

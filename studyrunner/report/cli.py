@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import studyrunner.search_path  # noqa: F401 - where all others are looked for
+
+# isort: split
 import argparse
 import os
 import sys
@@ -12,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+from studyrunner.streams import keep_talking
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -70,6 +74,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit status."""
+    keep_talking()
     try:
         return _report(parse_options(sys.argv[1:] if arguments is None else arguments))
     except UserError as error:
@@ -93,15 +98,15 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
-        from studyrunner.archive import check_result_file
         from studyrunner.progress import count, format_seconds
+        from studyrunner.report.door import check_numbers, reading_errors
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page import write_page
         from studyrunner.report.result import open_result
 
-        check_result_file(options.result, str(options.result))
         result = open_result(options.result)
-        with result.dataset:
+        with result.dataset, reading_errors(str(options.result)):
+            check_numbers(result.dataset, str(options.result))
             _make_folder(options.folder)
             page = options.folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)

@@ -42,6 +42,8 @@ _STYLE: Any = {
     "axes.formatter.limits": (-4, 5),
     # Formulas as tick labels take most of the time of a figure.
     "axes.formatter.use_mathtext": False,
+    # Names of a file are text, whatever signs they have.
+    "text.parse_math": False,
     "grid.color": "#d9d9d9",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,
@@ -97,8 +99,10 @@ class Table:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Inside, figures are built and saved in the one style of the report."""
-    with mpl.rc_context(_STYLE):
+    """Inside, figures are built and saved in the one style of the report, whatever a file matplotlibrc says."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
         yield
 
 

@@ -71,8 +71,7 @@ def _deepest(result: Result) -> int:
 
 def kept_loops(result: Result, point: dict[str, int]) -> list[int]:
     """Contact pairs whose loops the file holds at a point: those that the study asked for, without those of NaN."""
-    asked = result.study.get("outputs", {})
-    listed = asked.get("loops") if isinstance(asked, dict) else None
+    listed = result.study.get("outputs", {}).get("loops")
     pairs = [int(pair) for pair in result.dataset["contact"].values]
     wanted = [pair for pair in pairs if pair in listed] if isinstance(listed, list) and listed else pairs
     force = result.at("loop_force", point, 0).sel(contact=wanted)

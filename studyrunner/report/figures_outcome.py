@@ -195,6 +195,5 @@ def _worst_errors(result: Result, course: Course, name: str) -> NDArray[np.float
 
 def _aim(result: Result) -> float | None:
     """The `rtol` of the study; None where it is an axis or the file does not say."""
-    solver = result.study.get("solver", {})
-    aim = solver.get("rtol") if isinstance(solver, dict) else None
-    return float(aim) if isinstance(aim, (int, float)) and "rtol" not in result.varying else None
+    aim = result.study_number("solver", "rtol")
+    return aim if aim > 0.0 and "rtol" not in result.varying else None

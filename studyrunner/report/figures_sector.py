@@ -59,8 +59,7 @@ def _draw_frequencies(result: Result, panel: Axes) -> str:
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     text = f"Natural frequencies of the sector with its joint stuck, {frequencies.shape[1]} modes"
     first = f"The lowest is {np.nanmin(frequencies):.5g} Hz"
-    scene = result.study.get("scene", {})
-    diameter = scene.get("nodal_diameter") if isinstance(scene, dict) else None
+    diameter = result.study.get("scene", {}).get("nodal_diameter")
     if isinstance(diameter, int) and "frequency" in result.dataset.coords:
         studied = result.dataset["frequency"].values
         low, high = float(studied.min()), float(studied.max())
@@ -131,6 +130,8 @@ def _draw_scale_bar(panel: Axes, seen: NDArray[np.float64]) -> None:
     """A bar of a round length under the mesh, in place of axes."""
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float((high - low).max())
+    if not size > 0.0:
+        return
     length = 10.0 ** np.floor(np.log10(0.4 * size))
     length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
     bottom = low[1] - 0.05 * size

@@ -84,8 +84,7 @@ def _steps(result: Result) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         longest = np.minimum(result.dataset["step"], result.cycles[-1])
         steps = longest.broadcast_like(outcome).transpose(*result.axes).values
     explicit = np.zeros(shape, dtype=bool)
-    slow_time = result.study.get("slow_time", {})
-    free = isinstance(slow_time, dict) and "largest_depth" in slow_time
+    free = "largest_depth" in result.study.get("slow_time", {})
     if "scheme" in outcome.dims and not free:
         explicit = (result.dataset["scheme"] == "explicit").broadcast_like(outcome).transpose(*result.axes).values
     return steps, explicit

@@ -28,6 +28,7 @@ from studyrunner.report.page_sections import (
     table_section,
 )
 from studyrunner.report.result import Result
+from studyrunner.user_error import show_text
 
 DATA_LIMIT = 4e6
 """Most characters of numbers for the interactive part."""
@@ -165,7 +166,7 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
             f"<style>\n{style}</style>",
             "</head>",
             "<body>",
-            f"<header><h1>{title}</h1><p>Report of <code>{escape(result.path.name)}</code></p></header>",
+            f"<header><h1>{title}</h1><p>Report of <code>{escape(show_text(result.path.name))}</code></p></header>",
             "<main>",
             *body,
             "</main>",

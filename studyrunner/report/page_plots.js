@@ -61,7 +61,8 @@ function drawResponse() {
   byId("response-title").textContent = entry
     ? `Response${response} at ${cycleText(state.cycle)}`
     : "Points (the file holds no response_amplitude)";
-  const at = (point) => axis.values[places(point)[data.horizontal]];
+  const written = (value) => (axis.words ? plain(value) : value);
+  const at = (point) => written(axis.values[places(point)[data.horizontal]]);
   const value = (point, cycle) => (entry ? course("response_amplitude", point, cycle, state.response) * entry.factor : 0);
   const traces = [];
   let ghosts = false;
@@ -105,7 +106,7 @@ function drawResponse() {
     hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
     marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
   });
-  const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values } : {};
+  const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values.map(written) } : {};
   byId("response-hint").textContent = varying.length
     ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points without a value there." : "")
     : "The study has a single point.";

@@ -76,8 +76,7 @@ def _axis_values(result: Result, name: str) -> str:
 def _scene(result: Result) -> str:
     n_pairs = count(result.dataset.sizes["contact"], "contact pair")
     responses = f", response {', '.join(result.responses)}" if result.responses else ""
-    scene = result.study.get("scene")
-    model = scene.get("model") if isinstance(scene, dict) else None
+    model = result.study.get("scene", {}).get("model")
     return f"{model or 'unknown'}: {n_pairs}{responses}"
 
 

@@ -177,8 +177,7 @@ def study_precision(result: Result) -> Precision | None:
     if max(len(point.measured) for point in points) < 2:
         return None
     wears = result.dataset.sizes.get("wear_coefficient", 1) > 1 and result.cycles[-1] > 0.0
-    solver = result.study.get("solver")
-    shortcuts = not isinstance(solver, dict) or bool(solver.get("shortcuts", True))
+    shortcuts = bool(result.study.get("solver", {}).get("shortcuts", True))
     return Precision(result, keys, points, shared=shortcuts and wears)
 
 

@@ -144,10 +144,8 @@ class _Reader:
     def __init__(self, result: Result) -> None:
         self.result = result
         self.keys = [name for name in result.axes if name in KEYS]
-        study = result.study
-        tables = {name: table if isinstance(table, dict) else {} for name, table in study.items()}
-        self.solver = tables.get("solver", {})
-        self.by_depth = tables.get("slow_time", {}).get("largest_depth") is not None
+        self.solver = result.study.get("solver", {})
+        self.by_depth = result.study.get("slow_time", {}).get("largest_depth") is not None
         n_response = len(result.responses)
         self.worn = self._values("worn_volume", (len(result.cycles),))
         self.response = self._values("response_amplitude", (len(result.cycles), n_response))
@@ -211,7 +209,7 @@ class _Reader:
             used=(_or_zero(self.harmonics_used[at][-1]), _or_zero(self.samples_used[at][-1])),
             oscillates=bool(self.oscillates[at] == 1.0),
             step_limit=float(self.limit[at]),
-            rtol=float(self.solver.get("rtol", np.nan)) if setting.rtol is None else setting.rtol,
+            rtol=self.result.study_number("solver", "rtol") if setting.rtol is None else setting.rtol,
         )
 
     def exact(self, place: Mapping[str, int]) -> Run | None:

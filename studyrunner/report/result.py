@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
+import warnings
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,8 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.progress import count
+from studyrunner.report.door import check_dataset, read_study, reading_errors
 from studyrunner.report.units import show_cycles, show_number
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, show_text
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 CONVERGED = 0
@@ -24,8 +25,6 @@ CONVERGED = 0
 
 _COMPLETE = ("converged", "inaccurate", "sensitive")
 """Words of the outcomes of points that were computed to the last cycle."""
-
-_NEEDED = ("outcome", "cycle", "contact")
 
 Point = Mapping[str, int]
 """Index along each axis. Where axes are left out, all values along them are meant."""
@@ -110,9 +109,7 @@ class Result:
         outcome = self.dataset["outcome"]
         if "rtol" in outcome.dims:
             return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
-        solver = self.study.get("solver")
-        aim = solver.get("rtol") if isinstance(solver, dict) else None
-        return np.full(outcome.shape, float(aim) if isinstance(aim, int | float) else np.nan)
+        return np.full(outcome.shape, self.study_number("solver", "rtol"))
 
     @cached_property
     def above(self) -> NDArray[np.bool_]:
@@ -139,15 +136,20 @@ class Result:
     @cached_property
     def title(self) -> str:
         """Title of the study, or the name of the file."""
-        return str(self.dataset.attrs.get("title") or self.path.stem)
+        return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
 
     @cached_property
-    def study(self) -> dict[str, object]:
+    def study(self) -> dict[str, dict[str, object]]:
         """The effective study that the file carries, by table; empty where it has none that can be read."""
         try:
-            return tomllib.loads(str(self.dataset.attrs.get("study", "")))
-        except tomllib.TOMLDecodeError:
+            return read_study(self.dataset.attrs)
+        except UserError:
             return {}
+
+    def study_number(self, table: str, key: str) -> float:
+        """A number of the study; NaN where the file does not say."""
+        value = self.study.get(table, {}).get(key)
+        return float(value) if isinstance(value, int | float) else math.nan
 
     @cached_property
     def endings(self) -> dict[int, Ending]:
@@ -328,23 +330,21 @@ def as_sentences(*parts: str) -> str:
 
 
 def open_result(path: Path | str) -> Result:
-    """Open a result file; nothing but its header is read.
+    """Open a result file, once a process of its own has read it without harm; variables are read when they are needed.
 
     Raises
     ------
     UserError
         Where there is no such file or it is no result of `run-study`.
     """
-    path = Path(path)
+    # the report itself knows nothing of studies and scenes
+    from studyrunner.archive import check_result_file
+
+    path, source = Path(path), str(path)
     if not path.is_file():
-        raise UserError(str(path), "OUT.nc", None, "there is no such file; give a result file of run-study")
-    try:
-        dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False)
-    except (OSError, ValueError, RuntimeError) as error:
-        raise UserError(str(path), "OUT.nc", None, "is no NetCDF file; give a result file of run-study") from error
-    lacking = [name for name in _NEEDED if name not in dataset.variables]
-    if lacking or not math.prod(dataset["outcome"].shape):
-        dataset.close()
-        remedy = f"holds no {' and no '.join(lacking)}" if lacking else "holds no point"
-        raise UserError(str(path), "OUT.nc", None, f"{remedy}; give a result file of run-study")
-    return Result(path, dataset)
+        raise UserError(source, "OUT.nc", None, "there is no such file; give a result file of run-study")
+    check_result_file(path, source)
+    with reading_errors(source, every=True), warnings.catch_warnings(action="ignore"):
+        # the same file as before, whatever its name looks like
+        opened = xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
+        return Result(path, check_dataset(opened, source))

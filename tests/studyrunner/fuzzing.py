@@ -1,22 +1,32 @@
-"""Mutations of valid study, scene and result files, and what `run-study --plan` makes of them, one after the other."""
+"""Mutations of valid study, scene and result files, and what the commands make of them, one after the other.
+
+Kinds: "text" a study file, "scene" its scene file, "result" a result file, all under `run-study --plan`; "report" a
+result file under `study-report`; "reader" one that is opened and asked whatever it can be asked.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import io
 import json
 import os
 import random
 import resource
-import signal
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+
+import xarray as xr
 
 from studies import vetting
 from studyrunner import cli
+from studyrunner.report.drawing import Drawing, style
+from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import read_in_a_fork
+from tests.studyrunner.result_mutations import mutate_result
 
 NASTY = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
@@ -44,8 +54,13 @@ NASTY = (
         "#",
     ),
 )
-SECONDS = 5.0
-PATIENCE = 240
+KINDS = {"text": 0.4, "scene": 0.4, "result": 0.2}
+"""What is fuzzed in the tests, and how much of it."""
+
+SECONDS = {"text": 5.0, "scene": 5.0, "result": 5.0, "report": 10.0, "reader": 10.0}
+PATIENCE = 90
+PAINTED = 0.05
+"""Share of the reports whose figures are painted as well."""
 
 
 def mutate_text(text: str, chance: random.Random) -> bytes:
@@ -99,7 +114,76 @@ def address_space() -> int:
     return pages * resource.getpagesize()
 
 
-def run(folder: Path, seed: int, numbers: Sequence[int]) -> dict[str, object]:
+def ask(path: Path) -> int:
+    """Opens a result and asks it all that there is to ask; what it does not hold it says by ValueError or KeyError."""
+    from studyrunner.accessor import join_results
+    from studyrunner.report.result import open_result
+
+    try:
+        dataset = open_result(path).dataset
+    except UserError as error:
+        print(f"reader: {error}", file=sys.stderr)
+        return 2
+    with dataset:
+        questions: list[Callable[[], object]] = [
+            dataset.fretwear.response,
+            lambda: join_results([dataset, dataset]),
+            lambda: join_results([dataset], dim="friction_coefficient"),
+            *(lambda pair=pair: dataset.fretwear.loop(pair) for pair in dataset["contact"].values.tolist()[:3]),
+            *(lambda name=name: dataset.fretwear.flank("wear_depth", name) for name in _surfaces(dataset)),
+            *(lambda name=name: dataset[name].load() for name in map(str, dataset.variables)),
+        ]
+        for question in questions:
+            with contextlib.suppress(ValueError, KeyError):
+                question()
+    return 0
+
+
+def _surfaces(dataset: xr.Dataset) -> tuple[str, ...]:
+    try:
+        return tuple(dataset.fretwear.surfaces[:3])
+    except KeyError:
+        return ()
+
+
+def _mutate(kind: str, whole: Mapping[str, bytes], chance: random.Random) -> None:
+    """Writes the files of one input: all of them, one mutated."""
+    content = dict(whole)
+    if kind == "text":
+        content["study"] = mutate_text(whole["study"].decode(), chance)
+    else:
+        name = {"scene": "scene.h5", "result": "result"}.get(kind, "drawn")
+        # what stands in a result is taken for what it was; under run-study only its study and scene are read
+        if name != "drawn" or chance.random() < 0.4:
+            content[name] = mutate_bytes(whole[name], chance)
+    for name, what in content.items():
+        Path(name).write_bytes(what)
+    if kind in ("report", "reader") and content["drawn"] is whole["drawn"]:
+        mutate_result(Path("drawn"), chance)
+
+
+def _lay_out(drawing: Drawing, folder: Path) -> tuple[Path, Path]:
+    """As Drawing.save, with everything but the painting, which takes most of the time."""
+    with style():
+        drawing.figure.draw_without_rendering()
+    paths = folder / f"{drawing.name}.svg", folder / f"{drawing.name}.png"
+    paths[0].write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
+    return paths
+
+
+def _commands() -> dict[str, Callable[[], int]]:
+    from studyrunner.report import cli as report
+
+    return {
+        "text": lambda: cli.main(["study", "--plan"]),
+        "scene": lambda: cli.main(["study", "--plan"]),
+        "result": lambda: cli.main(["result", "--plan"]),
+        "report": lambda: report.main(["drawn", "-o", "report"]),
+        "reader": lambda: ask(Path("drawn")),
+    }
+
+
+def run(folder: Path, seed: int, numbers: Sequence[int], kinds: Mapping[str, float]) -> dict[str, object]:
     """Statuses and the worst of the files with these numbers; what is wrong with one is in `wrong`."""
     os.chdir(folder)
     largest, waited = 0, 0.0
@@ -113,7 +197,12 @@ def run(folder: Path, seed: int, numbers: Sequence[int]) -> dict[str, object]:
 
     vetting.run_reader = read
     vetting.LONGEST = 1
-    study, scene, result = (Path(name).read_bytes() for name in ("study", "scene.h5", "result"))
+    whole = {name: Path(name).read_bytes() for name in ("study", "scene.h5", "result", "drawn") if Path(name).exists()}
+    commands = _commands()
+    painted, Drawing.save = Drawing.save, _lay_out  # type: ignore[method-assign]
+    for kind in {"report", "reader"} & set(kinds):
+        # what it loads is none of the file's either
+        assert commands[kind]() == 0
     statuses: dict[str, int] = {}
     wrong: list[str] = []
     slowest = 0.0
@@ -121,22 +210,26 @@ def run(folder: Path, seed: int, numbers: Sequence[int]) -> dict[str, object]:
     resource.setrlimit(resource.RLIMIT_AS, (address_space() + 2**31,) * 2)
     for number in numbers:
         chance = random.Random(f"{seed} {number}")
-        kind = chance.choices(["text", "scene", "result"], [0.4, 0.4, 0.2])[0]
-        Path("study").write_bytes(mutate_text(study.decode(), chance) if kind == "text" else study)
-        Path("scene.h5").write_bytes(mutate_bytes(scene, chance) if kind == "scene" else scene)
-        Path("result").write_bytes(mutate_bytes(result, chance) if kind == "result" else result)
+        kind = chance.choices(list(kinds), list(kinds.values()))[0]
+        _mutate(kind, whole, chance)
+        Drawing.save = painted if chance.random() < PAINTED else _lay_out  # type: ignore[method-assign]
         Path("number").write_text(f"{kind} {seed} {number}", encoding="ascii")
         said, printed = io.StringIO(), io.StringIO()
-        signal.alarm(PATIENCE)  # the end of this process: no hang gets past it
+        # the end of this process, with the place: no hang gets past it
+        faulthandler.dump_traceback_later(PATIENCE, exit=True)
         watch, waited = Stopwatch(), 0.0
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
-            status = cli.main(["result" if kind == "result" else "study", "--plan"])
+            try:
+                status = commands[kind]()
+            except Exception:
+                status = 1
+                traceback.print_exc()
         seconds = watch.seconds(waited)
-        signal.alarm(0)
+        faulthandler.cancel_dump_traceback_later()
         slowest = max(slowest, seconds)
         lines = said.getvalue().splitlines()
         right = (status == 2 and len(lines) == 1 and lines[0].isprintable()) or (status == 0 and not lines)
-        if not right or seconds > SECONDS or len("".join(lines)) > 2000 or "\x1b" in printed.getvalue():
+        if not right or seconds > SECONDS[kind] or len("".join(lines)) > 2000 or "\x1b" in printed.getvalue():
             wrong.append(f"{kind} {seed} {number}: status {status}, {seconds:.1f} s: {said.getvalue()[-1500:]}")
         key = f"{kind} {status}"
         statuses[key] = statuses.get(key, 0) + 1
@@ -146,4 +239,5 @@ def run(folder: Path, seed: int, numbers: Sequence[int]) -> dict[str, object]:
 
 if __name__ == "__main__":
     first, last = int(sys.argv[3]), int(sys.argv[4])
-    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), range(first, last))))
+    wanted = json.loads(sys.argv[5]) if len(sys.argv) > 5 else KINDS
+    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), range(first, last), wanted)))

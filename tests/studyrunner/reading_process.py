@@ -91,7 +91,7 @@ def read_in_a_fork(arguments: Sequence[str], own: int = 0) -> Reading:
 def main() -> None:
     """Reads a file for every line of its input."""
     # loaded as a process of its own does it, before there are limits
-    import studies.hdf5_guard
+    import studies.netcdf_guard
     import studies.scene_file  # noqa: F401
 
     for line in sys.stdin:

@@ -300,3 +300,13 @@ def test_what_cannot_be_joined_is_refused(result):
         join_results([result, result.assign_coords(contact_x=2 * result.contact_x)])
     with pytest.raises(ValueError, match="gravity is not one value in the study of 'a study'"):
         join_results([result, result], dim="gravity")
+
+
+@pytest.mark.parametrize(
+    "study", ["a." * 100_000 + "a = 1", "a = " + "[" * 50_000, "a = " + "9" * 6000, "= nonsense", "a = 1"]
+)
+def test_a_study_that_was_made_to_do_harm(study):
+    result = make_result(flat([0.0, 1.0], [0.0, 1.0]), ["back"] * 4, frequency=[1.0])
+    result.attrs["study"] = study
+    with pytest.raises(ValueError, match="study"):
+        join_results([result], dim="friction_coefficient")

@@ -1,0 +1,136 @@
+"""Files that lie beside a study and bear the names of modules: no process of the commands ever runs one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from studies.scene_error import SceneError
+from studies.vetting import vet_result, vet_scene
+from studyrunner.cli import main
+from tests.mpi.launching import PATIENCE, launcher
+
+ROOT = Path(__file__).parents[2]
+FOREIGN = "import os\nopen(os.path.join({folder!r}, 'taken'), 'a').write(__name__ + ' ')\nraise SystemExit(77)\n"
+NAMES = (
+    *("json.py", "h5py/__init__.py", "numpy.py", "netCDF4.py", "xarray/__init__.py", "solver.py", "resource.py"),
+    *(
+        "matplotlib.py",
+        "argparse.py",
+        "subprocess.py",
+        "typing_extensions.py",
+        "mpi4py/__init__.py",
+        "rich/__init__.py",
+    ),
+)
+SMALL = ("axes.frequency=150", "slow_time.cycles=0", "axes.scheme=implicit")
+PLUGIN = "[xarray.backends]\nforeign = foreign_plugin:Backend\n[pydantic]\nforeign = foreign_plugin:plugin\n"
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> Path:
+    """A folder with a study, its scene, its result, and everything that could be mistaken for a module."""
+    folder = tmp_path / "hostile"
+    folder.mkdir()
+    scene, result = folder / "scene.h5", folder / "result.nc"
+    study = ["sdof_slider", *(part for text in SMALL for part in ("--set", text))]
+    assert main([*study, "--write-scene", str(scene)]) == 0
+    assert main([*study, "-o", str(result)]) == 0
+    text = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = 150.0\n'
+    (folder / "study.toml").write_text(f"{text}[slow_time]\ncycles = 0\noutputs = 1\n", encoding="utf-8")
+    for name in (*NAMES, "foreign_plugin.py"):
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(FOREIGN.format(folder=str(tmp_path)), encoding="utf-8")
+    # innocent: a folder of studies that somebody made a package of
+    (folder / "studies").mkdir()
+    (folder / "studies" / "__init__.py").touch()
+    (folder / "foreign-1.0.dist-info").mkdir()
+    (folder / "foreign-1.0.dist-info" / "METADATA").write_text("Name: foreign\nVersion: 1.0\n", encoding="utf-8")
+    (folder / "foreign-1.0.dist-info" / "entry_points.txt").write_text(PLUGIN, encoding="utf-8")
+    return folder
+
+
+def run(command: Sequence[str], folder: Path, python_path: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": python_path, "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+
+
+def assert_nothing_taken(folder: Path, done: subprocess.CompletedProcess[str]) -> None:
+    taken = folder.parent / "taken"
+    assert not taken.exists(), taken.read_text(encoding="utf-8")
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_process_that_reads(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # as in a notebook, or a script, that stands in the folder
+    monkeypatch.chdir(hostile)
+    monkeypatch.syspath_prepend("")
+    vet_scene(Path("scene.h5"))
+    vet_result(Path("result.nc"))
+    Path("scene.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    with pytest.raises(SceneError, match="damaged"):
+        vet_scene(Path("scene.h5"))
+    assert not (hostile.parent / "taken").exists()
+
+
+MODULE = [sys.executable, "-m", "studyrunner.cli"]
+REPORT = [sys.executable, "-m", "studyrunner.report.cli"]
+
+
+@pytest.mark.parametrize("arguments", [["study.toml", "--plan"], ["study.toml"], ["result.nc", "-o", "again.nc"]])
+def test_run_study(arguments: list[str], hostile: Path) -> None:
+    assert_nothing_taken(hostile, run([*MODULE, *arguments], hostile, str(ROOT)))
+
+
+def test_study_report(hostile: Path) -> None:
+    assert_nothing_taken(hostile, run([*REPORT, "result.nc"], hostile, str(ROOT)))
+
+
+@pytest.mark.parametrize("python_path", [f":{ROOT}", f".:{ROOT}", f"{ROOT}:"])
+@pytest.mark.parametrize("module", ["studyrunner.cli", "studyrunner.report.cli"])
+def test_commands_as_they_are_installed(module: str, python_path: str, hostile: Path, tmp_path: Path) -> None:
+    """A PYTHONPATH with an empty entry, as scripts that extend it leave it, means the current folder."""
+    script = tmp_path / "command"
+    script.write_text(f"import sys\nfrom {module} import main\nsys.exit(main())\n", encoding="utf-8")
+    arguments = ["study.toml", "--plan"] if module == "studyrunner.cli" else ["result.nc"]
+    assert_nothing_taken(hostile, run([sys.executable, str(script), *arguments], hostile, python_path))
+
+
+def test_under_mpiexec(hostile: Path) -> None:
+    done = run([*launcher(2), *MODULE, "study.toml", "-o", "out.nc"], hostile, str(ROOT))
+    assert_nothing_taken(hostile, done)
+    assert (hostile / "out.nc").exists()
+
+
+def test_a_cache_of_compiled_code_is_no_data_either(hostile: Path) -> None:
+    (hostile / ".numba_config.yaml").write_text(f"cache_dir: {hostile / 'cache'}\n", encoding="utf-8")
+    assert_nothing_taken(hostile, run([*MODULE, "study.toml"], hostile, str(ROOT)))
+    assert not (hostile / "cache").exists()
+
+
+def test_the_style_of_figures_is_the_reports_own(hostile: Path) -> None:
+    (hostile / "matplotlibrc").write_text(
+        "text.usetex: True\nfont.size: 40\nbackend: module://numpy\n", encoding="utf-8"
+    )
+    assert_nothing_taken(hostile, run([*REPORT, "result.nc"], hostile, str(ROOT)))
+
+
+def test_folders_of_python_path_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the current folder is left out, and not where the project lies in it."""
+    from studies.search_path import search_path
+
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert str(tmp_path) in search_path()
+    monkeypatch.chdir(tmp_path)
+    assert str(tmp_path) not in search_path()
+    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.chdir(ROOT)
+    assert str(ROOT) in search_path()

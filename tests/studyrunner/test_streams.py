@@ -1,0 +1,90 @@
+"""Terminals that are gone, pipes that nobody reads, full logs: a run goes on, with its result and its own status."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.mpi.launching import PATIENCE, launcher, results
+
+ROOT = Path(__file__).parents[2]
+STUDY = "two_masses --set axes.wear_coefficient=1e-11 --set slow_time.cycles=20000 --set slow_time.outputs=3 -o out.nc"
+DEAF = {
+    "full log": "2>/dev/full",
+    "full log of everything": ">/dev/full 2>&1",
+    "closed": ">&- 2>&-",
+    "closed, and stdin": "<&- >&- 2>&-",
+    "a reader that has gone": "2>&1 | true",
+    "a reader of one line": "2>&1 | head -1",
+}
+
+
+def shell(command: str, folder: Path) -> tuple[int, str, str]:
+    """Exit status of the command before the pipe; what was said behind it."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"],
+        cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout, done.stderr
+
+
+def faked(arguments: str, where: str) -> str:
+    """A run with the stand-in for the solver."""
+    return f"{sys.executable} {ROOT / 'tests' / 'mpi' / 'run_faked.py'} {arguments} {where}"
+
+
+@pytest.mark.parametrize("case", DEAF)
+def test_a_run_that_nobody_hears(case: str, tmp_path: Path) -> None:
+    status, _, _ = shell(faked(STUDY, DEAF[case]), tmp_path)
+    assert status == 0
+    assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
+
+
+@pytest.mark.parametrize("case", ["full log of everything", "closed"])
+def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
+    command = shlex.join([*launcher(2), "bash", "-c", faked(STUDY, DEAF[case])])
+    status, _, _ = shell(command, tmp_path)
+    assert status == 0
+    assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
+
+
+@pytest.mark.parametrize("case", ["full log", "closed"])
+def test_a_mistake_that_nobody_hears(case: str, tmp_path: Path) -> None:
+    status, _, _ = shell(faked("no_study", DEAF[case]), tmp_path)
+    assert status == 2
+
+
+def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
+    command = f"{sys.executable} -m studyrunner.cli two_masses --plan"
+    status, _, said = shell(f"{command} >/dev/full", tmp_path)
+    assert (status, said) == (
+        2,
+        "run-study: command line: --plan: cannot be written to stdout: No space left on device\n",
+    )
+    status, printed, said = shell(f"{command} | head -1", tmp_path)
+    assert (status, said) == (0, "")
+    assert len(printed.splitlines()) == 1
+
+
+@pytest.mark.parametrize("case", ["full log of everything", "closed", "a reader that has gone"])
+def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
+    assert shell(faked(STUDY, ""), tmp_path)[0] == 0
+    status, _, _ = shell(f"{sys.executable} -m studyrunner.report.cli out.nc {DEAF[case]}", tmp_path)
+    assert status == 0
+    assert (tmp_path / "out-report" / "index.html").exists()
+
+
+def test_nothing_else_gets_the_number_of_a_stream(tmp_path: Path) -> None:
+    """A library that complains on stderr must not write into a file of the run."""
+    code = (
+        "import os\nfrom studyrunner.streams import keep_talking\nkeep_talking()\n"
+        "file = open('file', 'wb')\nassert file.fileno() > 2\nos.write(2, b'complaint')\nprint('x', flush=True)\n"
+    )
+    assert shell(f"{sys.executable} -c {shlex.quote(code)} <&- >&- 2>&-", tmp_path)[0] == 0
+    assert (tmp_path / "file").read_bytes() == b""
