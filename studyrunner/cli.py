@@ -73,6 +73,7 @@ class Options:
     write_scene: Path | None
     fresh: bool
     retry_failed: bool
+    prune: bool
 
 
 class _Parser(argparse.ArgumentParser):
@@ -109,9 +110,14 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
     parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
-    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run has left")
+    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
+    )
+    parser.add_argument(
+        "--prune",
+        action="store_true",
+        help="remove what other studies have left in OUT.nc.parts, once this is finished",
     )
     found = parser.parse_args(list(arguments))
     return Options(
@@ -122,6 +128,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         write_scene=None if found.write_scene is None else Path(found.write_scene),
         fresh=found.fresh,
         retry_failed=found.retry_failed,
+        prune=found.prune,
     )
 
 
@@ -283,19 +290,27 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
             if ranks.size == 1 and (announced := job_size()) > 1:
                 progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
             summary = run_study(
-                ranks, study, model, target, progress, fresh=options.fresh, retry_failed=options.retry_failed
+                ranks,
+                study,
+                model,
+                target,
+                progress,
+                fresh=options.fresh,
+                retry_failed=options.retry_failed,
+                prune=options.prune,
             )
     except Interrupted as ended:
-        done = ended.summary.n_points - ended.summary.n_left
-        raise KeyboardInterrupt(
-            f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
-        ) from None
+        done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
+        kept = f"{done} are kept, {path} is the finished result that it was"
+        what = f"{path} holds {done}" if ended.summary.written else kept
+        raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
     failed = summary.n_points - summary.n_complete
     _say(
         f"{path}: {summary.n_points} points, {summary.n_complete} computed, {failed} failed,"
         f" {format_seconds(progress.seconds)}",
         summary.certificates,
         *summary.findings,
+        *([] if summary.written else [f"{path} is the finished result that it was"]),
     )
     return SOME_FAILED if failed else CONVERGED
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import run, schedule
+from studyrunner import schedule
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
 from studyrunner.store import Store
 from studyrunner.tasks import BranchTask, MarchTask
-from tests.studyrunner.fakes import fake_branch, fake_evaluate
+from tests.studyrunner.faked_runs import Solver, Task
+from tests.studyrunner.fakes import fake_branch
 
 N_POINTS, N_RESULTS = 8, 4 + 8
 SMALL = [
@@ -29,37 +29,12 @@ SMALL = [
     *("--set", "axes.scheme=implicit"),
     *("-o", "out.nc"),
 ]
-Task = BranchTask | MarchTask
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-class Solver:
-    """A stand-in that counts what it does and may do something else at one of its results."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.tasks: list[Task] = []
-        self.n_results = 0
-        self.disturb: Callable[[Task, int], None] = lambda *_: None
-
-        def build_fake(model: object, _: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
-            return lambda task, keep: self.evaluate(model, task, keep)
-
-        monkeypatch.setattr(run, "build_evaluator", build_fake)
-
-    def evaluate(self, model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
-        self.tasks.append(task)
-        for result in fake_evaluate(task, keep, describe_scene(model)):
-            self.n_results += 1
-            self.disturb(task, self.n_results)
-            yield result
-
-    def begin_again(self) -> None:
-        self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)
 
 
 @pytest.fixture
@@ -249,7 +224,7 @@ def test_a_second_run_of_the_same_study_is_refused(
             second.append(main(SMALL))
 
     monkeypatch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
-    monkeypatch.setattr("studyrunner.store._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.folder_lock._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(SMALL) == 0
     assert second == [2]
@@ -277,7 +252,7 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert len(marches) == 8
     assert all(task.resume == Kept("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(load(), expected)
-    assert not list(Path("out.nc.parts").glob("*.progress.npz"))
+    assert not list(Path("out.nc.parts").glob("*.progress"))
 
 
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,8 +277,8 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
 
     monkeypatch.setattr(solver, "evaluate", resuming)
     assert main(SMALL) == 130
-    assert list(Path("out.nc.parts").glob("*.progress.npz"))
-    for path in Path("out.nc.parts").glob("*.starts.npz"):
+    assert list(Path("out.nc.parts").glob("*.progress"))
+    for path in Path("out.nc.parts").glob("*.starts"):
         path.unlink()
     assert main(SMALL) == 0
     xr.testing.assert_identical(load(), expected)
