@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import IO
 
-from studyrunner.files import open_plain, sync_folder
+from studyrunner.files import open_plain
 
 _SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
 _LONGEST = 1000
@@ -41,7 +41,6 @@ class FolderLock:
                 self._file.truncate(0)
                 self._file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
                 self._file.flush()
-                sync_folder(path.parent)
         except BaseException:
             self._file.close()
             raise

@@ -34,6 +34,7 @@ from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
+_BYTES_OF_CACHE = 2**16
 _ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
 
 Region = tuple[int | slice, ...]
@@ -64,7 +65,7 @@ class _Index:
     key: NDArray[np.bytes_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Entry:
     """A record in a file: its place there, its hash, and the points that have it."""
 
@@ -184,6 +185,8 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
             chunksizes=(*slab, *(1 if _one_pair(name, of) else sizes[of] for of in entry.dimensions)),
             fill_value=math.nan if entry.dtype.startswith("float") else None,
         )
+        # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+        variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
         variable.setncatts(_attributes(name, entry))
         if "contact" in entry.dimensions:
             variable.setncattr("coordinates", _ON_CONTACT)

@@ -51,7 +51,7 @@ def take_stock(folder: Path, kind: np.dtype[np.void], *, alone: bool) -> Stock:
             continue
         except NotPlainError:
             damaged.append(path)
-        except OSError:
+        except (OSError, MemoryError):
             # a disk that fails for now is no reason to throw anything away
             raise
         except Exception:
