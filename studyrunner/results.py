@@ -31,13 +31,14 @@ class StartResult:
 
     position: place of the frequency in the branch. start: what a march starts from. moves: whether anything slips or
     lifts in the joint; where nothing does nothing wears. n_unknowns: of the state, with the harmonics that it took; 0
-    where there is no state.
+    where there is no state. lost: the fault of the machine that it broke off with: then this is no result.
     """
 
     position: int
     start: Kept
     moves: bool
     n_unknowns: int
+    lost: str = ""
 
     @property
     def failed(self) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.course import Course
+from studyrunner.course import Course, fault_of
 from studyrunner.crashes import Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
 from studyrunner.earlier import holds_finished_result
 from studyrunner.evaluate import (
@@ -207,11 +207,23 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
     """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
     course = Course(ledger)
 
-    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
+    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = course.take(task, result)
         if isinstance(task, BranchTask) and course.n_starts_left == 0:
             progress.say("marching through the remaining wear histories")
         return new
+
+    said: set[tuple[int, str]] = set()
+
+    def is_sick(rank: int, result: StartResult | MarchResult) -> bool:
+        fault = fault_of(result)
+        if fault and (rank, fault) not in said:
+            said.add((rank, fault))
+            progress.note(
+                f"rank {rank}: {fault}: a fault of the machine; the task is tried once more, by another rank where"
+                " there is one"
+            )
+        return bool(fault)
 
     def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
         had = f", which had {count(len(lost), 'task')}" if lost else ""
@@ -229,5 +241,5 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
         n_starts = count(course.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back)
+    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back, is_sick)
     ledger.store.flush()
