@@ -118,11 +118,20 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
     another history, which then takes a march of its own.
     """
-    history = _solve(model, friction_coefficient, task, keep)
-    yield build_result(task, history)
+    reached = task.resume
+
+    def note(progress: Kept) -> None:
+        nonlocal reached
+        reached = progress
+        keep(progress)
+
+    history = _solve(model, friction_coefficient, task, note)
+    # with more time it goes on from there
+    left = reached if history.outcome is Outcome.TIME_LIMIT else None
+    yield replace(build_result(task, history), progress=left)
     for place, share in enumerate(task.shares[1:], start=1):
         if not history.oscillates:
-            yield build_result(task, history, place)
+            yield replace(build_result(task, history, place), progress=left)
         else:
             alone = replace(task, shares=(share,), resume=None)
             yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)

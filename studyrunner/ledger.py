@@ -105,8 +105,10 @@ class Ledger:
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """A history has come."""
         key = self._histories[march.number][result.share]
-        last = result.share == march.n_results - 1
-        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if last else "")
+        ended = result.share == march.n_results - 1 and result.progress is None
+        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
+        if result.progress is not None:
+            self.store.keep_progress(self.key(march), result.progress)
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """A task says how far it is."""

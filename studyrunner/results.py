@@ -62,7 +62,7 @@ class MarchResult:
 
     values: variable -> array with the dimensions of that variable after the axes; after `last_cycle` NaN, or 0 where
         the variable is a whole number.
-    share: its place among the shares of the task.
+    share: its place among the shares of the task. progress: how far a march was that was given up for its time.
     The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
     """
 
@@ -81,3 +81,4 @@ class MarchResult:
     largest_wear_depth: float
     message: str = ""
     share: int = 0
+    progress: Kept | None = None

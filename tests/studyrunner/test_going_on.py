@@ -303,3 +303,36 @@ def test_a_time_limit_is_one_bad_point() -> None:
     assert "time_limit" in load().outcome.attrs["flag_meanings"]
     sentence = "The computation took longer than solver.time_limit"
     assert any(line.startswith(sentence) for line in load().outcome.attrs["sentences"].splitlines())
+
+
+def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the solver itself: to the numbers of a march that had the time at once."""
+    from studyrunner import evaluate
+
+    study = [
+        *("sdof_slider", "--set", "axes.frequency=[160]", "--set", "axes.scheme=['implicit']"),
+        *("--set", "solver.harmonics=5", "--set", "solver.samples=64", "--set", "slow_time.cycles=100_000"),
+        *("--set", "axes.step=500"),
+    ]
+    assert main([*study, "-o", "whole.nc"]) == 0
+    own, begun = evaluate._solve, []
+
+    def solve(model: object, friction: float, task: MarchTask, *rest: object) -> object:
+        begun.append(task.resume)
+        return own(model, friction, task, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(evaluate, "_solve", solve)
+    with xr.open_dataset("whole.nc") as whole:
+        limit = 0.5 * float(whole.run_time.squeeze())
+    study += ["-o", "out.nc"]
+    assert main([*study, "--set", f"solver.time_limit={limit}"]) == 3
+    reached = load().last_cycle.item()
+    assert 0.0 < reached < 100_000.0
+    # without being asked it is not tried again, and without more time it comes no further
+    assert main([*study, "--set", f"solver.time_limit={limit}"]) == 3
+    assert len(begun) == 1
+    assert main([*study, "--retry-failed", "--set", "solver.time_limit=1000"]) == 0
+    assert [resume is not None for resume in begun] == [False, True]
+    # but for the limit, which stands in their attributes
+    xr.testing.assert_equal(load(), load("whole.nc"))
+    assert list(Path("out.nc.parts").glob("*.progress")) == []
