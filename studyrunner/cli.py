@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit statuses."""
 
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+"""Signals that end a run: Ctrl-C, the end of a job's time, of a terminal, and what batch systems send before that."""
+
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 _SECONDS_FOR_RANK_0 = 60.0
@@ -56,7 +59,7 @@ exit status:
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
   3  finished and saved, but some points failed; their `outcome` says why
-  130  ended by Ctrl-C or SIGTERM; the file holds the points that were computed until then
+  130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
 
 A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
 is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
@@ -139,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
     try:
@@ -201,8 +204,8 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    """Ctrl-C and SIGTERM: ends the run in good order; the same again does not disturb that."""
-    for again in (signal.SIGINT, signal.SIGTERM):
+    """Ends the run in good order; the same signal again, or another one, does not disturb that."""
+    for again in _ENDING:
         signal.signal(again, signal.SIG_IGN)
     raise KeyboardInterrupt
 
