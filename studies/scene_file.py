@@ -45,6 +45,9 @@ def write_scene(model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None 
     path = Path(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
+        # that of a process with the same number, which was killed, is taken over; no link is written through
+        unfinished.unlink(missing_ok=True)
+        os.close(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
         with h5py.File(unfinished, "w") as file:
             file.attrs.update(scene_attributes(model))
             for key, values in scene_datasets(model, mesh):

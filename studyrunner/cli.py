@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit statuses."""
 
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+"""Signals that end a run: Ctrl-C, the end of a job's time, of a terminal, and what batch systems send before that."""
+
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 _SECONDS_FOR_RANK_0 = 60.0
@@ -60,7 +63,7 @@ exit status:
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
   3  finished and saved, but some points failed; their `outcome` says why
-  130  ended by Ctrl-C or SIGTERM; the file holds the points that were computed until then
+  130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
 
 A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
 is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
@@ -77,6 +80,7 @@ class Options:
     write_scene: Path | None
     fresh: bool
     retry_failed: bool
+    prune: bool
 
 
 class _Parser(argparse.ArgumentParser):
@@ -113,9 +117,14 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
     parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
-    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run has left")
+    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
+    )
+    parser.add_argument(
+        "--prune",
+        action="store_true",
+        help="remove what other studies have left in OUT.nc.parts, once this is finished",
     )
     found = parser.parse_args(list(arguments))
     return Options(
@@ -126,6 +135,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         write_scene=None if found.write_scene is None else Path(found.write_scene),
         fresh=found.fresh,
         retry_failed=found.retry_failed,
+        prune=found.prune,
     )
 
 
@@ -137,7 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
     try:
@@ -199,8 +209,8 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    """Ctrl-C and SIGTERM: ends the run in good order; the same again does not disturb that."""
-    for again in (signal.SIGINT, signal.SIGTERM):
+    """Ends the run in good order; the same signal again, or another one, does not disturb that."""
+    for again in _ENDING:
         signal.signal(again, signal.SIG_IGN)
     raise KeyboardInterrupt
 
@@ -291,17 +301,25 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
             if ranks.size == 1 and (announced := job_size()) > 1:
                 progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
             summary = run_study(
-                ranks, study, model, target, progress, fresh=options.fresh, retry_failed=options.retry_failed
+                ranks,
+                study,
+                model,
+                target,
+                progress,
+                fresh=options.fresh,
+                retry_failed=options.retry_failed,
+                prune=options.prune,
             )
     except Interrupted as ended:
-        done = ended.summary.n_points - ended.summary.n_left
-        raise KeyboardInterrupt(
-            f"interrupted: {path} holds {done} of {ended.summary.n_points} points, the same command goes on"
-        ) from None
+        done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
+        kept = f"{done} are kept, {path} is the finished result that it was"
+        what = f"{path} holds {done}" if ended.summary.written else kept
+        raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
     failed = summary.n_points - summary.n_complete
     counts = f"{summary.n_points} points, {summary.n_complete} computed, {failed} failed"
-    lines = (f"{path}: {counts}, {format_seconds(progress.seconds)}", summary.certificates, *summary.findings)
-    print(*lines, sep="\n", flush=True)
+    head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
+    untouched = [] if summary.written else [f"{path} is the finished result that it was"]
+    print(head, summary.certificates, *summary.findings, *untouched, sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
 
 

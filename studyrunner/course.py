@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from studyrunner.costs import LearnedCosts
 from studyrunner.crashes import Crash
-from studyrunner.evaluate import CRASHED
+from studyrunner.evaluate import CRASHED, NOT_COMPUTED
 from studyrunner.ledger import Ledger
 from studyrunner.progress import Standing
 from studyrunner.results import MarchResult, StartResult
@@ -16,6 +16,9 @@ from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
 
 _RANKS_A_TASK = 2
 """A task that as many ranks were at when they were lost is not given to another one."""
+
+_TRIES_AGAIN = 1
+"""So often a task that a fault of the machine has ended is done again by itself."""
 
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
@@ -37,6 +40,8 @@ class Course:
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
         self._ledger = ledger
         self._n_lost: Counter[str] = Counter()
+        self._n_faults: Counter[str] = Counter()
+        self._n_given: Counter[int] = Counter()
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
         lines = ledger.plan.marches
@@ -49,17 +54,37 @@ class Course:
             for result in self._ledger.known_starts(branch):
                 yield from self._start(branch, result)
 
-    def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
-        """Takes a result; returns the tasks that it makes possible."""
+    def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
+        """Takes a result; returns the tasks that it makes possible, or that are to be done again."""
         self._left[task.kind] -= task.cost / task.n_results
+        self.n_starts_left -= isinstance(task, BranchTask)
+        if fault_of(result):
+            last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
+            place = result.position if isinstance(result, StartResult) else result.share
+            return self._try_again(task) if place == last else ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
-            self.n_starts_left -= 1
             self._ledger.add_start(task, result)
             return self._start(task, result)
         if isinstance(task, MarchTask) and isinstance(result, MarchResult):
             self._ledger.add_history(task, result)
             self.n_points += len(result.points)
+            self._n_given[task.number] += len(result.points)
         return ()
+
+    def _try_again(self, task: BranchTask | MarchTask) -> Sequence[BranchTask | MarchTask]:
+        """A task that a fault of the machine has ended, for once; then its points are left to another run."""
+        self._n_faults[task.key] += 1
+        if self._n_faults[task.key] > _TRIES_AGAIN:
+            return ()
+        again = self._ledger.renew(task)
+        if isinstance(again, BranchTask):
+            again = replace(again, cost=task.cost * again.n_results / task.n_results)
+            self.n_starts_left += again.n_results
+        else:
+            # it gives all of its histories again
+            self.n_points -= self._n_given.pop(task.number, 0)
+        self._left[again.kind] += again.cost
+        return [again]
 
     def take_back(
         self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
@@ -130,6 +155,13 @@ class Course:
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             return f"{how} to {task.frequencies[place]:.6g} Hz"
         return f"{self._ledger.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
+
+
+def fault_of(result: StartResult | MarchResult) -> str:
+    """The fault of the machine that a rank sends in place of a result; nothing where it is one."""
+    if isinstance(result, StartResult):
+        return result.lost
+    return result.message if result.outcome == NOT_COMPUTED else ""
 
 
 def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:

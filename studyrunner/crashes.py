@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from studyrunner.files import NotPlainError, create, open_plain
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask
 
@@ -26,6 +27,7 @@ Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | March
 """Does a task: gives its results one by one, and hands over now and then how far it is."""
 
 _LINE = 64  # bytes of the first line, which is written anew for each task: behind it the fault handler writes
+_LARGEST = 1_000_000
 _FATAL = re.compile(r"Fatal Python error: (.*)")
 _FRAME = re.compile(r'File "(.*)", line (\d+) in (.*)')
 
@@ -47,7 +49,8 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
     if folder.is_dir():
         # a full disk or one that is write-protected here is no reason to stop
         with contextlib.suppress(OSError):
-            file = path.open("wb", buffering=0)
+            path.unlink(missing_ok=True)
+            file = create(path)
     if file is None:
         yield evaluate
         return
@@ -83,7 +86,8 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
 
 def forget_crash(folder: Path, rank: int) -> None:
     """Removes what a rank that is lost has left."""
-    (folder / f"rank-{rank}.crash").unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        (folder / f"rank-{rank}.crash").unlink()
 
 
 def read_crashes(folder: Path) -> tuple[Crash, ...]:
@@ -98,9 +102,9 @@ def crash_files(folder: Path) -> Iterable[Path]:
 
 def _read_crash(path: Path) -> Crash | None:
     try:
-        with path.open("rb") as file:
-            first, *lines = file.read(100_000).decode("utf-8", "replace").splitlines() or [""]
-    except OSError:
+        with open_plain(path, _LARGEST) as file:
+            first, *lines = file.read().decode("utf-8", "replace").splitlines() or [""]
+    except (OSError, NotPlainError):
         return None
     match first.split():
         case [key]:

@@ -123,6 +123,7 @@ class Dispatcher(Generic[Task]):
         # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
         self._free = dict.fromkeys(reversed(range(n_ranks)))
         self._ahead: dict[int, None] = {}
+        self._shunned: set[int] = set()
 
     @property
     def done(self) -> bool:
@@ -172,7 +173,7 @@ class Dispatcher(Generic[Task]):
             if self._held_by[rank]:
                 self._held[self._held_by[rank][0]].began = self._clock()
                 self._see_ahead(rank)
-            else:
+            elif rank not in self._shunned:
                 self._free[rank] = None
         return task
 
@@ -185,10 +186,18 @@ class Dispatcher(Generic[Task]):
                 self._costs.forget(held.lesson)
             lost.append((held.task, held.n_left))
         self._held_by[rank] = []
+        self._shunned.discard(rank)
         self._free.pop(rank, None)
         self._ahead.pop(rank, None)
         self._n_ranks -= 1
         return lost
+
+    def shun(self, rank: int) -> None:
+        """A rank is sick: it gets no more tasks, as long as another one does."""
+        if len(self._shunned) + 1 < self._n_ranks:
+            self._shunned.add(rank)
+            self._free.pop(rank, None)
+            self._ahead.pop(rank, None)
 
     def task(self, number: int) -> Task:
         """A task that is computed."""
@@ -238,5 +247,7 @@ class Dispatcher(Generic[Task]):
     def _see_ahead(self, rank: int) -> None:
         """Whether a rank that holds one task may get a second one."""
         task = self._held[self._held_by[rank][0]].task
+        if rank in self._shunned:
+            return
         if task.n_results == 1 and task.cost * self._costs.correction(task.kin) < AHEAD_SECONDS:
             self._ahead[rank] = None

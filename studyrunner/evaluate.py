@@ -15,6 +15,7 @@ from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packed import Packed
 from solver.settings import Resolution, SolverSettings
+from studyrunner.machine_faults import MachineFaultError, guard_kernel_cache, is_fault_of_machine, tells_of_machine
 from studyrunner.places import describe_reach, known_to, show_count
 from studyrunner.records import failed_result
 from studyrunner.results import Kept, MarchResult, StartResult
@@ -54,6 +55,7 @@ def build_evaluator(
     """The function that does the tasks of a study on this model and gives their results one by one."""
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+        guard_kernel_cache()
         if isinstance(task, BranchTask):
             yield from follow(model, friction_coefficient, task, keep)
         else:
@@ -84,24 +86,30 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
     for place, start in branch:
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
+        _raise_fault(start)
         packed = pack(start)
         yield StartResult(wanted[place], Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
 
 
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
-    """What a task still owes after its first results, where it broke off with an error that it should not have."""
+    """What a task still owes after its first results, where it broke off with an error that it should not have.
+
+    A fault of the machine is no result of the task: what it owes is not computed, and may be tried again.
+    """
     from solver.packing import pack
 
-    message = describe_error(error)
+    lost = is_fault_of_machine(error)
+    message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
     if isinstance(task, MarchTask):
         for place in range(n_given, task.n_results):
-            yield failed_result(task, place, int(Outcome.EXCEPTION), message)
+            yield failed_result(task, place, NOT_COMPUTED if lost else int(Outcome.EXCEPTION), message)
         return
     nan = math.nan
     start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
     packed = pack(start)
     for position in [place for place in task.order if place not in task.known][n_given:]:
-        yield StartResult(position, Kept(packed.text, packed.arrays), moves=False, n_unknowns=0)
+        kept = Kept(packed.text, packed.arrays)
+        yield StartResult(position, kept, moves=False, n_unknowns=0, lost=message if lost else "")
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
@@ -110,11 +118,20 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
     another history, which then takes a march of its own.
     """
-    history = _solve(model, friction_coefficient, task, keep)
-    yield build_result(task, history)
+    reached = task.resume
+
+    def note(progress: Kept) -> None:
+        nonlocal reached
+        reached = progress
+        keep(progress)
+
+    history = _solve(model, friction_coefficient, task, note)
+    # with more time it goes on from there
+    left = reached if history.outcome is Outcome.TIME_LIMIT else None
+    yield replace(build_result(task, history), progress=left)
     for place, share in enumerate(task.shares[1:], start=1):
         if not history.oscillates:
-            yield build_result(task, history, place)
+            yield replace(build_result(task, history, place), progress=left)
         else:
             alone = replace(task, shares=(share,), resume=None)
             yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
@@ -130,7 +147,7 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         raise TypeError(f"task without a start state: {task}")
     # The march begins at cycle 0, whether that count is kept or not.
     counts = np.unique(np.concatenate([[0.0], *(task.counts(share) for share in task.shares)]))
-    return march_wear(
+    history = march_wear(
         model,
         friction_coefficient,
         start,
@@ -144,6 +161,14 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
         resume=_packed(task.resume),
     )
+    _raise_fault(history)
+    return history
+
+
+def _raise_fault(ended: StartState | WearHistory) -> None:
+    """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
+    if ended.outcome is Outcome.EXCEPTION and tells_of_machine(ended.message):
+        raise MachineFaultError(ended.message)
 
 
 def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,10 +19,11 @@ from numpy.typing import NDArray
 
 from studyrunner.certificates import CertificateTable
 from studyrunner.evaluate import NOT_COMPUTED, endings
+from studyrunner.files import replacing
 from studyrunner.findings import Findings
 from studyrunner.ledger import Ledger
-from studyrunner.output import partial_path
-from studyrunner.provenance import describe_run
+from studyrunner.part_files import KEY, KEY_TYPE
+from studyrunner.provenance import POINTS_LEFT, describe_run
 from studyrunner.records import empty_record, variable_sizes
 from studyrunner.scene import KeptScene, SceneFacts
 from studyrunner.scene_group import write_scene_group
@@ -34,6 +34,7 @@ from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
+_BYTES_OF_CACHE = 2**16
 _ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
 
 Region = tuple[int | slice, ...]
@@ -56,11 +57,21 @@ class Gathered:
 class _Index:
     """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,).
 
-    The file is -1 for points that are not computed.
+    key (n_points,): what stands in that record. The file is -1 for points that are not computed.
     """
 
     file: NDArray[np.int32]
     row: NDArray[np.int32]
+    key: NDArray[np.bytes_]
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A record in a file: its place there, its hash, and the points that have it."""
+
+    row: int
+    key: str
+    points: tuple[tuple[int, ...], ...]
 
 
 def gather(
@@ -70,53 +81,84 @@ def gather(
     path: Path,
     of_scene: Sequence[SceneVariable] = (),
     scene: KeptScene | None = None,
+    keep_finished: bool = False,
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
     of_scene: what no task computes. scene: what goes into the group of the scene, None for none. Points that are not
-    computed yet say so in their outcome. Raises StorageError.
+    computed yet say so in their outcome. keep_finished: `path` holds a finished result, and is left as it is where
+    points of this one are missing. Raises StorageError.
     """
     index, gathered = _read_through(study, facts, ledger)
-    temporary = partial_path(path)
+    left = gathered.outcomes[NOT_COMPUTED]
+    if left and keep_finished:
+        return gathered
     try:
-        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+        with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
+            file.setncattr(POINTS_LEFT, np.int32(left))
             _write_values(file, study, facts, ledger.store, index)
             _write_scene(file, study, ledger.store, of_scene)
             _write_coordinates(file, study, facts)
             if scene is not None:
                 write_scene_group(file, scene)
-        os.replace(temporary, path)
     except (OSError, RuntimeError) as error:
         # the library says the one or the other where the disk is full
         raise StorageError(path, error) from error
-    finally:
-        temporary.unlink(missing_ok=True)
     return gathered
 
 
 def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Index, Gathered]:
-    """Reads every file once: where each point is, how it ended, and the table."""
+    """Reads every file once, piece by piece: where each point is, how it ended, and the table.
+
+    A record that is not the one that is asked for, as another run may have changed its file, leaves its points out.
+    """
     shape = tuple(len(values) for values in study.dimensions.values())
-    index = _Index(np.full(math.prod(shape), -1, dtype=np.int32), np.zeros(math.prod(shape), dtype=np.int32))
-    found: dict[int, list[tuple[int, tuple[tuple[int, ...], ...]]]] = {}
+    n_points = math.prod(shape)
+    index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
+    found: dict[int, list[_Entry]] = {}
     for march in itertools.chain.from_iterable(ledger.plan.marches):
-        for share, place in zip(march.shares, ledger.places(march), strict=True):
+        for key, share, place in zip(ledger.histories(march), march.shares, ledger.places(march), strict=True):
             if place is not None:
-                number, row = place
-                found.setdefault(number, []).append((row, share.points))
-                at = [int(np.ravel_multi_index(point, shape)) for point in share.points]
-                index.file[at], index.row[at] = number, row
+                found.setdefault(place[0], []).append(_Entry(place[1], key, share.points))
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
+    changed: list[str] = []
+    at_once = max(1, int(_BYTES_A_SLAB // ledger.store.kind.itemsize))
     for number, entries in found.items():
-        records = ledger.store.read(number)[[row for row, _ in entries]]
-        for outcome, (_, points) in zip(records["outcome"].tolist(), entries, strict=True):
-            outcomes[outcome] += len(points)
-        for collected in (table, findings):
-            collected.add([points for _, points in entries], records)
+        entries.sort(key=lambda entry: entry.row)
+        for first in range(0, len(entries), at_once):
+            there, records = _read_entries(ledger.store, number, entries[first : first + at_once])
+            if len(there) < len(entries[first : first + at_once]):
+                changed.append(ledger.store.path(number).name)
+            for outcome, entry in zip(records["outcome"].tolist(), there, strict=True):
+                outcomes[outcome] += len(entry.points)
+                at = np.ravel_multi_index(np.transpose(entry.points), shape)
+                index.file[at], index.row[at], index.key[at] = number, entry.row, entry.key.encode()
+            for collected in (table, findings):
+                collected.add([entry.points for entry in there], records)
     outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
-    return index, Gathered(outcomes, table.format(), findings.format(outcomes))
+    lost = [
+        f"{name} in {ledger.store.folder.name} does not hold any more what this run has written there: its points are"
+        " not computed, the same command goes on"
+        for name in dict.fromkeys(changed)
+    ]
+    return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))
+
+
+def _read_entries(store: Store, number: int, entries: Sequence[_Entry]) -> tuple[Sequence[_Entry], NDArray[np.void]]:
+    """Those entries of a file that are there, and their records. Raises StorageError where the disk fails."""
+    try:
+        kept = store.read(number)
+        if len(kept) <= entries[-1].row or kept.dtype != store.kind:
+            return [], np.zeros(0, store.kind)
+        records = np.array(kept[[entry.row for entry in entries]])
+    except StorageError as error:
+        if isinstance(error.__cause__, ValueError | FileNotFoundError):
+            return [], np.zeros(0, store.kind)
+        raise
+    same = records[KEY] == np.array([entry.key for entry in entries], KEY_TYPE)
+    return [entry for entry, right in zip(entries, same.tolist(), strict=True) if right], records[same]
 
 
 def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store: Store, index: _Index) -> None:
@@ -143,6 +185,8 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
             chunksizes=(*slab, *(1 if _one_pair(name, of) else sizes[of] for of in entry.dimensions)),
             fill_value=math.nan if entry.dtype.startswith("float") else None,
         )
+        # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+        variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
         variable.setncatts(_attributes(name, entry))
         if "contact" in entry.dimensions:
             variable.setncattr("coordinates", _ON_CONTACT)
@@ -193,7 +237,7 @@ def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, 
 
 def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np.void]:
     """Records of points that follow each other in the file."""
-    files, rows = index.file[first:last], index.row[first:last]
+    files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
     missing = empty_record(store.kind)
     missing["outcome"] = NOT_COMPUTED
     records = np.repeat(missing, last - first)
@@ -204,6 +248,11 @@ def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np
         number = int(files[places[0]])
         if number >= 0:
             records[places] = store.read(number)[rows[places]]
+            if (records[KEY][places] != keys[places]).any():
+                # between the two times that it was read
+                raise StorageError(
+                    store.path(number), ValueError("another run has changed it"), "give the command again"
+                )
     return records
 
 

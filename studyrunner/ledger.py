@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -10,11 +11,12 @@ import numpy as np
 from studyrunner.identity import Identities
 from studyrunner.records import failed_result, pack
 from studyrunner.results import Kept, MarchResult, StartResult, read_start
+from studyrunner.shelf import Place
 from studyrunner.store import Store
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
 
-Place = tuple[int, int]
-"""Number of a file of the store, and place of a record in it."""
+MOST_OF_OTHERS = 2.0**30
+"""Bytes: what other studies have left under the same name is kept up to this size."""
 
 
 class Ledger:
@@ -34,6 +36,10 @@ class Ledger:
             for march in line:
                 self._histories[march.number] = identities.of_histories(branch, march)
                 self._marches[march.number] = identities.of_march(self._histories[march.number])
+
+    def histories(self, march: MarchTask) -> tuple[str, ...]:
+        """What the histories of a march are known by, one for each share."""
+        return self._histories[march.number]
 
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
         """Where the histories of a march are, one for each share; None for those that are not finished."""
@@ -99,8 +105,10 @@ class Ledger:
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """A history has come."""
         key = self._histories[march.number][result.share]
-        last = result.share == march.n_results - 1
-        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if last else "")
+        ended = result.share == march.n_results - 1 and result.progress is None
+        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
+        if result.progress is not None:
+            self.store.keep_progress(self.key(march), result.progress)
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """A task says how far it is."""
@@ -147,10 +155,23 @@ class Ledger:
         self.store.flush()
         return n_points
 
-    def prune(self) -> None:
-        """Leaves nothing in the store but what this study holds."""
-        histories = {key for keys in self._histories.values() for key in keys}
-        self.store.prune(histories, {key for keys in self._starts for key in keys})
+    def forget_all(self) -> None:
+        """Nothing that an earlier run has left of this study counts any more; what it holds of others stays."""
+        for key in self._all_histories():
+            self.store.forget_history(key)
+        for key in itertools.chain.from_iterable(self._starts):
+            self.store.forget_start(key)
+        for key in (*self._branches, *self._marches.values()):
+            self.store.forget_progress(key)
+        self.store.remove_forgotten()
+
+    def prune(self, most: float = MOST_OF_OTHERS) -> None:
+        """Leaves at most so many bytes in the store that are not of this study; for 0 bytes nothing else."""
+        tasks = {*self._branches, *self._marches.values()}
+        self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), tasks, most)
+
+    def _all_histories(self) -> set[str]:
+        return set(itertools.chain.from_iterable(self._histories.values()))
 
     def _needed(self, branch: BranchTask) -> frozenset[int]:
         """Places on a branch from which there is something to march."""

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from studyrunner.files import create, leftovers, new_partial
 from studyrunner.user_error import UserError
+
+_SECONDS_TO_WRITE = 86400.0  # no run is at one file for so long
 
 
 def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
@@ -34,17 +39,29 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
                 raise wrong(f"give another file with {option}: this one is read by the run")
         if parts_folder(target).exists() and not parts_folder(target).is_dir():
             raise wrong(f"give another name: {parts_folder(target).name}, which the run needs, is a file")
-        trial = partial_path(target)
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        try_to_create(target)
     except OSError as error:
         raise wrong(f"give a file that can be written: {error.strerror}") from None
     return target
 
 
-def partial_path(path: Path) -> Path:
-    """Where the file `path` is written before it is renamed: in the same folder, one name for each process."""
-    return path.with_name(f".{path.name}.{os.getpid()}.partial")
+def try_to_create(path: Path) -> None:
+    """Makes a new file beside `path` and removes it. Raises OSError."""
+    trial = new_partial(path)
+    create(trial).close()
+    trial.unlink()
+
+
+def remove_leftovers(path: Path, *, alone: bool) -> None:
+    """Removes what runs that were killed have left while they wrote `path`.
+
+    alone: whether no other run is at work on it; else only what is old.
+    """
+    for found in leftovers(path):
+        # the file may have gone meanwhile, and one that stays is no harm
+        with contextlib.suppress(OSError):
+            if alone or time.time() - found.stat().st_mtime > _SECONDS_TO_WRITE:
+                found.unlink()
 
 
 def parts_folder(path: Path) -> Path:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
 
+POINTS_LEFT = "points_not_computed"
+"""Attribute of a result file: how many of its points a run that was ended has left, 0 where it is finished."""
+
 _REFERENCE = (
     "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
     " balance method coupled with explicit or implicit integration schemes"

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from studyrunner.part_files import KEY, KEY_TYPE
 from studyrunner.results import MarchResult
 from studyrunner.scene import SceneFacts
-from studyrunner.store import KEY, KEY_TYPE
 from studyrunner.study import Study
 from studyrunner.tasks import MarchTask, march_variables
 from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS

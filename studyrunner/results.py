@@ -31,13 +31,14 @@ class StartResult:
 
     position: place of the frequency in the branch. start: what a march starts from. moves: whether anything slips or
     lifts in the joint; where nothing does nothing wears. n_unknowns: of the state, with the harmonics that it took; 0
-    where there is no state.
+    where there is no state. lost: the fault of the machine that it broke off with: then this is no result.
     """
 
     position: int
     start: Kept
     moves: bool
     n_unknowns: int
+    lost: str = ""
 
     @property
     def failed(self) -> bool:
@@ -61,7 +62,7 @@ class MarchResult:
 
     values: variable -> array with the dimensions of that variable after the axes; after `last_cycle` NaN, or 0 where
         the variable is a whole number.
-    share: its place among the shares of the task.
+    share: its place among the shares of the task. progress: how far a march was that was given up for its time.
     The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
     """
 
@@ -80,3 +81,4 @@ class MarchResult:
     largest_wear_depth: float
     message: str = ""
     share: int = 0
+    progress: Kept | None = None

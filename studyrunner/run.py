@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.course import Course
+from studyrunner.course import Course, fault_of
 from studyrunner.crashes import Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
+from studyrunner.earlier import holds_finished_result
 from studyrunner.evaluate import (
     COMPLETE,
     CRASHED,
@@ -17,9 +18,10 @@ from studyrunner.evaluate import (
     build_evaluator,
     failed_results,
 )
+from studyrunner.folder_lock import StoreInUseError
 from studyrunner.identity import Identities, hash_of_kind
-from studyrunner.ledger import Ledger
-from studyrunner.output import parts_folder
+from studyrunner.ledger import MOST_OF_OTHERS, Ledger
+from studyrunner.output import parts_folder, remove_leftovers
 from studyrunner.progress import RunProgress, count
 from studyrunner.ranks import Ranks
 from studyrunner.records import record_type
@@ -27,7 +29,7 @@ from studyrunner.results import MarchResult, StartResult
 from studyrunner.scene import describe_scene, scene_to_keep
 from studyrunner.scene_variables import build_scene_variables
 from studyrunner.schedule import serve_tasks, work_on_tasks
-from studyrunner.store import Store, StoreInUseError
+from studyrunner.store import Store
 from studyrunner.study import Study
 from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 from studyrunner.user_error import UserError, Verbatim
@@ -61,7 +63,7 @@ class RunSummary:
     """How a run ended. n_complete: points computed to their last cycle. n_left: those that are not computed yet.
 
     n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
-    certificates: the table that begins with the worn volume.
+    certificates: the table that begins with the worn volume. written: whether the file holds this, or is as it was.
     """
 
     n_points: int
@@ -70,6 +72,7 @@ class RunSummary:
     n_found: int
     findings: tuple[str, ...]
     certificates: str
+    written: bool
 
 
 def run_study(
@@ -81,12 +84,15 @@ def run_study(
     *,
     fresh: bool = False,
     retry_failed: bool = False,
+    prune: bool = False,
 ) -> RunSummary:
     """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
 
     It goes on from what an earlier run has left in the folder beside the file, unless `fresh`; retry_failed: points
-    that failed there are computed again. Raises UserError where another run is at work there, StorageError where
-    something cannot be written, and Interrupted.
+    that failed there are computed again; prune: what other studies have left there is removed at the end.
+    A finished result that stands there already is replaced by one without missing points only. Raises UserError where
+    another run is at work there or `path` is a file of something else, StorageError where something cannot be written,
+    and Interrupted.
     """
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
@@ -95,10 +101,16 @@ def run_study(
         progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
     kept_scene = scene_to_keep(study, model)
+    keep_finished = holds_finished_result(path)
     kind = record_type(study, facts)
-    store = _open_store(parts_folder(path), kind, fresh=fresh)
+    store = _open_store(parts_folder(path), kind)
     with contextlib.closing(store):
+        for note in store.notes:
+            progress.note(note)
+        remove_leftovers(path, alone=store.locked)
         ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+        if fresh:
+            ledger.forget_all()
         take_crashes(ledger)
         if retry_failed:
             ledger.forget_failed(COMPLETE)
@@ -111,7 +123,8 @@ def run_study(
             from studyrunner.gather import gather
 
             store.flush()
-            return _summarise(plan, n_found, gather(study, facts, ledger, path, of_scene, kept_scene))
+            gathered = gather(study, facts, ledger, path, of_scene, kept_scene, keep_finished)
+            return _summarise(plan, n_found, gathered, keep_finished)
 
         try:
             job = Job(model, study.friction_coefficient, store.folder)
@@ -123,7 +136,8 @@ def run_study(
             summary = write()
         except KeyboardInterrupt:
             raise Interrupted(write()) from None
-        ledger.prune()
+        if summary.n_left == 0:
+            ledger.prune(0.0 if prune else MOST_OF_OTHERS)
     return summary
 
 
@@ -132,18 +146,19 @@ def take_crashes(ledger: Ledger) -> None:
     for crash in read_crashes(ledger.store.folder):
         ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
     for path in crash_files(ledger.store.folder):
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
-def _open_store(folder: Path, kind: np.dtype[np.void], *, fresh: bool) -> Store:
+def _open_store(folder: Path, kind: np.dtype[np.void]) -> Store:
     try:
-        return Store(folder, kind, fresh=fresh)
+        return Store(folder, kind)
     except StoreInUseError as error:
         remedy = "another run is writing there: wait for its end, or give another result file with -o"
         raise UserError(str(folder), "in use", Verbatim(f"by {error}"), remedy) from None
 
 
-def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
+def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: bool) -> RunSummary:
     outcomes = gathered.outcomes
     return RunSummary(
         n_points=plan.n_points,
@@ -152,6 +167,7 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered) -> RunSummary:
         n_found=n_found,
         findings=gathered.findings,
         certificates=gathered.certificates,
+        written=not (keep_finished and outcomes[NOT_COMPUTED]),
     )
 
 
@@ -191,11 +207,23 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
     """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
     course = Course(ledger)
 
-    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[MarchTask]:
+    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = course.take(task, result)
         if isinstance(task, BranchTask) and course.n_starts_left == 0:
             progress.say("marching through the remaining wear histories")
         return new
+
+    said: set[tuple[int, str]] = set()
+
+    def is_sick(rank: int, result: StartResult | MarchResult) -> bool:
+        fault = fault_of(result)
+        if fault and (rank, fault) not in said:
+            said.add((rank, fault))
+            progress.note(
+                f"rank {rank}: {fault}: a fault of the machine; the task is tried once more, by another rank where"
+                " there is one"
+            )
+        return bool(fault)
 
     def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
         had = f", which had {count(len(lost), 'task')}" if lost else ""
@@ -213,5 +241,5 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
         n_starts = count(course.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back)
+    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back, is_sick)
     ledger.store.flush()

@@ -155,6 +155,7 @@ def serve_tasks(
     tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None,
     keep: Callable[[Task, object], None] = lambda *_: None,
     take_back: TakeBack[Task] = give_again,
+    is_sick: Callable[[int, Result], bool] = lambda *_: False,
 ) -> None:
     """Rank 0: has all tasks done, its own share by `run`, and hands every result to `take`.
 
@@ -162,7 +163,7 @@ def serve_tasks(
         returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
         second, with what tells the tasks that run, as `Dispatcher.running`. keep: called with how far a task is; never
         after its last result. tasks: are taken one by one, as there is use for them. take_back: called with a rank that
-        is lost and the tasks that it had.
+        is lost and the tasks that it had. is_sick: whether a result of a rank tells that it should get no more tasks.
     Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
     another rank ends that rank's process.
     """
@@ -197,6 +198,8 @@ def serve_tasks(
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
+        if is_sick(rank, message.result):
+            dispatcher.shun(rank)
         task = dispatcher.deliver(rank, message.number, message.seconds)
         dispatcher.add(take(task, message.result))
         hand_out()

@@ -32,13 +32,15 @@ class UserError(Exception):
 class StorageError(Exception):
     """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
 
-    What was written before is kept, and the same command goes on from there.
+    What was written before is kept, and the same command goes on from there. remedy: what would help.
     """
 
-    def __init__(self, path: Path, error: Exception) -> None:
+    def __init__(
+        self, path: Path, error: Exception, remedy: str = "make room there or give another result file with -o"
+    ) -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         super().__init__(
-            f"{show_text(str(path))}: {show_text(reason)}: make room there or give another result file with -o;"
+            f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"
         )
 

@@ -113,8 +113,11 @@ def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["two_masses.nc.parts"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("n_ranks", [0, 2])
+# the launcher of MPICH ends by itself at SIGHUP, and all ranks with it
+@pytest.mark.parametrize(
+    ("n_ranks", "number"),
+    [(n, number) for n in (0, 2) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)] + [(0, signal.SIGHUP)],
+)
 def test_an_interrupted_run_ends_at_once(n_ranks: int, number: signal.Signals, tmp_path: Path) -> None:
     def interrupt(running: Running) -> None:
         running.wait_for("following 2 branches")

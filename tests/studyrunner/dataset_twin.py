@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.evaluate import endings
-from studyrunner.gather import coordinates, describe_run
+from studyrunner.gather import coordinates
+from studyrunner.provenance import POINTS_LEFT, describe_run
 from studyrunner.results import MarchResult
 from studyrunner.scene import SceneFacts
 from studyrunner.scene_variables import SceneVariable
@@ -53,7 +54,7 @@ def build_dataset(
             **coordinates(study, facts),
             **{scene.name: (scene.name, scene.values) for scene in of_scene if scene.coordinate},
         },
-        attrs={**describe_run(study, facts), "certificate_summary": certificates},
+        attrs={**describe_run(study, facts), "certificate_summary": certificates, POINTS_LEFT: np.int32(0)},
     )
     for scene in of_scene:
         if not scene.coordinate:

@@ -120,8 +120,10 @@ def open_ledger(
 ) -> Ledger:
     """What is in the folder of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    store = Store(folder, kind, fresh=fresh)
-    return Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+    ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
+    if fresh:
+        ledger.forget_all()
+    return ledger
 
 
 def fake_ledger(

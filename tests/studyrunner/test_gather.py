@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import gather
+from studyrunner import files, gather
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.evaluate import NOT_COMPUTED, endings
 from studyrunner.gather import Gathered
@@ -316,7 +316,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
             raise OSError("disk full")
         replace_file(source, target)
 
-    monkeypatch.setattr(gather.os, "replace", fail)
+    monkeypatch.setattr(files.os, "replace", fail)
     with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"

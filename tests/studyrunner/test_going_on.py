@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import run, schedule
+from studyrunner import schedule
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
 from studyrunner.store import Store
 from studyrunner.tasks import BranchTask, MarchTask
-from tests.studyrunner.fakes import fake_branch, fake_evaluate
+from tests.studyrunner.faked_runs import Solver, Task
+from tests.studyrunner.fakes import fake_branch
 
 N_POINTS, N_RESULTS = 8, 4 + 8
 SMALL = [
@@ -29,37 +29,12 @@ SMALL = [
     *("--set", "axes.scheme=implicit"),
     *("-o", "out.nc"),
 ]
-Task = BranchTask | MarchTask
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-class Solver:
-    """A stand-in that counts what it does and may do something else at one of its results."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.tasks: list[Task] = []
-        self.n_results = 0
-        self.disturb: Callable[[Task, int], None] = lambda *_: None
-
-        def build_fake(model: object, _: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
-            return lambda task, keep: self.evaluate(model, task, keep)
-
-        monkeypatch.setattr(run, "build_evaluator", build_fake)
-
-    def evaluate(self, model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
-        self.tasks.append(task)
-        for result in fake_evaluate(task, keep, describe_scene(model)):
-            self.n_results += 1
-            self.disturb(task, self.n_results)
-            yield result
-
-    def begin_again(self) -> None:
-        self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)
 
 
 @pytest.fixture
@@ -249,7 +224,7 @@ def test_a_second_run_of_the_same_study_is_refused(
             second.append(main(SMALL))
 
     monkeypatch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
-    monkeypatch.setattr("studyrunner.store._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.folder_lock._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(SMALL) == 0
     assert second == [2]
@@ -277,7 +252,7 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert len(marches) == 8
     assert all(task.resume == Kept("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(load(), expected)
-    assert not list(Path("out.nc.parts").glob("*.progress.npz"))
+    assert not list(Path("out.nc.parts").glob("*.progress"))
 
 
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,8 +277,8 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
 
     monkeypatch.setattr(solver, "evaluate", resuming)
     assert main(SMALL) == 130
-    assert list(Path("out.nc.parts").glob("*.progress.npz"))
-    for path in Path("out.nc.parts").glob("*.starts.npz"):
+    assert list(Path("out.nc.parts").glob("*.progress"))
+    for path in Path("out.nc.parts").glob("*.starts"):
         path.unlink()
     assert main(SMALL) == 0
     xr.testing.assert_identical(load(), expected)
@@ -328,3 +303,44 @@ def test_a_time_limit_is_one_bad_point() -> None:
     assert "time_limit" in load().outcome.attrs["flag_meanings"]
     sentence = "The computation took longer than solver.time_limit"
     assert any(line.startswith(sentence) for line in load().outcome.attrs["sentences"].splitlines())
+
+
+def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the solver itself: to the numbers of a march that had the time at once."""
+    from solver import path
+    from studyrunner import evaluate
+
+    study = [
+        *("sdof_slider", "--set", "axes.frequency=[160]", "--set", "axes.scheme=['implicit']"),
+        *("--set", "solver.harmonics=5", "--set", "solver.samples=64", "--set", "slow_time.cycles=100_000"),
+        *("--set", "axes.step=500"),
+    ]
+    assert main([*study, "-o", "whole.nc"]) == 0
+    own, begun = evaluate._solve, []
+    own_clock, n_looks = path.computing_time, 0
+
+    def solve(model: object, friction: float, task: MarchTask, *rest: object) -> object:
+        begun.append(task.resume)
+        return own(model, friction, task, *rest)  # type: ignore[arg-type]
+
+    def clock() -> float:
+        # the time is over in the midst of the march, however fast the machine is
+        nonlocal n_looks
+        n_looks += bool(begun)
+        return np.inf if n_looks > 300 else own_clock()
+
+    monkeypatch.setattr(evaluate, "_solve", solve)
+    study += ["-o", "out.nc"]
+    with monkeypatch.context() as slow:
+        slow.setattr(path, "computing_time", clock)
+        assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
+        reached = load().last_cycle.item()
+        assert 0.0 < reached < 100_000.0
+        # without being asked it is not tried again
+        assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
+        assert len(begun) == 1
+    assert main([*study, "--retry-failed", "--set", "solver.time_limit=2e6"]) == 0
+    assert [resume is not None for resume in begun] == [False, True]
+    # but for the limit, which stands in their attributes
+    xr.testing.assert_equal(load(), load("whole.nc"))
+    assert list(Path("out.nc.parts").glob("*.progress")) == []

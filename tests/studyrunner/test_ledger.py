@@ -12,7 +12,7 @@ import pytest
 
 from studyrunner.course import Course
 from studyrunner.evaluate import COMPLETE
-from studyrunner.ledger import Ledger
+from studyrunner.ledger import MOST_OF_OTHERS, Ledger
 from studyrunner.results import Kept
 from studyrunner.study_file import read_study
 from studyrunner.tasks import BranchTask, MarchTask, build_tasks
@@ -237,12 +237,36 @@ def test_tasks_know_their_keys_and_their_progress(folder: Path) -> None:
         ]
 
 
-def test_nothing_of_another_study_is_left_when_this_one_is_finished(finished: Path) -> None:
-    with ledger_of(finished, "axes.excitation_amplitude=11") as ledger:
+@pytest.mark.parametrize(("most", "expected"), [(MOST_OF_OTHERS, (0, 0)), (0.0, (6, 12)), (1.0, (6, 12))])
+def test_what_another_study_has_left_stays_up_to_a_size(most: float, expected: tuple[int, int], finished: Path) -> None:
+    other = "axes.excitation_amplitude=11"
+    with ledger_of(finished, other) as ledger:
         assert compute(ledger) == (6, 12)
-        ledger.prune()
+        ledger.prune(most)
         assert ledger.n_points_finished == 12
-    with ledger_of(finished, "axes.excitation_amplitude=11") as ledger:
+    with ledger_of(finished, other) as ledger:
         assert compute(ledger) == (0, 0)
     with ledger_of(finished) as ledger:
-        assert compute(ledger) == (6, 12)
+        assert compute(ledger) == expected
+
+
+def test_what_stands_in_one_file_with_another_study_goes_alone(finished: Path) -> None:
+    """A study and a larger one share files once these are put together."""
+    with ledger_of(finished, "axes.wear_coefficient=[1e-11]") as ledger:
+        assert ledger.n_points_finished == 6
+        ledger.prune(0.0)
+    with ledger_of(finished) as ledger:
+        assert ledger.n_points_finished == 6
+
+
+def test_a_study_that_starts_over_leaves_those_of_others(finished: Path) -> None:
+    other = "axes.wear_coefficient=[5e-12, 1e-11, 2e-11]"
+    with ledger_of(finished, other) as ledger:
+        assert compute(ledger) == (0, 6)
+    with ledger_of(finished) as ledger:
+        ledger.forget_all()
+    with ledger_of(finished) as ledger:
+        assert ledger.n_points_finished == 0
+        assert not any(branch.known for branch in ledger.branches_left())
+    with ledger_of(finished, other) as ledger:
+        assert ledger.n_points_finished == 6

@@ -1,0 +1,101 @@
+"""Files as a run opens them: no link is followed, nothing is waited for, and what is written can be put on the disk.
+
+A folder of results may hold anything: what somebody has put there, a link for one, is neither written through nor read.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+_NOT_PLAIN = (errno.ELOOP, errno.ENXIO, errno.EISDIR)
+_NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
+
+
+class NotPlainError(ValueError):
+    """What stands under a name is no plain file, or is larger than any that would be written there."""
+
+
+def create(path: Path) -> IO[bytes]:
+    """A new file for writing. Raises FileExistsError where anything has this name, a link to nowhere included."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    return os.fdopen(os.open(path, flags, 0o666), "wb")
+
+
+def open_plain(path: Path, largest: int, flags: int = os.O_RDONLY) -> IO[bytes]:
+    """A file of at most `largest` bytes, open for reading, or as `flags` say. Raises NotPlainError and OSError."""
+    try:
+        # what would wait for a writer, as a FIFO does, must not be waited for
+        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno in _NOT_PLAIN:
+            raise NotPlainError(f"{path.name} is no plain file") from None
+        raise
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode) or found.st_size > largest:
+        os.close(descriptor)
+        what = "larger than a run writes it" if stat.S_ISREG(found.st_mode) else "no plain file"
+        raise NotPlainError(f"{path.name} is {what}")
+    return os.fdopen(descriptor, "rb" if flags & os.O_ACCMODE == os.O_RDONLY else "rb+")
+
+
+def sync(file: IO[bytes]) -> None:
+    """What was written is on the disk when this returns."""
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """The names in a folder are on the disk when this returns: a file that was renamed is there under its new name."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        # some file systems on the network do so by themselves, and know no such call
+        if error.errno not in _NO_SYNC:
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def new_partial(path: Path) -> Path:
+    """Where a file that is to stand under `path` can be written: beside it, under a name that no other has."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(6)}.partial")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Gives the name of an empty new file beside `path`, which takes its place at the end, whole and on the disk.
+
+    Where the block raises, or what follows it, `path` is as it was. Raises OSError.
+    """
+    partial = new_partial(path)
+    create(partial).close()
+    try:
+        yield partial
+        with partial.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+        sync_folder(path.parent)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def leftovers(path: Path) -> list[Path]:
+    """What runs have left beside `path` that were killed while they wrote it, or are about to write it."""
+    begin, end = f".{path.name}.", ".partial"
+    return sorted(
+        found
+        for found in path.parent.iterdir()
+        if found.name.startswith(begin)
+        and found.name.endswith(end)
+        and set(found.name[len(begin) : -len(end)]) <= set("0123456789abcdef")
+        and found.is_file()
+        and not found.is_symlink()
+    )

@@ -1,0 +1,75 @@
+"""A thread that writes: what hands out the tasks never waits for a disk."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+Job = TypeVar("Job")
+Done = TypeVar("Done")
+
+
+class Writer(Generic[Job, Done]):
+    """Does jobs one after the other on a thread of its own. All methods are for one other thread.
+
+    An interrupt between any two of their steps loses neither a job nor what came of it.
+    """
+
+    def __init__(self, do: Callable[[Job], Done]) -> None:
+        self._do = do
+        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._ended: deque[tuple[Job, Done | BaseException]] = deque()
+        self._something_ended = threading.Event()
+        self._n_begun = self._n_taken = 0
+        # A daemon: a process that ends in disorder does not wait for a disk that hangs.
+        self._thread = threading.Thread(target=self._work, name="writer", daemon=True)
+        self._thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a job was begun whose end was not taken note of."""
+        return self._n_begun > self._n_taken
+
+    def begin(self, job: Job) -> None:
+        """Hands over a job."""
+        self._jobs.put(job)
+        self._n_begun += 1
+
+    def take(self, accept: Callable[[Job, Done], None], refuse: Callable[[Job], None], *, wait: bool = False) -> None:
+        """Takes note of the jobs that have ended. Raises what a job raised.
+
+        accept: called with a job and what came of it. refuse: with a job that failed. wait: until there is nothing
+        more to take note of.
+        """
+        while True:
+            self._something_ended.clear()
+            while self._ended:
+                job, done = self._ended[0]
+                if isinstance(done, BaseException):
+                    refuse(job)
+                else:
+                    accept(job, done)
+                self._ended.popleft()
+                self._n_taken += 1
+                if isinstance(done, BaseException):
+                    raise done
+            if not wait or not self.busy:
+                return
+            self._something_ended.wait()
+
+    def close(self) -> None:
+        """Ends the thread, after the jobs that it has."""
+        self._jobs.put(None)
+        self._thread.join()
+
+    def _work(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            try:
+                done: Done | BaseException = self._do(job)
+            except BaseException as error:  # handed to the other thread, which raises it
+                done = error
+            self._ended.append((job, done))
+            self._something_ended.set()

@@ -1,0 +1,39 @@
+"""Runs of the command with a stand-in for the solver, which may do something else at one of its results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from studyrunner import run
+from studyrunner.results import Kept, MarchResult, StartResult
+from studyrunner.scene import describe_scene
+from studyrunner.tasks import BranchTask, MarchTask
+from tests.studyrunner.fakes import fake_evaluate
+
+Task = BranchTask | MarchTask
+
+
+class Solver:
+    """A stand-in that counts what it does. disturb: called with each task and the number of its result."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.tasks: list[Task] = []
+        self.n_results = 0
+        self.disturb: Callable[[Task, int], None] = lambda *_: None
+
+        def build_fake(model: object, _: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+            return lambda task, keep: self.evaluate(model, task, keep)
+
+        monkeypatch.setattr(run, "build_evaluator", build_fake)
+
+    def evaluate(self, model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        self.tasks.append(task)
+        for result in fake_evaluate(task, keep, describe_scene(model)):
+            self.n_results += 1
+            self.disturb(task, self.n_results)
+            yield result
+
+    def begin_again(self) -> None:
+        self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)

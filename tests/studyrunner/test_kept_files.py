@@ -1,0 +1,166 @@
+"""What a run finds beside its result: finished results, those of others, files of runs that were killed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import h5py
+import pytest
+import xarray as xr
+
+from studyrunner.cli import main
+from studyrunner.evaluate import NOT_COMPUTED
+from studyrunner.provenance import POINTS_LEFT
+from tests.studyrunner.faked_runs import Solver, Task
+
+SMALL = [
+    "sdof_slider",
+    *("--set", "axes.frequency=[100, 110]"),
+    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
+    *("--set", "axes.scheme=implicit"),
+    *("--set", "solver.shortcuts=false"),
+    *("-o", "out.nc"),
+]
+VARIANT = [*SMALL, "--set", "axes.excitation_amplitude=11"]
+LARGER = [*SMALL, "--set", "axes.frequency=[100, 110, 120]"]
+N_POINTS = 4
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
+    return Solver(monkeypatch)
+
+
+def interrupt(_: Task, n_results: int) -> None:
+    if n_results == 3:
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("command", [VARIANT, LARGER, [*SMALL, "--fresh"]], ids=["variant", "larger", "fresh"])
+def test_a_finished_result_is_not_replaced_by_less(
+    command: list[str], solver: Solver, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(SMALL) == 0
+    before = Path("out.nc").read_bytes()
+    capsys.readouterr()
+    solver.begin_again()
+    solver.disturb = interrupt
+    assert main(command) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("run-study: interrupted: ")
+    assert said.endswith("points are kept, out.nc is the finished result that it was, the same command goes on")
+    assert Path("out.nc").read_bytes() == before
+    # a finished one takes its place
+    solver.begin_again()
+    assert main(command) == 0
+    with xr.open_dataset("out.nc") as result:
+        assert (result.outcome == 0).all()
+        assert result.attrs[POINTS_LEFT] == 0
+
+
+def test_an_unfinished_result_is_replaced_by_any(solver: Solver) -> None:
+    solver.disturb = interrupt
+    assert main(SMALL) == 130
+    with xr.open_dataset("out.nc") as result:
+        n_left = int((result.outcome == NOT_COMPUTED).sum())
+        assert 0 < n_left <= N_POINTS
+        assert result.attrs[POINTS_LEFT] == n_left
+    solver.begin_again()
+    solver.disturb = interrupt
+    assert main(VARIANT) == 130
+    with xr.open_dataset("out.nc") as result:
+        assert result.excitation_amplitude == 11
+
+
+def test_a_result_of_an_earlier_version_counts_as_finished(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    with h5py.File("out.nc", "r+") as file:
+        del file.attrs[POINTS_LEFT]
+    before = Path("out.nc").read_bytes()
+    solver.begin_again()
+    solver.disturb = interrupt
+    assert main(VARIANT) == 130
+    assert Path("out.nc").read_bytes() == before
+
+
+def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    assert main(VARIANT) == 0
+    for command in (SMALL, VARIANT):
+        solver.begin_again()
+        assert main(command) == 0
+        assert solver.tasks == []
+    assert main([*VARIANT, "--prune"]) == 0
+    assert solver.tasks == []
+    assert main(VARIANT) == 0
+    assert solver.tasks == []
+    assert main(SMALL) == 0
+    assert len(solver.tasks) > N_POINTS
+
+
+def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    assert main([*VARIANT, "--fresh"]) == 0
+    solver.begin_again()
+    assert main(SMALL) == 0
+    assert solver.tasks == []
+    assert main([*SMALL, "--fresh"]) == 0
+    assert len(solver.tasks) > N_POINTS
+
+
+def make_text(path: Path) -> None:
+    path.write_text("two years of measurements", encoding="utf-8")
+
+
+def make_netcdf(path: Path) -> None:
+    xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
+
+
+def make_scene(path: Path) -> None:
+    assert main(["sdof_slider", "--write-scene", str(path)]) == 0
+
+
+def make_damaged(path: Path) -> None:
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 10)
+
+
+@pytest.mark.parametrize("make", [make_text, make_netcdf, make_scene, make_damaged])
+def test_a_file_of_something_else_is_not_overwritten(
+    make: object, solver: Solver, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert callable(make)
+    make(Path("out.nc"))
+    before = Path("out.nc").read_bytes()
+    capsys.readouterr()
+    assert main(SMALL) == 2
+    line = capsys.readouterr().err
+    assert line.startswith('run-study: command line: -o = "')
+    assert 'out.nc": remove the file or give another name: it is no result of run-study' in line
+    assert len(line.splitlines()) == 1
+    assert Path("out.nc").read_bytes() == before
+    assert solver.tasks == []
+
+
+def test_an_empty_file_is_nobodys(solver: Solver) -> None:
+    Path("out.nc").touch()
+    assert main(SMALL) == 0
+
+
+def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Path) -> None:
+    """Also with the number of this process, as in containers, where all have the same."""
+    for name in (f".out.nc.{os.getpid()}.partial", ".out.nc.4711.partial", ".out.nc.0123456789ab.partial"):
+        Path(name).write_bytes(b"half a result")
+    for name in (".out.nc.notes.partial", ".other.nc.4711.partial"):
+        Path(name).touch()
+    Path(".out.nc.99.partial").symlink_to(".other.nc.4711.partial")
+    assert main(SMALL) == 0
+    left = {path.name for path in folder.iterdir()}
+    foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
+    assert left == {"out.nc", "out.nc.parts", *foreign}

@@ -1,0 +1,199 @@
+"""Faults of the machine cost no point: the task is done again, elsewhere where there is a choice, or by a later run."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from solver.outcome import describe_error
+from studyrunner import run
+from studyrunner.cli import main
+from studyrunner.costs import LearnedCosts
+from studyrunner.dispatch import Dispatcher
+from studyrunner.evaluate import NOT_COMPUTED
+from studyrunner.machine_faults import is_fault_of_machine, tells_of_machine
+from studyrunner.tasks import BranchTask, MarchTask
+from tests.studyrunner.faked_runs import Solver, Task
+
+SMALL = [
+    "sdof_slider",
+    *("--set", "axes.frequency=[100, 110]"),
+    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
+    *("--set", "axes.scheme=implicit"),
+    *("-o", "out.nc"),
+]
+FAULTS = [
+    OSError(122, "Disk quota exceeded"),
+    MemoryError(),
+    pickle.UnpicklingError("pickle data was truncated"),
+    EOFError("Ran out of input"),
+    PermissionError(13, "Permission denied"),
+]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
+    return Solver(monkeypatch)
+
+
+def load() -> xr.Dataset:
+    with xr.open_dataset("out.nc") as result:
+        return result.load().drop_vars("run_time")
+
+
+def failing(error: Exception, n_times: int, kind: type[Task]) -> Callable[[Task, int], None]:
+    """The first task of a kind breaks off so often."""
+    left = [n_times]
+    first: list[int] = []
+
+    def disturb(task: Task, _: int) -> None:
+        if isinstance(task, kind):
+            first.append(task.number)
+            if task.number == first[0] and left[0]:
+                left[0] -= 1
+                raise error
+
+    return disturb
+
+
+@pytest.mark.parametrize("error", FAULTS, ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize("kind", [BranchTask, MarchTask])
+def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
+    error: Exception, kind: type[Task], solver: Solver, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    solver.begin_again()
+    solver.disturb = failing(error, 1, kind)
+    assert main(SMALL) == 0
+    with xr.open_dataset("whole.nc") as whole:
+        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+    said = capsys.readouterr().err
+    assert said.count(f"rank 0: {type(error).__name__}") == 1
+    assert "a fault of the machine; the task is tried once more" in said
+
+
+@pytest.mark.parametrize("kind", [BranchTask, MarchTask])
+def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) -> None:
+    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    solver.begin_again()
+    solver.disturb = failing(FAULTS[0], 2, kind)
+    assert main(SMALL) == 3
+    outcomes = set(load().outcome.values.flat)
+    assert NOT_COMPUTED in outcomes
+    assert outcomes <= {0, NOT_COMPUTED}
+    # the same command goes on, and nothing of it is left
+    solver.begin_again()
+    assert main(SMALL) == 0
+    with xr.open_dataset("whole.nc") as whole:
+        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+
+
+def test_what_the_solver_says_of_an_error_tells_which_it_was() -> None:
+    for error in FAULTS:
+        assert is_fault_of_machine(error)
+        assert tells_of_machine(describe_error(error))
+    for error in (ZeroDivisionError("OSError"), ValueError("MemoryError: no"), FloatingPointError("x")):
+        assert not is_fault_of_machine(error)
+        assert not tells_of_machine(describe_error(error))
+
+
+def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the solver itself, whose march breaks off in its midst."""
+    from solver import march
+
+    own, n_calls = march.Trajectory.check, 0
+
+    def check(self: march.Trajectory) -> object:
+        nonlocal n_calls
+        n_calls += 1
+        if n_calls in (3, 30):
+            raise MemoryError("no room for an array")
+        return own(self)
+
+    monkeypatch.setattr(march.Trajectory, "check", check)
+    assert main([*SMALL, "--set", "solver.harmonics=3", "--set", "solver.samples=32"]) == 0
+    assert n_calls > 30
+    assert (load().outcome == 0).all()
+
+
+class Chore:
+    cost, n_results, opens_others = 1.0, 1, False
+    kin = (("chore",),)
+
+
+def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
+    dispatcher: Dispatcher[Chore] = Dispatcher(3, LearnedCosts(), time.monotonic)
+    dispatcher.add([Chore() for _ in range(20)])
+    held = [(rank, given.number) for rank, given in dispatcher.assign()]
+    ranks: list[int] = []
+    while held:
+        rank, number = held.pop(0)
+        if rank in (0, 2):
+            dispatcher.shun(rank)
+        dispatcher.deliver(rank, number, 0.01)
+        new = [(rank, given.number) for rank, given in dispatcher.assign()]
+        ranks += [rank for rank, _ in new]
+        held += new
+    assert dispatcher.done
+    assert set(ranks) == {1}
+    dispatcher.shun(1)
+    dispatcher.add([Chore()])
+    assert [rank for rank, _ in dispatcher.assign()] == [1]
+
+
+KERNELS = """
+from studyrunner.machine_faults import guard_kernel_cache
+guard_kernel_cache()
+guard_kernel_cache()
+import kernel
+print(kernel.double(3.0), len(kernel.double.stats.cache_hits))
+"""
+
+
+@pytest.fixture
+def kernel(folder: Path) -> Callable[[], str]:
+    (folder / "kernel.py").write_text(
+        "from numba import njit\n@njit(cache=True)\ndef double(x):\n    return 2.0 * x\n", encoding="utf-8"
+    )
+
+    def call() -> str:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+        environment["PYTHONPATH"] = os.pathsep.join([str(folder), str(Path(run.__file__).parents[1])])
+        done = subprocess.run(
+            [sys.executable, "-c", KERNELS], env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    return call
+
+
+def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], folder: Path) -> None:
+    assert kernel() == "6.0 0"
+    assert kernel() == "6.0 1"
+    for suffix in ("*.nbi", "*.nbc"):
+        (path,) = (folder / "cache").rglob(suffix)
+        path.write_bytes(path.read_bytes()[:-20])
+        assert kernel() == "6.0 0"
+        assert kernel() == "6.0 1"
+
+
+def test_kernels_without_a_place_for_their_cache_are_compiled_all_the_same(
+    kernel: Callable[[], str], folder: Path
+) -> None:
+    # a file in place of the folder
+    (folder / "cache").write_text("no folder", encoding="utf-8")
+    assert kernel().startswith("6.0")
