@@ -7,15 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from studyrunner.costs import LearnedCosts
-from studyrunner.crashes import Crash
+from studyrunner.crashes import MOST_DEATHS, Crash
 from studyrunner.evaluate import CRASHED, NOT_COMPUTED
 from studyrunner.ledger import Ledger
 from studyrunner.progress import Standing
 from studyrunner.results import MarchResult, StartResult
 from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
-
-_RANKS_A_TASK = 2
-"""A task that as many ranks were at when they were lost is not given to another one."""
 
 _TRIES_AGAIN = 1
 """So often a task that a fault of the machine has ended is done again by itself."""
@@ -30,16 +27,16 @@ class Course:
     """How far the tasks of a study are, and what their results make possible.
 
     A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
-    order.
+    order. n_crashes: by the key of a task, how many processes it has ended in earlier runs.
     """
 
-    def __init__(self, ledger: Ledger) -> None:
+    def __init__(self, ledger: Ledger, n_crashes: Mapping[str, int] | None = None) -> None:
         self.costs = LearnedCosts()
         self.branches = ledger.branches_left()
         self.n_points = ledger.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
         self._ledger = ledger
-        self._n_lost: Counter[str] = Counter()
+        self._n_lost: Counter[str] = Counter(n_crashes)
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[int] = Counter()
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
@@ -91,17 +88,22 @@ class Course:
     ) -> list[BranchTask | MarchTask]:
         """What is to be done in place of the tasks of a lost rank, each with the number of results still to be given.
 
-        The rank was at the first of them. crashes: by the key of the task. A task that crashes is not tried again, and
-        neither is one with which several ranks were lost, as it may need more memory than there is.
+        The rank was at the first of them, or at the one that it has left word of. crashes: those words, by the key of
+        the task. A task is tried once more; one with which two ranks were lost is not, be it that it crashes or that it
+        needs more memory than there is.
         """
         left: list[BranchTask | MarchTask] = []
+        keys = [task.key for task, _ in lost]
+        # its word is the later one: what it has sent last may be lost with it
+        at = next((key for key in keys if key in crashes), next(iter(keys), ""))
+        self._n_lost[at] += 1
         for task, n_left in lost:
-            self._n_lost[task.key] += task is lost[0][0]
             again = self._ledger.renew(task)
-            crash = crashes.get(task.key)
-            if crash is None and self._n_lost[task.key] >= _RANKS_A_TASK:
+            crash = None
+            if task.key == at and self._n_lost[at] >= MOST_DEATHS:
                 position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
-                crash = Crash(task.key, position, f"{_RANKS_A_TASK} ranks were lost while they were at it")
+                unknown = Crash(task.key, position, f"{MOST_DEATHS} ranks were lost while they were at it")
+                crash = crashes.get(at, unknown)
             if crash is not None:
                 self.n_points += self._ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
             if isinstance(again, BranchTask):

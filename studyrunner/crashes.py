@@ -2,6 +2,9 @@
 
 Every rank that sees the folder of the run has a file there. The key of its task stands in the first line; Python's
 fault handler writes behind it where the process was. A process that is killed from outside leaves no such text.
+
+The signal of a crash may come from outside as well, or from a machine that is sick: one says nothing of the task yet.
+What the rank has left is kept under the key of the task, and is the tally of how often that has ended its process.
 """
 
 from __future__ import annotations
@@ -12,11 +15,11 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from studyrunner.files import NotPlainError, create, open_plain
+from studyrunner.files import NotPlainError, create, open_plain, sync_folder
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.tasks import BranchTask, MarchTask
 
@@ -26,8 +29,14 @@ Keep = Callable[[Kept], None]
 Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]
 """Does a task: gives its results one by one, and hands over now and then how far it is."""
 
+MOST_DEATHS = 2
+"""A task that has ended so many processes is not tried again."""
+
 _LINE = 64  # bytes of the first line, which is written anew for each task: behind it the fault handler writes
 _LARGEST = 1_000_000
+_OF_A_RANK = "rank-*.crash"
+_OF_A_TASK = re.compile(r"([0-9a-f]{32})\.\d+\.died")
+_KEY = re.compile(r"[0-9a-f]{32}")
 _FATAL = re.compile(r"Fatal Python error: (.*)")
 _FRAME = re.compile(r'File "(.*)", line (\d+) in (.*)')
 
@@ -84,20 +93,47 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
         path.unlink(missing_ok=True)
 
 
-def forget_crash(folder: Path, rank: int) -> None:
-    """Removes what a rank that is lost has left."""
-    with contextlib.suppress(OSError):
-        (folder / f"rank-{rank}.crash").unlink()
+def count_crashes(folder: Path, rank: int | None = None) -> tuple[Crash, ...]:
+    """Takes what ranks have left that are there no more, or one of them, into the tally: the crashes among it."""
+    crashes = []
+    for path in sorted(folder.glob(_OF_A_RANK)) if rank is None else [folder / f"rank-{rank}.crash"]:
+        with contextlib.suppress(OSError):
+            crash = _read_crash(path)
+            if crash is None:
+                path.unlink()
+                continue
+            number = 1
+            while os.path.lexists(counted := folder / f"{crash.key}.{number}.died"):
+                number += 1
+            # at once, so that a run that is killed here counts no crash twice
+            path.rename(counted)
+            crashes.append(crash)
+    if crashes:
+        with contextlib.suppress(OSError):
+            sync_folder(folder)
+    return tuple(crashes)
 
 
-def read_crashes(folder: Path) -> tuple[Crash, ...]:
-    """The crashes of an earlier run."""
-    return tuple(found for path in crash_files(folder) if (found := _read_crash(path)) is not None)
+def read_tally(folder: Path) -> dict[str, tuple[Crash, ...]]:
+    """The crashes of each task so far, by its key, in their order."""
+    tally: dict[str, tuple[Crash, ...]] = {}
+    for path, key in _tally_files(folder):
+        crash = _read_crash(path)
+        if crash is not None and crash.key == key:
+            tally[key] = (*tally.get(key, ()), crash)
+    return tally
 
 
-def crash_files(folder: Path) -> Iterable[Path]:
-    """The files of the ranks of an earlier run."""
-    return sorted(folder.glob("rank-*.crash"))
+def forget_crashes(folder: Path, keys: Collection[str] | None) -> None:
+    """Nothing of these tasks is counted any more, or of any for None."""
+    for path, key in _tally_files(folder):
+        if keys is None or key in keys:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _tally_files(folder: Path) -> list[tuple[Path, str]]:
+    return [(path, found[1]) for path in sorted(folder.glob("*.died")) if (found := _OF_A_TASK.fullmatch(path.name))]
 
 
 def _read_crash(path: Path) -> Crash | None:
@@ -113,6 +149,9 @@ def _read_crash(path: Path) -> Crash | None:
             position = int(place)
         case _:
             return None
+    # it becomes the name of a file
+    if not _KEY.fullmatch(key):
+        return None
     fatal = next((found for line in lines if (found := _FATAL.search(line))), None)
     frames = [found for line in lines if (found := _FRAME.search(line))]
     # A crash elsewhere in the process, in the MPI library for one, is not that of a task.

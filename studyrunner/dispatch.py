@@ -106,6 +106,7 @@ class Dispatcher(Generic[Task]):
 
     Tasks that make others possible go first, unless so many wait already that all ranks have enough for long: what
     waits, and what it holds, is then bounded. Of the others the longest go first, so that the ranks end together.
+    Tasks that may have ended a rank come first of all, but not on rank 0, which all need, while there is another.
     """
 
     def __init__(self, n_ranks: int, costs: LearnedCosts, clock: Callable[[], float]) -> None:
@@ -118,6 +119,7 @@ class Dispatcher(Generic[Task]):
         self._next_watch = self._began + WATCH_SECONDS
         self._openers: WaitingTasks[Task] = WaitingTasks(costs)
         self._others: WaitingTasks[Task] = WaitingTasks(costs)
+        self._suspects: WaitingTasks[Task] = WaitingTasks(costs)
         self._held: dict[int, _Held[Task]] = {}
         self._held_by: list[list[int]] = [[] for _ in range(n_ranks)]
         # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
@@ -128,7 +130,7 @@ class Dispatcher(Generic[Task]):
     @property
     def done(self) -> bool:
         """Whether nothing waits and nothing is computed."""
-        return not self._held and self._n_waiting == 0
+        return not self._held and self._n_waiting == 0 and not self._suspects
 
     @property
     def wants_more(self) -> bool:
@@ -141,11 +143,21 @@ class Dispatcher(Generic[Task]):
             (self._openers if task.opens_others else self._others).add(self._n_known, task)
             self._n_known += 1
 
+    def add_lost(self, tasks: Iterable[Task]) -> None:
+        """Tasks of a rank that is lost, maybe by one of them."""
+        for task in tasks:
+            self._suspects.add(self._n_known, task)
+            self._n_known += 1
+
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
         """The ranks that get a task now, and the tasks."""
         if self._n_lessons >= max(_FEW_LESSONS, len(self._others) // _LESSONS_SHARE):
             self._n_lessons = 0
             self._others.reorder()
+        only_0 = self._n_ranks - len(self._shunned - {0}) == 1
+        while self._suspects and (rank := next((rank for rank in self._free if rank or only_0), None)) is not None:
+            del self._free[rank]
+            yield rank, self._hold(rank, *self._suspects.pop())
         while self._free and self._n_waiting:
             rank, _ = self._free.popitem()
             assignment = self._hand_out(rank)
@@ -155,15 +167,19 @@ class Dispatcher(Generic[Task]):
             rank, _ = self._ahead.popitem()
             yield rank, self._hand_out(rank)
 
-    def deliver(self, rank: int, number: int, seconds: float) -> Task:
-        """The task of which a rank has sent a result that took it so long."""
+    def deliver(self, rank: int, number: int, seconds: float, *, teaches: bool = True) -> Task:
+        """The task of which a rank has sent a result that took it so long.
+
+        teaches: whether others like it may take as long; not where it broke off.
+        """
         held = self._held[number]
         task = held.task
         if held.lesson is not None:
             self._costs.forget(held.lesson)
             held.lesson = None
-        self._costs.learn(task.kin, task.cost / task.n_results, seconds)
-        self._n_lessons += 1
+        if teaches:
+            self._costs.learn(task.kin, task.cost / task.n_results, seconds)
+            self._n_lessons += 1
         held.n_left -= 1
         held.began = self._clock()
         if held.n_left == 0:
@@ -190,6 +206,10 @@ class Dispatcher(Generic[Task]):
         self._free.pop(rank, None)
         self._ahead.pop(rank, None)
         self._n_ranks -= 1
+        if len(self._shunned) == self._n_ranks:
+            # sick ones alone are left
+            self._free |= dict.fromkeys(rank for rank in self._shunned if not self._held_by[rank])
+            self._shunned.clear()
         return lost
 
     def shun(self, rank: int) -> None:
@@ -239,7 +259,9 @@ class Dispatcher(Generic[Task]):
         return len(self._openers) + len(self._others)
 
     def _hand_out(self, rank: int) -> Assignment[Task]:
-        number, task = (self._openers if self._openers and not self._enough_waits else self._others).pop()
+        return self._hold(rank, *(self._openers if self._openers and not self._enough_waits else self._others).pop())
+
+    def _hold(self, rank: int, number: int, task: Task) -> Assignment[Task]:
         self._held[number] = _Held(task, task.n_results, None if self._held_by[rank] else self._clock())
         self._held_by[rank].append(number)
         return Assignment(number, task)

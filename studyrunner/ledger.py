@@ -41,6 +41,20 @@ class Ledger:
         """What the histories of a march are known by, one for each share."""
         return self._histories[march.number]
 
+    @property
+    def keys(self) -> frozenset[str]:
+        """What all tasks are known by."""
+        return frozenset((*self._branches, *self._marches.values()))
+
+    def is_left(self, key: str) -> bool:
+        """Whether the task of this key is one of this plan from which a history is missing."""
+        return any(
+            not self.is_finished(march)
+            for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
+            for march in line
+            if key in (self.key(branch), self.key(march))
+        )
+
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
         """Where the histories of a march are, one for each share; None for those that are not finished."""
         return tuple(self.store.histories.get(key) for key in self._histories[march.number])
@@ -135,7 +149,7 @@ class Ledger:
                         self.store.forget_history(key)
 
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
-        """The task of this key has ended its process: no other run tries it again. How many points are lost with it.
+        """The task of this key ends its processes: no other run tries it again. How many points are lost with it.
 
         position: place on a branch that it was on the way to, None for a march. The branch ends before that place.
         """
@@ -161,14 +175,13 @@ class Ledger:
             self.store.forget_history(key)
         for key in itertools.chain.from_iterable(self._starts):
             self.store.forget_start(key)
-        for key in (*self._branches, *self._marches.values()):
+        for key in self.keys:
             self.store.forget_progress(key)
         self.store.remove_forgotten()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
         """Leaves at most so many bytes in the store that are not of this study; for 0 bytes nothing else."""
-        tasks = {*self._branches, *self._marches.values()}
-        self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), tasks, most)
+        self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
 
     def _all_histories(self) -> set[str]:
         return set(itertools.chain.from_iterable(self._histories.values()))

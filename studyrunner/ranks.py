@@ -32,7 +32,9 @@ _MANY_SENT = 64
 _TOLERANT = "OMPI_MCA_mpi_ft_enable"
 """Set by the launcher of Open MPI where it was told --with-ft ulfm."""
 
-_SECONDS_TO_START = 600.0
+_SECONDS_TO_START = 120.0
+"""From the first rank that calls the library to the last: the ranks of a job start within seconds of each other."""
+
 _SECONDS_TO_MISS_RANK_0 = 0.5
 
 _SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")

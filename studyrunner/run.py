@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.course import Course, fault_of
-from studyrunner.crashes import Evaluate, Keep, crash_files, forget_crash, note_tasks, read_crashes
+from studyrunner.crashes import (
+    MOST_DEATHS,
+    Crash,
+    Evaluate,
+    Keep,
+    count_crashes,
+    forget_crashes,
+    note_tasks,
+    read_tally,
+)
 from studyrunner.earlier import holds_finished_result
 from studyrunner.evaluate import (
     COMPLETE,
@@ -111,9 +120,12 @@ def run_study(
         ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
         if fresh:
             ledger.forget_all()
-        take_crashes(ledger)
+        crashes = take_crashes(ledger, fresh=fresh)
         if retry_failed:
             ledger.forget_failed(COMPLETE)
+        for crash in crashes:
+            if ledger.is_left(crash.key):
+                progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
         n_found = ledger.n_points_finished
         if n_found:
             progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
@@ -137,17 +149,27 @@ def run_study(
         except KeyboardInterrupt:
             raise Interrupted(write()) from None
         if summary.n_left == 0:
+            forget_crashes(store.folder, None if prune else ledger.keys)
             ledger.prune(0.0 if prune else MOST_OF_OTHERS)
     return summary
 
 
-def take_crashes(ledger: Ledger) -> None:
-    """Points at which a process crashed in an earlier run have failed; what that run has said of it is removed."""
-    for crash in read_crashes(ledger.store.folder):
-        ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
-    for path in crash_files(ledger.store.folder):
-        with contextlib.suppress(OSError):
-            path.unlink()
+def take_crashes(ledger: Ledger, *, fresh: bool = False) -> list[Crash]:
+    """Points whose task has crashed two processes in earlier runs have failed. The new crashes of which there is one.
+
+    fresh: crashes of this study's tasks in earlier runs do not count.
+    """
+    folder, own = ledger.store.folder, ledger.keys
+    new = count_crashes(folder)
+    if fresh:
+        forget_crashes(folder, own)
+    for key, crashes in read_tally(folder).items():
+        if key in own and len(crashes) >= MOST_DEATHS:
+            ledger.take_as_failed(key, crashes[-1].position, CRASHED, crashes[-1].message)
+            # it is on the disk: where it is asked for again, counting begins anew
+            forget_crashes(folder, {key})
+    tally = read_tally(folder)
+    return [crash for crash in new if crash.key in tally]
 
 
 def _open_store(folder: Path, kind: np.dtype[np.void]) -> Store:
@@ -205,7 +227,7 @@ def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluat
 
 def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunProgress) -> None:
     """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
-    course = Course(ledger)
+    course = Course(ledger, {key: len(crashes) for key, crashes in read_tally(ledger.store.folder).items()})
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = course.take(task, result)
@@ -228,8 +250,7 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
     def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
         had = f", which had {count(len(lost), 'task')}" if lost else ""
         progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in read_crashes(ledger.store.folder)}
-        forget_crash(ledger.store.folder, rank)
+        crashes = {crash.key: crash for crash in count_crashes(ledger.store.folder, rank)}
         return course.take_back(lost, crashes)
 
     def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:

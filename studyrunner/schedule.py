@@ -185,7 +185,7 @@ def serve_tasks(
         nonlocal lost
         new, lost = ranks.lost - lost, ranks.lost
         for rank in sorted(new):
-            dispatcher.add(take_back(rank, dispatcher.lose(rank)))
+            dispatcher.add_lost(take_back(rank, dispatcher.lose(rank)))
 
     def accept(rank: int, message: object) -> None:
         if rank in lost:
@@ -198,9 +198,10 @@ def serve_tasks(
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-        if is_sick(rank, message.result):
+        sick = is_sick(rank, message.result)
+        if sick:
             dispatcher.shun(rank)
-        task = dispatcher.deliver(rank, message.number, message.seconds)
+        task = dispatcher.deliver(rank, message.number, message.seconds, teaches=not sick)
         dispatcher.add(take(task, message.result))
         hand_out()
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner.evaluate import CRASHED
+from studyrunner import ranks
+from studyrunner.evaluate import CRASHED, NOT_COMPUTED
 from tests.mpi.conftest import OpenMpi
 from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Ended, Running, results, watch_to_end
 
@@ -103,19 +104,66 @@ def test_without_rank_0_all_end_and_the_next_run_goes_on(
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
 
 
-def test_a_march_that_crashes_takes_one_rank_with_it(open_mpi: OpenMpi, tmp_path: Path) -> None:
-    """It is not given to the others; the branch, which rank 0 follows, gives the marches to ranks that are free."""
+@pytest.mark.parametrize(("number", "rank"), [(signal.SIGUSR1, None), (signal.SIGTERM, 0), (signal.SIGTERM, 2)])
+def test_a_run_that_is_ended_from_outside_leaves_what_there_is(
+    number: signal.Signals, rank: int | None, open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+) -> None:
+    """By a signal to the launcher that it passes on, or to a rank."""
+    expected, n_histories = whole
+
+    def end(running: Running) -> None:
+        assert running.reaches(lambda: count_noted(tmp_path) >= n_histories // 4), running.said
+        os.kill(running.process.pid if rank is None else running.ranks()[rank], number)
+
+    done = watch_to_end(
+        [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, FAKED, *STUDY],
+        tmp_path,
+        {**open_mpi.environment, **SECONDS},
+        end,
+    )
+    assert done.status == 130, done.said
+    assert done.said.count("run-study: interrupted: out.nc holds ") == 1
+    assert done.seconds < 10.0
+    left = results(tmp_path / "out.nc").outcome
+    assert 0 < int((left == NOT_COMPUTED).sum()) < left.size
+    assert run_and_kill(open_mpi, tmp_path).status == 0
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
+
+
+def test_the_launcher_that_is_told_to_end_leaves_nobody_behind(
+    open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+) -> None:
+    """It kills the ranks at once, before they have written a result, or after; its status is its own."""
+    expected, n_histories = whole
+
+    def end(running: Running) -> None:
+        assert running.reaches(lambda: count_noted(tmp_path) >= n_histories // 4), running.said
+        running.process.send_signal(signal.SIGTERM)
+
+    command = [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, FAKED, *STUDY]
+    done = watch_to_end(command, tmp_path, {**open_mpi.environment, **SECONDS}, end)
+    assert done.status == 1
+    assert done.seconds < 5.0
+    done = run_and_kill(open_mpi, tmp_path)
+    assert done.status == 0, done.said
+    assert "points are there from an earlier run" in done.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
+
+
+def test_a_march_that_crashes_takes_two_ranks_with_it(open_mpi: OpenMpi, tmp_path: Path) -> None:
+    """Never rank 0, which follows the branch and gives the marches to ranks that are free, and then to one of them."""
     study = ["two_masses", "-o", "out.nc", "--set", "axes.frequency=[0.1, 0.11, 0.12]"]
     done = run_and_kill(open_mpi, tmp_path, n_ranks=4, study=study, faked={"FAKE_CRASH": "abort"})
     assert done.status == 3, done.said
-    assert done.said.count(" is lost, which had 1 task: ") == 1
+    assert done.said.count(" is lost, which had 1 task: ") == 2
     found = results(tmp_path / "out.nc").squeeze()
     assert found.outcome.values.tolist() == [0, CRASHED, 0]
     assert str(found.message.values[1]).startswith("Aborted (run_faked.py, line ")
 
 
 def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi: OpenMpi, tmp_path: Path) -> None:
-    """The library waits for it for ever."""
+    """The library waits for it for ever, the others for some minutes."""
+    assert ranks._SECONDS_TO_START <= 120.0
     program = (
         "import os; from studyrunner import ranks; ranks._SECONDS_TO_START = 2.0;"
         "os.environ['OMPI_COMM_WORLD_RANK'] == '2' and os.kill(os.getpid(), 9); ranks.start_ranks()"

@@ -242,3 +242,16 @@ def test_what_a_lost_rank_has_taught_by_being_late_is_forgotten() -> None:
     assert costs.correction(jobs[0].kin) > 10.0
     dispatcher.lose(0)
     assert costs.correction(jobs[0].kin) == 1.0
+
+
+def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other() -> None:
+    dispatcher, _ = make(3, *[Job("a", 1.0)] * 3)
+    assert dict(handed_out(dispatcher)) == {0: 0, 1: 1, 2: 2}
+    dispatcher.add_lost([task for task, _ in dispatcher.lose(2)])
+    dispatcher.deliver(0, 0, 1.0)
+    assert handed_out(dispatcher) == []
+    assert not dispatcher.done
+    dispatcher.deliver(1, 1, 1.0)
+    assert handed_out(dispatcher) == [(1, 3)]
+    dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
+    assert handed_out(dispatcher) == [(0, 4)]

@@ -82,19 +82,28 @@ def test_a_march_gives_all_its_histories_again(ledger: Ledger) -> None:
     assert_finished(course, ledger)
 
 
-def test_a_march_that_crashed_is_not_given_again(ledger: Ledger) -> None:
-    course, _, (crashed, second, *others) = begin(ledger, 5)
-    lost = [(crashed, crashed.n_results), (second, second.n_results)]
+@pytest.mark.parametrize("earlier", [0, 1])
+def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, ledger: Ledger) -> None:
+    course, _, (first, crashed, *others) = begin(ledger, 5)
+    lost = [(first, first.n_results), (crashed, crashed.n_results)]
+    if earlier:
+        # in a run before this one
+        course._n_lost.update(Course(ledger, {crashed.key: 1})._n_lost)
+    else:
+        assert course.take_back(lost, {crashed.key: Crash(crashed.key, None, "Aborted")}) == [first, crashed]
     (again,) = course.take_back(lost, {crashed.key: Crash(crashed.key, None, "Aborted")})
-    assert again == second
+    assert again == first
     finish(course, [again, *others])
     assert_finished(course, ledger)
     assert len(ledger.store.select(lambda records: records["outcome"] == CRASHED)) == crashed.n_results
 
 
-def test_a_branch_that_crashed_ends_there(ledger: Ledger) -> None:
+def test_a_branch_that_crashed_twice_ends_there(ledger: Ledger) -> None:
     """What it has computed before and not yet sent is computed again."""
     course, branch, marches = begin(ledger, 2)
+    (again,) = course.take_back([(branch, 3)], {branch.key: Crash(branch.key, branch.order[3], "Aborted")})
+    assert isinstance(again, BranchTask)
+    assert again.order_left == branch.order[2:]
     (again,) = course.take_back([(branch, 3)], {branch.key: Crash(branch.key, branch.order[3], "Aborted")})
     assert isinstance(again, BranchTask)
     assert again.order_left == (branch.order[2],)

@@ -16,7 +16,7 @@ import xarray as xr
 from solver.outcome import describe_error
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.costs import LearnedCosts
+from studyrunner.costs import Kin, LearnedCosts, Lesson
 from studyrunner.dispatch import Dispatcher
 from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.machine_faults import is_fault_of_machine, tells_of_machine
@@ -153,6 +153,28 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
     dispatcher.shun(1)
     dispatcher.add([Chore()])
     assert [rank for rank, _ in dispatcher.assign()] == [1]
+    # where the others are lost a sick one is better than none
+    dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
+    assert {rank for rank, _ in dispatcher.assign()} == {2}
+
+
+def test_a_task_that_broke_off_teaches_nothing_of_those_like_it(
+    solver: Solver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, lessons = LearnedCosts.learn, []
+
+    def learn(self: LearnedCosts, kin: Kin, estimated: float, measured: float) -> Lesson:
+        lessons.append(measured)
+        return own(self, kin, estimated, measured)
+
+    monkeypatch.setattr(LearnedCosts, "learn", learn)
+    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    n_whole = len(lessons)
+    solver.begin_again()
+    lessons.clear()
+    solver.disturb = failing(FAULTS[0], 1, MarchTask)
+    assert main(SMALL) == 0
+    assert len(lessons) == n_whole > 0
 
 
 KERNELS = """

@@ -16,7 +16,7 @@ import pytest
 
 from studyrunner import folder_lock, part_writer, stock
 from studyrunner import store as store_module
-from studyrunner.crashes import read_crashes
+from studyrunner.crashes import count_crashes, forget_crashes, read_tally
 from studyrunner.folder_lock import StoreInUseError
 from studyrunner.part_files import KEY, KEY_TYPE
 from studyrunner.results import Kept
@@ -302,11 +302,12 @@ def test_any_bit_of_a_file_matters(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["fifo", "folder", "endless", "link", "link to nowhere"])
-@pytest.mark.parametrize("suffix", [".npy", ".starts", ".progress", ".crash"])
+@pytest.mark.parametrize("suffix", [".npy", ".starts", ".progress", ".crash", ".died"])
 def test_only_plain_files_are_opened(what: str, suffix: str, folder: Path, tmp_path: Path) -> None:
     fill(folder)
     own = min(folder.glob(RECORDS))
-    odd = folder / ("rank-0.crash" if suffix == ".crash" else f"00000007{suffix}")
+    names = {".crash": "rank-0.crash", ".died": f"{'0' * 32}.1.died"}
+    odd = folder / names.get(suffix, f"00000007{suffix}")
     if what == "fifo":
         os.mkfifo(odd)
     elif what == "folder":
@@ -314,15 +315,41 @@ def test_only_plain_files_are_opened(what: str, suffix: str, folder: Path, tmp_p
     else:
         odd.symlink_to({"endless": Path("/dev/zero"), "link": own, "link to nowhere": tmp_path / "none"}[what])
     store = Store(folder, KIND)
-    crashes = read_crashes(folder)
+    assert odd.is_symlink() or odd.exists()
+    crashes, tally = count_crashes(folder), read_tally(folder)
     store.add_history(key(8), record(8))
     settle(store)
-    assert crashes == ()
-    assert odd.is_symlink() or odd.exists()
+    assert (crashes, tally) == ((), {})
     assert len(store.histories) == 5
     assert not (tmp_path / "none").exists()
-    if suffix != ".crash":
+    if suffix not in names:
         assert [f"{odd.name} is damaged" in note for note in store.notes] == [True]
+
+
+@pytest.mark.parametrize("key", ["../precious", "f" * 32 + "/..", "F" * 32, "0" * 31])
+def test_what_a_crash_says_of_its_task_leads_nowhere_else(key: str, folder: Path) -> None:
+    folder.mkdir()
+    (folder / "rank-3.crash").write_text(crash_text(key))
+    before = sorted(folder.parent.rglob("*"))
+    assert count_crashes(folder) == ()
+    assert sorted(folder.parent.rglob("*")) == [path for path in before if path.suffix != ".crash"]
+
+
+def test_crashes_are_counted_once_each(folder: Path) -> None:
+    folder.mkdir()
+    for number in (1, 2):
+        (folder / "rank-3.crash").write_text(crash_text("a" * 32))
+        assert [crash.key for crash in count_crashes(folder, rank=3)] == ["a" * 32]
+        assert count_crashes(folder) == count_crashes(folder, rank=3) == ()
+        assert {key: len(crashes) for key, crashes in read_tally(folder).items()} == {"a" * 32: number}
+    forget_crashes(folder, {"b" * 32})
+    assert len(read_tally(folder)) == 1
+    forget_crashes(folder, None)
+    assert list(folder.iterdir()) == []
+
+
+def crash_text(key: str) -> str:
+    return f'{key}\nFatal Python error: Aborted\n  File "x.py", line 1 in f\n  File "crashes.py", line 2 in noted\n'
 
 
 def test_a_link_in_place_of_the_lock_is_not_written_through(folder: Path, tmp_path: Path) -> None:
