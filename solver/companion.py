@@ -42,7 +42,7 @@ SPARE = 500
 AUTOMATIC = SolverSettings()
 """With these harmonics may be left out: what the companion misses is in the difference, too."""
 
-_CARRIED = ("kept", "offset", "waiting", "followed", "start_share")
+_CARRIED = ("kept", "offset", "waiting", "followed", "start_share", "met")
 
 
 class Companion:
@@ -51,7 +51,8 @@ class Companion:
     kept (n_output, n_contact): its depths at the counts asked for, m, NaN where it has not come to. offset
     (n_contact,): m, difference of the depths at the last count at which it had to begin anew from the history itself.
     start_share: difference of the wear rates of both start states, pair by pair, over that of the joint: a later state
-    that happens to be the same does not make the start better known. waiting: steps of the history that it has still to
+    that happens to be the same does not make the start better known. met: counts at which it has come to the history,
+    and the difference of both there, as volume of all pairs, m3. waiting: steps of the history that it has still to
     follow. followed: harmonics and samples of the history for which
     its own were chosen.
     """
@@ -67,6 +68,7 @@ class Companion:
         self.kept = np.full((cycles.size, main.still.size), np.nan)
         self.offset = np.zeros_like(main.still)
         self.start_share = 0.0
+        self.met: list[tuple[float, float]] = []
         self.waiting = 0
         self.followed = main.case.resolution
         self.steps: AdaptiveSteps | None = None
@@ -107,19 +109,23 @@ class Companion:
             return
         self.waiting = 0
         self.effort.deadline = self.main.effort.deadline
-        if self.effort.iterations > self.main.effort.iterations + SPARE:
-            # it has lost its way from jump to jump
+        # one that has spent more has lost its way from jump to jump
+        lost = self.effort.iterations > self.main.effort.iterations + SPARE
+        lost = lost or (self.main.case.resolution != self.followed and not self._take_case())
+        if lost or not self._catch_up():
             self._begin_anew()
-            return
-        if self.main.case.resolution != self.followed and not self._take_case():
-            self._begin_anew()
-            return
+        area, depth = self.main.joint.contact.area, self.main.point.evaluation.wear_depth
+        differs = np.abs(self.offset + self.way.point.evaluation.wear_depth - depth)
+        self.met.append((self.main.cycle, float(differs @ area)))
+
+    def _catch_up(self) -> bool:
+        """Steps to the count of the history; False where it does not come to it."""
         for _ in range(MOST_PARTS):
             if self.way.cycle >= self.main.cycle * (1.0 - 1e-12):
-                return
+                return True
             if not self._step():
-                break
-        self._begin_anew()
+                return False
+        return False
 
     def _step(self) -> bool:
         """One step to the count of the history, or as far as its branch goes and behind its end."""

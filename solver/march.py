@@ -132,7 +132,9 @@ def march_wear(
     # adaptive steps go beyond the end
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
     n_iterations = march.effort.iterations + companion.effort.iterations
-    history = recorder.finish(outcome, jump_cycle, n_iterations, spent, companion.kept, companion.start_share)
+    history = recorder.finish(
+        outcome, jump_cycle, n_iterations, spent, companion.kept, companion.met, companion.start_share
+    )
     if outcome is Outcome.CONVERGED:
         outcome, message = _judge(march, history, companion)
     return replace(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,10 +39,11 @@ SAFETY = {"implicit": 1.5, "explicit": 0.8, "adaptive": 0.6}
 """Error of a history over its difference to the companion. Expected where steps are short: 1, 1/3 and 1/3. Measured on
 the dovetail: 0.6 to 1.3, 0.2 to 0.9, 0.05 to 0.4."""
 
-NEAR = 0.75
+NEAR = 0.5
 """Share of the cycle count: histories that differ by when something happens cross each other, and where they do their
-difference is small and says nothing. It is the largest one from this share of the count to as much beyond it (measured
-on the dovetail, 211.25 Hz, steps of 2000 cycles: without it a quarter of the true error at the crossing)."""
+difference is small and says nothing. It is the largest one since this share of the count (measured on the dovetail,
+211.25 Hz, steps of 2000 cycles: without it a quarter of the true error at the crossing). What comes later has no part
+in it, so that an error does not depend on how far a study goes."""
 
 _CARRIED = ("_kept", "_last", "_local", "_truncation", "_pair_truncation")
 
@@ -156,12 +158,14 @@ class Recorder:
         iterations: int,
         run_time: float,
         companion: FloatArray,
+        met: Sequence[tuple[float, float]] = (),
         start_share: float = 0.0,
     ) -> WearHistory:
         """The history as far as it was computed.
 
-        companion (n_output, n_contact): m, depths of the coarser history, NaN at counts that it has not come to.
-        start_share: error of the wear rates of the start state, which is at least that of what they wear.
+        companion (n_output, n_contact): m, depths of the coarser history, NaN at counts that it has not come to. met:
+        counts at which it has come to the history, and how much both differ there, m3. start_share: error of the wear
+        rates of the start state, which is at least that of what they wear.
         """
         kept, area = dict(self._kept), self.model.contact.area
         local, truncation, of_pairs = (kept.pop(name) for name in ("local", "truncation", "pair_truncation"))
@@ -170,7 +174,8 @@ class Recorder:
         # rates that are all wrong by one share are those of another time: this counts where the wear rises steeply
         late = np.divide(self.cycles * kept["wear_rate"], volume, out=np.ones_like(volume), where=volume > 0.0)
         # in the first steps both histories are wrong by the same, which only the rates at their ends show
-        differs = np.fmax(_nearby(self.cycles, difference @ area), start_share * volume)
+        differs = np.fmax(difference @ area, SAFETY[self.scheme] * _before(self.cycles, met))
+        differs = np.fmax(differs, start_share * volume)
         error = np.fmax(differs, local) + truncation * np.fmax(late, 1.0)
         relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
         relative[np.isnan(volume)] = np.nan
@@ -200,10 +205,11 @@ def _held(difference: FloatArray) -> FloatArray:
     return held
 
 
-def _nearby(cycles: FloatArray, values: FloatArray) -> FloatArray:
-    """Largest of the values (n_output,) at counts near to each; NaN where there is none."""
-    first, last = np.searchsorted(cycles, NEAR * cycles, "left"), np.searchsorted(cycles, cycles / NEAR, "right")
-    return np.array([np.fmax.reduce(values[one:other]) for one, other in zip(first, last, strict=True)])
+def _before(cycles: FloatArray, met: Sequence[tuple[float, float]]) -> FloatArray:
+    """Largest of the differences met since a share of each count; 0 where there is none."""
+    at, differences = (np.array(values, dtype=float) for values in (zip(*met, strict=True) if met else ((), ())))
+    first, last = np.searchsorted(at, NEAR * cycles, "left"), np.searchsorted(at, cycles, "right")
+    return np.array([differences[one:other].max(initial=0.0) for one, other in zip(first, last, strict=True)])
 
 
 def depth_within(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import builtins
 import contextlib
-import pickle
 from typing import Any
 
-_FAULTS = (OSError, MemoryError, EOFError, ImportError, pickle.UnpicklingError)
+_FAULTS = (OSError, MemoryError, EOFError, ImportError)
+# the last two by name: what numba raises where its cache is cut off, and numpy where memory is not there
 _NAMES = frozenset(
     kind.__name__ for kind in vars(builtins).values() if isinstance(kind, type) and issubclass(kind, _FAULTS)
 ) | {"UnpicklingError", "_ArrayMemoryError"}
@@ -19,7 +19,7 @@ class MachineFaultError(Exception):
 
 def is_fault_of_machine(error: BaseException) -> bool:
     """Whether an error says something of the machine."""
-    return isinstance(error, (MachineFaultError, *_FAULTS))
+    return isinstance(error, (MachineFaultError, *_FAULTS)) or type(error).__name__ in _NAMES
 
 
 def tells_of_machine(message: str) -> bool:

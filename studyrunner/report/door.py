@@ -7,6 +7,7 @@ than a label. What the report does not draw is left outside.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -158,7 +159,7 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
         raise _WrongError(name, f"dimensions {variable.dims}")
     if variable.dtype.kind not in "iuf":
         texts = _texts(variable, name)
-        if name in COORDINATES and name not in _TEXTS and not set(texts.values.tolist()) <= {"auto"}:
+        if name in COORDINATES and name not in _TEXTS and not all(map(_is_choice, texts.values.tolist())):
             raise _WrongError(name, "texts in place of numbers")
         return texts
     if name in ("scheme", "sweep"):
@@ -166,6 +167,11 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
     if not np.isfinite(variable.values).all():
         raise _WrongError(name, "a value that is no finite number")
     return xr.Variable((name,), variable.values, _attributes(variable))
+
+
+def _is_choice(text: str) -> bool:
+    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
+    return text == "auto" or re.fullmatch(r"[0-9.e+-]{1,32}", text) is not None
 
 
 def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:

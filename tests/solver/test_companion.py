@@ -15,7 +15,7 @@ from solver.history import StartState, WearHistory
 from solver.march import march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.record import _nearby
+from solver.record import _before
 from solver.settings import Scheme, SolverSettings
 from solver.trajectory import Trajectory
 from tests.references import slider_amplitude, slider_wear_depth
@@ -140,15 +140,16 @@ def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive(monkeypa
     assert np.array_equal(history.worn_volume, usual.worn_volume)
 
 
-def test_histories_that_cross_are_wrong_by_what_they_differ_nearby() -> None:
+def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
     cycles = np.linspace(0.0, 10.0, 11)
-    difference = np.abs(cycles - 6.0)
-    difference[9:] = np.nan
-    error = _nearby(cycles, difference)
-    assert error[6] == 2.0
-    assert error[0] == difference[0]
-    assert (error >= np.nan_to_num(difference)).all()
-    assert np.isnan(_nearby(cycles, np.full(11, np.nan))).all()
+    met = [(float(at), abs(float(at) - 6.0)) for at in np.arange(0.5, 8.0, 0.5)]
+    error = _before(cycles, met)
+    assert error[0] == 0.0
+    assert error[6] == 3.0
+    assert error[10] == 1.5
+    # what comes later changes nothing
+    assert np.array_equal(_before(cycles[:6], met[:10]), error[:6])
+    assert (_before(cycles, []) == 0.0).all()
 
 
 def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkeypatch: pytest.MonkeyPatch) -> None:

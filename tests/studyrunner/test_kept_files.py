@@ -142,7 +142,7 @@ def test_a_file_of_something_else_is_not_overwritten(
     assert main(SMALL) == 2
     line = capsys.readouterr().err
     assert line.startswith('run-study: command line: -o = "')
-    assert 'out.nc": remove the file or give another name: it is no result of run-study' in line
+    assert ": remove the file or give another name: it is no result of run-study" in line
     assert len(line.splitlines()) == 1
     assert Path("out.nc").read_bytes() == before
     assert solver.tasks == []

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studyrunner.part_files import KEY
 from studyrunner.records import empty_record, failed_result, pack, record_type
-from studyrunner.store import KEY
 from studyrunner.study_file import read_study
 from studyrunner.tasks import build_tasks
 from studyrunner.variables import KEPT
