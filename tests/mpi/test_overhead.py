@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,20 @@ import pytest
 from tests.benchmarks.overhead import run, spent_on_points
 
 N_POINTS = 10_000
-MILLISECONDS = 0.5
+MILLISECONDS = 0.6
+"""Of the processor of rank 0, a point (measured: 0.44 to 0.46), on a machine that takes `UNIT` for a loop in Python."""
+UNIT = 14.0
+
+
+def unit() -> float:
+    """Milliseconds of this processor for a fixed piece of work in Python, the least of some tries."""
+    tries = []
+    for _ in range(7):
+        began, texts = time.thread_time(), {}
+        for number in range(100_000):
+            texts[number & 1023] = str(number)
+        tries.append(1e3 * (time.thread_time() - began))
+    return min(tries)
 
 
 def test_ten_thousand_trivial_points_cost_little_time(tmp_path: Path) -> None:
@@ -17,16 +31,17 @@ def test_ten_thousand_trivial_points_cost_little_time(tmp_path: Path) -> None:
 
     The least of some tries counts: what else runs here can only add to it.
     """
+    limit = MILLISECONDS * max(1.0, unit() / UNIT)
     tries = []
     for attempt in range(6):
         folder = tmp_path / str(attempt)
         folder.mkdir()
         spent = spent_on_points(4, N_POINTS, folder)
         tries.append(1e3 * spent.of_rank_0 / N_POINTS)
-        if tries[-1] < MILLISECONDS:
+        if tries[-1] < limit:
             break
     print(f"{N_POINTS} trivial points on 4 ranks: {min(tries):.3f} ms a point; rank 0 grows by {spent.memory:.0f} MiB")
-    assert min(tries) < MILLISECONDS
+    assert min(tries) < limit
     assert spent.memory < 1e-2 * N_POINTS
 
 
