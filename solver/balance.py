@@ -40,6 +40,11 @@ class Balance:
     wear_depth: FloatArray
     wear_gain: FloatArray
 
+    @classmethod
+    def frozen(cls, joint: Joint, history: FloatArray, wear_depth: FloatArray) -> Balance:
+        """The wear is held: the depths do not depend on the motion."""
+        return cls(joint, history, wear_depth, np.zeros_like(wear_depth))
+
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
         """Predicted force (n_rel, m), N, that gives a motion, m, and contact force, N, (n_contact, 3, m) of a state."""
         motion = displacement_h.copy()

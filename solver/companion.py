@@ -53,8 +53,7 @@ class Companion:
     start_share: difference of the wear rates of both start states, pair by pair, over that of the joint: a later state
     that happens to be the same does not make the start better known. met: counts at which it has come to the history,
     and the difference of both there, as volume of all pairs, m3. waiting: steps of the history that it has still to
-    follow. followed: harmonics and samples of the history for which
-    its own were chosen.
+    follow. followed: harmonics and samples of the history for which its own were chosen.
     """
 
     def __init__(self, main: Trajectory, start: StartState, cycles: FloatArray) -> None:
@@ -65,8 +64,8 @@ class Companion:
         self.effort = self.way.effort
         self.way.bounded = False
         self.cycles = cycles
-        self.kept = np.full((cycles.size, main.still.size), np.nan)
-        self.offset = np.zeros_like(main.still)
+        self.kept = np.full((cycles.size, main.slip_work_error.size), np.nan)
+        self.offset = np.zeros_like(main.slip_work_error)
         self.start_share = 0.0
         self.met: list[tuple[float, float]] = []
         self.waiting = 0

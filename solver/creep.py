@@ -76,4 +76,4 @@ class _Moving:
     def at(self, share: float, _: FloatArray) -> Balance:
         """Balance at a share of the way."""
         moved = self.history + share * self.way
-        return Balance(self.joint, moved, self.wear_depth, np.zeros_like(self.wear_depth))
+        return Balance.frozen(self.joint, moved, self.wear_depth)

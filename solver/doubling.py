@@ -74,7 +74,7 @@ def linearise_over_two(model: ReducedModel, joint: Joint, evaluation: Evaluation
         structure=build_structure(model, omega, joint.excitation_amplitude, orders),
         basis=build_basis(orders, 2 * joint.basis.n_samples),
     )
-    balance = Balance(longer, evaluation.history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
+    balance = Balance.frozen(longer, evaluation.history, evaluation.wear_depth)
     doubled = tuple(2 * order for order in joint.basis.orders)
     return balance.linearise(balance.evaluate(change_orders(evaluation.predicted_h, doubled, orders)))
 

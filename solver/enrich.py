@@ -76,7 +76,7 @@ def start_with_tail(
     that the samples have.
     """
     history = carried_history(evaluation, old, joint.penalty.inertial if inertial is None else inertial, joint)
-    balance = Balance(joint, history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
+    balance = Balance.frozen(joint, history, evaluation.wear_depth)
     orders = joint.basis.orders
     force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
     motion_h, force_h = (
@@ -120,4 +120,4 @@ class _Way:
             mixed[self.new] = np.linalg.inv((1.0 - share) * self.penalty_compliance + share * self.compliance)
             structure = replace(structure, dynamic_stiffness=mixed)
         joint = replace(self.joint, structure=structure)
-        return Balance(joint, self.history, self.wear_depth, np.zeros_like(self.wear_depth))
+        return Balance.frozen(joint, self.history, self.wear_depth)

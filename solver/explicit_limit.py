@@ -54,4 +54,4 @@ def explicit_step_limit(balance: Balance, at: Evaluation, wear_per_work: FloatAr
 
 def balance_without_wear(balance: Balance, at: Evaluation) -> Balance:
     """The balance of a state at its wear depth, held."""
-    return Balance(balance.joint, at.history, at.wear_depth, np.zeros_like(at.wear_depth))
+    return Balance.frozen(balance.joint, at.history, at.wear_depth)

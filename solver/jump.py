@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from solver.arc import follow_arc
 from solver.balance import Balance
 from solver.joint import Case, Joint
@@ -36,11 +34,10 @@ def landings(
     if outcome is Outcome.ADRIFT:
         yield outcome
         return
-    idle = np.zeros_like(worn)
     before = last.evaluation.wear_depth
 
     def balance_at(omega: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(omega, joint.excitation_amplitude), history, before, idle)
+        return Balance.frozen(case.joint(omega, joint.excitation_amplitude), history, before)
 
     def stays(point: PathPoint) -> bool:
         return is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), solver)

@@ -58,7 +58,7 @@ def transfer(
     """
     was = joint.penalty.inertial if inertial is None else inertial
     history = carried_history(evaluation, old_orders, was, joint)
-    balance = Balance(joint, history, evaluation.wear_depth, np.zeros_like(evaluation.wear_depth))
+    balance = Balance.frozen(joint, history, evaluation.wear_depth)
     orders = case.resolution.orders
     return balance, balance.predict(
         change_orders(evaluation.displacement_h, old_orders, orders),

@@ -37,11 +37,10 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
     of the one before. The first evaluation lets the pairs stick. Steps that Newton's method does not find are found by
     way of less friction (`friction_path`).
     """
-    idle = np.zeros(joint.contact.n_contact)
     solver = JacobianSolver()
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
-        return Balance(static_joint(joint, load_factor), history, wear_depth, idle)
+        return Balance.frozen(static_joint(joint, load_factor), history, wear_depth)
 
     history = np.zeros((joint.contact.n_contact, 2))
     first = balance_at(1.0 / LOAD_STEPS, history)
@@ -88,14 +87,13 @@ def solve_first_state(
     omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
     """
     tolerance = case.settings.tolerance
-    idle = np.zeros_like(wear_depth)
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, wear_depth, tolerance, effort)
     if static is None:
         return Outcome.STATIC_FAILED, None
 
     def balance_at(share: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(omega, share * excitation_amplitude), history, wear_depth, idle)
+        return Balance.frozen(case.joint(omega, share * excitation_amplitude), history, wear_depth)
 
     unstable = False
 
@@ -127,7 +125,7 @@ def solve_first_state(
         if stays(slid):
             return Outcome.CONVERGED, slid
     for share in RELIEF:
-        relieved = Balance(quiet, _relieved(quiet, static, share), wear_depth, idle)
+        relieved = Balance.frozen(quiet, _relieved(quiet, static, share), wear_depth)
         result = solve_balance(relieved, start, solver, tolerance, effort)
         if result.converged:
             held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))

@@ -54,7 +54,7 @@ class Route:
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
         unworn = np.zeros(self.case.model.contact.n_contact)
-        return Balance(self.joint_at(parameter), history, unworn, unworn)
+        return Balance.frozen(self.joint_at(parameter), history, unworn)
 
     def scale(self, parameter: float) -> float:
         """What lengths are shares of."""

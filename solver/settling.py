@@ -172,14 +172,13 @@ def settle(
     """
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
-    idle = np.zeros_like(wear_depth)
     predicted = start.predicted_h
     period = 2.0 * np.pi / joint.omega
     length, tried, failures = 1.0, np.inf, 0
     size = float(np.abs(start.displacement_h).max())
     for _ in range(MOST_STEPS):
         inverse = 1.0 / (length * period)
-        balance = Balance(transient.step(motion, inverse), history, wear_depth, idle)
+        balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         tolerance = max(STEP_TOLERANCE, case.settings.tolerance)
         result = solve_balance(balance, predicted, solver, tolerance, effort, 12)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
@@ -219,7 +218,7 @@ def _periodic(
     effort: Effort,
 ) -> PathPoint | None:
     """Stable periodic state from a motion that has settled."""
-    balance = Balance(joint, history, wear_depth, np.zeros_like(wear_depth))
+    balance = Balance.frozen(joint, history, wear_depth)
     result = solve_balance(balance, predicted, solver, case.settings.tolerance, effort, 10)
     if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
         return None

@@ -36,6 +36,7 @@ from solver.response import StateReport, report_state
 from solver.settings import Scheme
 from solver.stability import is_stable
 from solver.step_size import check_step
+from solver.wear_step import held_wear, implicit_wear
 
 RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
 SMALLEST_RESOLUTION = 2.0**-10  # of a step
@@ -73,7 +74,6 @@ class Trajectory:
         self.effort = Effort()
         self.cycle = 0.0
         self.jump_cycle = float("nan")
-        self.still = np.zeros(self.case.model.contact.n_contact)
         self.last_change: tuple[float, FloatArray] | None = None
         self.unresolved = 0.0
         self.jumps = 0
@@ -85,7 +85,7 @@ class Trajectory:
         self.rates = WearRates(self.case.model.contact.n_contact + 1)
         self.largest_rate = 0.0
         self.estimate = Estimate(self.start.response_error, self.start.wear_rate_error)
-        self.slip_work_error = np.zeros_like(self.still)
+        self.slip_work_error = np.zeros(self.case.model.contact.n_contact)
         self.certificate: Certificate | None = None
         self.accurate = self.start.outcome is Outcome.CONVERGED
         # the first count at which it was not, and the largest errors from there on
@@ -118,7 +118,7 @@ class Trajectory:
         """Take up the unworn state: it is evaluated, not solved again."""
         state = self.start.state
         assert state is not None
-        balance = Balance(self.joint, state.start_history, state.wear_depth, self.still)
+        balance = Balance.frozen(self.joint, state.start_history, state.wear_depth)
         predicted = balance.predict(state.displacement_h, state.contact_force_h)
         evaluation = balance.evaluate(predicted)
         self.point = PathPoint(0.0, evaluation, final_history(balance, evaluation))
@@ -183,7 +183,7 @@ class Trajectory:
 
     def _compare_pairs(self) -> None:
         """What the slip work of each pair is wrong by; nothing where nothing wears."""
-        self.slip_work_error = np.zeros_like(self.still)
+        self.slip_work_error = np.zeros_like(self.slip_work_error)
         if self.wears():
             self.slip_work_error = slip_work_error(self.case, self.joint, self.point, self.effort)
 
@@ -213,8 +213,7 @@ class Trajectory:
         length = reach - self.cycle
         balance_at = self._step(length)
         base = PathPoint(0.0, self.point.evaluation, self.point.history)
-        found = self._extrapolated(balance_at(1.0, base.history), length)
-        if found is not None:
+        if (found := self._extrapolated(balance_at(1.0, base.history), length)) is not None:
             self.take(PathPoint(1.0, found, base.history), balance_at, length)
             return True
         # the end of a branch is to be known to a share of the count; in the first step to that of the step
@@ -261,7 +260,7 @@ class Trajectory:
                 self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
                 break
             # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
-            balance_at = self._held(landed.evaluation.wear_depth, worn)
+            balance_at = held_wear(self.joint, landed.evaluation.wear_depth, worn)
             start = PathPoint(0.0, landed.evaluation, landed.history)
             point, arrived = follow_naturally(
                 balance_at, start, 1.0, self.solver, self.case.settings.tolerance, self.effort, keep_history=True
@@ -295,14 +294,14 @@ class Trajectory:
 
     def is_stable(self, evaluation: Evaluation) -> bool:
         """Whether a state is stable with its wear held."""
-        held = Balance(self.joint, evaluation.history, evaluation.wear_depth, self.still)
+        held = Balance.frozen(self.joint, evaluation.history, evaluation.wear_depth)
         return is_stable(held.linearise(evaluation), self.solver)
 
     def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
         """Make the state at a share of a step the current one. Raises StepTooLongError."""
-        before, ahead = self.point.evaluation, point.parameter * length
+        ahead = point.parameter * length
         if self.bounded:
-            check_step(self.joint, before, point.evaluation.wear_depth, self.cycle, ahead)
+            check_step(self.joint, self.point.evaluation, point.evaluation.wear_depth, self.cycle, ahead)
         balance = balance_at(point.parameter, self.point.history)
         self.accept(PathPoint(0.0, point.evaluation, final_history(balance, point.evaluation)), ahead)
 
@@ -324,35 +323,16 @@ class Trajectory:
         moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
         self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
         if np.isnan(self.step_limit) and self.wears():
-            balance = Balance(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth, self.still)
+            balance = Balance.frozen(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth)
             per_work = self.wear_coefficient / self.joint.contact.area
             self.step_limit = explicit_step_limit(balance, self.point.evaluation, per_work, self.solver)
 
     def _step(self, length: float) -> BalanceAt:
-        return self._explicit(length) if self.scheme == "explicit" else self._implicit(length)
-
-    def _held(self, before: FloatArray, after: FloatArray) -> BalanceAt:
-        def balance_at(share: float, history: FloatArray) -> Balance:
-            return Balance(self.joint, history, before + share * (after - before), self.still)
-
-        return balance_at
-
-    def _explicit(self, length: float) -> BalanceAt:
-        before, grown = self.point.evaluation.wear_depth, length * self.rate()
-
-        def balance_at(share: float, history: FloatArray) -> Balance:
-            return Balance(self.joint, history, before + share * grown, self.still)
-
-        return balance_at
-
-    def _implicit(self, length: float) -> BalanceAt:
+        """Where a step of this length leads, Eqs. (21) and (24)."""
         before = self.point.evaluation.wear_depth
-        gain = length * self.wear_coefficient / self.joint.contact.area
-
-        def balance_at(share: float, history: FloatArray) -> Balance:
-            return Balance(self.joint, history, before, share * gain)
-
-        return balance_at
+        if self.scheme == "explicit":
+            return held_wear(self.joint, before, before + length * self.rate())
+        return implicit_wear(self.joint, before, length * self.wear_coefficient / self.joint.contact.area)
 
     def predicted(self, balance: Balance, length: float) -> FloatArray:
         """Predicted force (n_rel, m), N, to begin a step with: extrapolated over the last step, or that of now."""

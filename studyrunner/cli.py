@@ -7,25 +7,17 @@ import studyrunner.search_path  # noqa: F401 - where all others are looked for
 # isort: split
 import argparse
 import os
-import signal
 import sys
 import time
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.ranks import (
-    POLL_SECONDS,
-    LauncherError,
-    Ranks,
-    job_size,
-    launcher_rank,
-    start_ranks,
-    wait_for_message,
-)
+from studyrunner.endings import take_endings
+from studyrunner.launcher import LauncherError, job_size, launcher_rank
+from studyrunner.ranks import POLL_SECONDS, Ranks, start_ranks, wait_for_message
 from studyrunner.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
 
@@ -34,9 +26,6 @@ if TYPE_CHECKING:
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit statuses."""
-
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
-"""Signals that end a run: Ctrl-C, the end of a job's time, of a terminal, and what batch systems send before that."""
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -147,9 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
-    for number in _ENDING:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _interrupt)
+    take_endings()
     try:
         ranks = start_ranks()
     except LauncherError as error:
@@ -206,13 +193,6 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
             return True
         time.sleep(POLL_SECONDS)
     return False
-
-
-def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    """Ends the run in good order; the same signal again, or another one, does not disturb that."""
-    for again in _ENDING:
-        signal.signal(again, signal.SIG_IGN)
-    raise KeyboardInterrupt
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:

@@ -6,19 +6,24 @@ MPI come from the main thread, so that any MPI library will do (MPI_THREAD_FUNNE
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import faulthandler
 import os
 import signal
 import sys
 import time
 import warnings
-from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn, Protocol
+
+from studyrunner.launcher import (
+    LauncherError,
+    has_launcher,
+    launcher_rank,
+    launcher_size,
+    load_packaged_library,
+)
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -37,25 +42,10 @@ _SECONDS_TO_START = 120.0
 
 _SECONDS_TO_MISS_RANK_0 = 0.5
 
-_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
-_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
-_JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
-_SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _REMEDY = (
     "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
     " the site's MPI"
 )
-
-
-_PACKAGED_LIBRARIES = (
-    *("libucm.so.0", "libucs.so.0", "libuct.so.0", "libucp.so.0", "libfabric.so.1"),
-    "libmpi.so.12",
-)
-"""Files of the package mpich, each after those that it depends on."""
-
-
-class LauncherError(Exception):
-    """The launcher started several processes that cannot talk to each other: each would compute the whole study."""
 
 
 class Ranks(Protocol):
@@ -125,7 +115,7 @@ class MpiRanks:
     def __init__(self) -> None:
         import mpi4py
 
-        _load_packaged_library()
+        load_packaged_library()
         # Started and ended here rather than by the import: the launcher is compared with the library before.
         mpi4py.rc(initialize=False, finalize=False)
         from mpi4py import MPI
@@ -281,7 +271,7 @@ def start_ranks() -> Ranks:
 
     Raises LauncherError where the launcher started more processes than the MPI library knows of.
     """
-    if not any(name in os.environ for name in _SIGNS):
+    if not has_launcher():
         return Alone()
     announced = launcher_size()
     try:
@@ -304,48 +294,8 @@ def _survives_losses() -> bool:
     return version >= (4, 1)
 
 
-def _load_packaged_library() -> None:
-    """Loads the MPI library that is installed as a Python package, where there is one, with what it depends on.
-
-    mpi4py looks for that library first. Its own dependencies, however, are searched in LD_LIBRARY_PATH first, which may
-    lead to those of another MPI on the machine; loaded from their places before, they are taken from there.
-    """
-    if "MPI4PY_LIBMPI" in os.environ or sys.platform != "linux":
-        return
-    try:
-        files = metadata.files("mpich") or []
-    except metadata.PackageNotFoundError:
-        return
-    for name in _PACKAGED_LIBRARIES:
-        for file in files:
-            if file.name == name:
-                # Where this fails, mpi4py looks for a library on its own, and says so where it finds none.
-                with contextlib.suppress(OSError):
-                    ctypes.CDLL(str(file.locate()), mode=os.RTLD_LAZY | os.RTLD_LOCAL)
-
-
 def wait_for_message(ranks: Ranks) -> object:
     """The next message, whenever it comes; for ranks that have nothing else to do."""
     while (received := ranks.receive()) is None:
         time.sleep(POLL_SECONDS)
     return received[1]
-
-
-def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of this process as the launcher counts, 0 without one; known without MPI."""
-    return max(_count(environment, name) for name in _RANKS)
-
-
-def launcher_size(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of processes that the launcher says it started, 0 where none says so."""
-    return max(_count(environment, name) for name in _SIZES)
-
-
-def job_size(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of processes that a batch system has room for, where no launcher has started them; 0 if unknown."""
-    return 0 if launcher_size(environment) else max(_count(environment, name) for name in _JOBS)
-
-
-def _count(environment: Mapping[str, str], name: str) -> int:
-    text = environment.get(name, "")
-    return int(text) if text.isdecimal() else 0

@@ -9,7 +9,8 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from studyrunner.ranks import POLL_SECONDS, LauncherError, Ranks
+from studyrunner.launcher import LauncherError
+from studyrunner.ranks import POLL_SECONDS, Ranks
 
 SECONDS_TO_ANSWER = 60.0
 """All ranks have started when the first one asks; one that runs an older version never answers."""

@@ -17,6 +17,7 @@ from typing import Generic, TypeVar
 
 from studyrunner.costs import LearnedCosts
 from studyrunner.dispatch import Assignment, Dispatcher, Work
+from studyrunner.endings import ignore_endings
 from studyrunner.ranks import POLL_SECONDS, Ranks, wait_for_message
 
 SECONDS_TO_PROGRESS = 5.0
@@ -195,6 +196,7 @@ def serve_tasks(
             keep(dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
+            ignore_endings()
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")

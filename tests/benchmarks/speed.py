@@ -71,7 +71,7 @@ def iteration_at(model: ReducedModel, start: StartState, settings: SolverSetting
     assert state is not None
     case = build_case(model, FRICTION, start.penalty_omega, settings)
     joint = case.joint(state.omega, state.excitation_amplitude)
-    balance = Balance(joint, state.start_history, state.wear_depth, np.zeros(model.contact.n_contact))
+    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
     predicted = balance.predict(state.displacement_h, state.contact_force_h)
     solver = JacobianSolver()
 

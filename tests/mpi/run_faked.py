@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from studyrunner import progress, run, schedule
 from studyrunner.cli import main
-from studyrunner.ranks import launcher_rank
+from studyrunner.launcher import launcher_rank
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.scene import describe_scene
 from studyrunner.tasks import BranchTask, MarchTask

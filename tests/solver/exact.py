@@ -112,7 +112,7 @@ def first_found(exact: ExactState, case: Case, effort: Effort) -> PathPoint:
         return point
 
     def balance_at(omega: float, history: np.ndarray) -> Balance:
-        return Balance(case.joint(omega, exact.amplitude), history, idle, idle)
+        return Balance.frozen(case.joint(omega, exact.amplitude), history, idle)
 
     tolerance, solver = case.settings.tolerance, JacobianSolver()
     at = PathPoint(begin, point.evaluation, point.history)

@@ -89,7 +89,7 @@ def test_dense_of_some_pairs_is_a_block_of_the_whole() -> None:
 
 def test_wear_is_a_change_of_rank_one_of_the_columns_of_a_pair() -> None:
     worn, predicted = case("3d", 0, wear=True)
-    unworn = Balance(worn.joint, worn.history, worn.wear_depth, np.zeros_like(worn.wear_gain))
+    unworn = Balance.frozen(worn.joint, worn.history, worn.wear_depth)
     with_wear, without = (
         balance.linearise(balance.evaluate(predicted)).dense(np.arange(4)) for balance in (worn, unworn)
     )
@@ -109,7 +109,7 @@ def test_predict_is_the_inverse_of_evaluate(kinds: str, wear: bool) -> None:
     balance, predicted = case(kinds, 5, wear)
     at = balance.evaluate(predicted)
     # what a state stores is its own depth; from there no wear is left to add
-    stored = Balance(balance.joint, balance.history, at.wear_depth, np.zeros_like(at.wear_depth))
+    stored = Balance.frozen(balance.joint, balance.history, at.wear_depth)
     back = stored.predict(at.displacement_h, at.force_h)
     assert back == pytest.approx(predicted, abs=1e-11 * np.abs(predicted).max())
     assert np.abs(stored.evaluate(back).residual - at.residual).max() < 1e-10 * np.abs(at.residual).max()
@@ -133,7 +133,7 @@ def mass_balance(free: str, seed: int, wear: bool, resolution: Resolution) -> tu
 def test_predict_is_the_inverse_for_masses_on_sliders(free: str, wear: bool, resolution: Resolution) -> None:
     balance, predicted = mass_balance(free, 6, wear, resolution)
     at = balance.evaluate(predicted)
-    stored = Balance(balance.joint, balance.history, at.wear_depth, np.zeros_like(at.wear_depth))
+    stored = Balance.frozen(balance.joint, balance.history, at.wear_depth)
     back = stored.predict(at.displacement_h, at.force_h)
     assert back == pytest.approx(predicted, abs=1e-10 * np.abs(predicted).max())
 
@@ -196,7 +196,7 @@ def test_residual_is_that_of_the_stiffness_matrices() -> None:
 
 def test_wear_opens_the_pairs_that_slip_by_gain_times_slip_work() -> None:
     balance, predicted = case("3d", 0, wear=True)
-    unworn = Balance(balance.joint, balance.history, balance.wear_depth, np.zeros(4))
+    unworn = Balance.frozen(balance.joint, balance.history, balance.wear_depth)
     worn_at, unworn_at = balance.evaluate(predicted), unworn.evaluate(predicted)
     assert np.array_equal(unworn_at.wear_depth, balance.wear_depth)
     assert worn_at.wear_depth == pytest.approx(
@@ -210,7 +210,7 @@ def test_wear_opens_the_pairs_that_slip_by_gain_times_slip_work() -> None:
 
 def test_a_gap_and_a_wear_depth_act_alike() -> None:
     balance, predicted = case("3d", 1, wear=False)
-    flat = Balance(balance.joint, balance.history, np.zeros(4), np.zeros(4))
+    flat = Balance.frozen(balance.joint, balance.history, np.zeros(4))
     difference = balance.evaluate(predicted).displacement_h - flat.evaluate(predicted).displacement_h
     assert difference[:, 0, 0] == pytest.approx(balance.wear_depth, rel=1e-9, abs=0.0)
     difference[:, 0, 0] = 0.0

@@ -28,7 +28,7 @@ def on_branch(
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
     assert start.state is not None
     joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(model.contact.n_contact))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     predicted = balance.predict(start.state.displacement_h, start.state.contact_force_h)
     return joint, balance.evaluate(predicted)
 
@@ -56,7 +56,7 @@ def vibro_impact(omega: float, n_harmonics: int, sweep: str = "up") -> tuple[Joi
     start = branch_states(model, 0.0, 0.02, omegas, settings)[-1]
     assert start.state is not None
     joint = build_case(model, 0.0, start.penalty_omega, settings).joint(omega, 0.02)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(1))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     return joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
 
 
@@ -96,7 +96,7 @@ def test_a_dovetail_state_that_slips_and_lifts_holds() -> None:
     start = branch_states(dovetail(), 0.5, 2.0, omegas, settings)[-1]
     assert start.state is not None
     joint = build_case(dovetail(), 0.5, start.penalty_omega, settings).joint(start.state.omega, 2.0)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(16))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
     assert {0, 1, 2} == set(np.unique(evaluation.status_t))
     certificate = certify(joint, evaluation)
@@ -129,7 +129,7 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
 
 def test_an_unconverged_force_is_caught_by_the_residual() -> None:
     for joint, evaluation in (slider(5), random_state(1)):
-        balance = Balance(joint, evaluation.history, evaluation.wear_depth, np.zeros(joint.contact.n_contact))
+        balance = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
         noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
         size = np.abs(evaluation.predicted_h).max()
         assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + 1e-5 * size * noise))

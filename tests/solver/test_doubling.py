@@ -42,7 +42,7 @@ def state_of(drawn: Scene, start: StartState) -> tuple[Case, Joint, Evaluation]:
     assert start.state is not None
     case = build_case(drawn.model, drawn.friction, start.penalty_omega, SETTINGS, start.resolution)
     joint = case.joint(drawn.omega, drawn.excitation)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(1))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     return case, joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
 
 
@@ -109,7 +109,7 @@ def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega: float
     assert start.state is not None
     case = build_case(model, 0.0, start.penalty_omega, settings, start.resolution)
     joint = case.joint(omega, 0.02)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(1))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     at = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
     assert (at.status_t == SEPARATED).any()
     assert not (at.status_t == SEPARATED).all()

@@ -129,9 +129,8 @@ def judge_start(case: Case, start: StartState) -> None:
     assert (start.state is None) == (start.outcome is not Outcome.CONVERGED)
     if start.state is None:
         return
-    n_contact = case.model.contact.n_contact
     joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth, np.zeros(n_contact))
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
     certificate = certify(joint, evaluation)
     assert certificate.holds(case.settings.tolerance), certificate.sentence(case.settings.tolerance)

@@ -30,7 +30,7 @@ def wall(omega: float, n_harmonics: int = 5) -> tuple[BalanceAt, Callable[[float
     idle = np.zeros(1)
 
     def balance_at(amplitude: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(omega, amplitude), history, idle, idle)
+        return Balance.frozen(case.joint(omega, amplitude), history, idle)
 
     def first(amplitude: float) -> PathPoint:
         found = first_point(case, omega, amplitude, idle)
@@ -81,7 +81,7 @@ def upper_branch_size(amplitude: float) -> float:
     idle = np.zeros(1)
 
     def balance_at(omega: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(omega, amplitude), history, idle, idle)
+        return Balance.frozen(case.joint(omega, amplitude), history, idle)
 
     found = first_point(case, 0.9, amplitude, idle)
     point = PathPoint(0.9, found.evaluation, found.history)
@@ -143,7 +143,7 @@ def test_history_is_handed_on_or_kept() -> None:
     idle = np.zeros(2)
 
     def balance_at(amplitude: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(OMEGA, amplitude), history, idle, idle)
+        return Balance.frozen(case.joint(OMEGA, amplitude), history, idle)
 
     found = first_point(case, OMEGA, 20.0, idle)
     start = PathPoint(20.0, found.evaluation, found.history)
@@ -166,7 +166,7 @@ def test_the_history_is_the_corrected_slip_at_the_end_of_the_period() -> None:
     model = random_model(2, ("3d", "constant_load"))
     case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
     joint = case.joint(OMEGA, 60.0)
-    balance = Balance(joint, np.full((2, 2), 1e-6), np.zeros(2), np.zeros(2))
+    balance = Balance.frozen(joint, np.full((2, 2), 1e-6), np.zeros(2))
     at = balance.evaluate(np.random.default_rng(3).normal(size=(joint.slots.size, 7)) * 100.0)
     expected = at.state_t[:, :, -1] / joint.penalty.tangential[:, None]
     assert final_history(balance, at) == pytest.approx(expected, rel=1e-15, abs=0.0)
@@ -176,7 +176,7 @@ def test_the_history_of_a_mass_on_a_slider_is_its_mean_position() -> None:
     case = build_case(scene("sdof_slider"), 0.5, 1000.0, SolverSettings(3, 64))
     joint = case.joint(1000.0, 10.0)
     assert joint.penalty.inertial.all()
-    balance = Balance(joint, np.array([[2e-5, 0.0]]), np.zeros(1), np.zeros(1))
+    balance = Balance.frozen(joint, np.array([[2e-5, 0.0]]), np.zeros(1))
     at = balance.evaluate(np.random.default_rng(4).normal(size=(joint.slots.size, 7)) * 10.0)
     assert np.array_equal(final_history(balance, at), at.displacement_h[:, 1:, 0])
 

@@ -205,7 +205,7 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
     omega = 2.0 * np.pi * 213.0
     joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(13), 128)).joint(omega, 5.0)
     idle = np.zeros(model.contact.n_contact)
-    balance = Balance(joint, np.zeros((model.contact.n_contact, 2)), idle, idle)
+    balance = Balance.frozen(joint, np.zeros((model.contact.n_contact, 2)), idle)
     predicted = joint.structure.force_h()
     predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.slots.size, 2))
     tangent = tangent_of(balance, predicted)

@@ -91,8 +91,7 @@ def residual_of(
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(model, scene.friction, omega, SETTINGS)
     joint = case.joint(omega, load * scene.amplitude)
-    idle = np.zeros(model.contact.n_contact)
-    balance = Balance(joint, length * evaluation.history, length * evaluation.wear_depth, idle)
+    balance = Balance.frozen(joint, length * evaluation.history, length * evaluation.wear_depth)
     predicted = balance.predict(length * evaluation.displacement_h, load * evaluation.force_h)
     other = balance.evaluate(predicted)
     return other.scaled_residual(), other
@@ -269,7 +268,7 @@ def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(replace(model, linear={0: turned}), scene.friction, omega, SETTINGS)
     other_joint = replace(case, penalty=joint.penalty).joint(omega, scene.amplitude)
-    balance = Balance(other_joint, history_m, at.wear_depth, np.zeros(len(dofs)))
+    balance = Balance.frozen(other_joint, history_m, at.wear_depth)
     other = balance.evaluate(balance.predict(displacement_h, force_h))
     assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
     # a pair that static load alone has brought to its limit slips by round-off

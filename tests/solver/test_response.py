@@ -230,8 +230,7 @@ def test_largest_distance_is_that_between_any_two_points() -> None:
 
 def test_a_stored_state_is_reproduced_without_an_iteration() -> None:
     joint, point, state = periodic("3d", 1)
-    idle = np.zeros(3)
-    balance = Balance(joint, state.start_history, state.wear_depth, idle)
+    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
     again = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     assert again.scaled_residual() <= 1.1 * SETTINGS.tolerance
     assert again.force_t == pytest.approx(point.evaluation.force_t, abs=1e-8)

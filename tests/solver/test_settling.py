@@ -33,7 +33,7 @@ def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: flo
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, idle, settings.tolerance, Effort())
     assert static is not None
-    still = Balance(quiet, static.history, idle, idle)
+    still = Balance.frozen(quiet, static.history, idle)
     at = static.evaluation
     orders = case.resolution.orders
     start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
@@ -66,7 +66,7 @@ def upper_state(case: Case, omega: float) -> PathPoint:
     """Vibro-impact on the branch with impacts."""
     state = converged_state(case.model, 0.0, FORCE, omega, case.settings)
     idle = np.zeros(1)
-    balance = Balance(case.joint(omega, FORCE), state.start_history, idle, idle)
+    balance = Balance.frozen(case.joint(omega, FORCE), state.start_history, idle)
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     assert np.abs(state.contact_force_h).max() > 1e-2
     return PathPoint(omega, at, state.start_history)
@@ -107,7 +107,7 @@ def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
     transient = Transient(case, joint)
     motion = transient.periodic(point.evaluation)
     for inverse in (1e-6 * OMEGA, 0.01 * OMEGA, OMEGA):
-        stepped = Balance(transient.step(motion, inverse), point.evaluation.history, idle, idle)
+        stepped = Balance.frozen(transient.step(motion, inverse), point.evaluation.history, idle)
         at = stepped.evaluate(point.evaluation.predicted_h)
         assert at.scaled_residual() < 1e-9
         after = transient.after(at, motion, inverse)
@@ -135,7 +135,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
         inverse = steps / end
         predicted = np.zeros((1, 5))
         for _ in range(steps):
-            balance = Balance(transient.step(motion, inverse), history, idle, idle)
+            balance = Balance.frozen(transient.step(motion, inverse), history, idle)
             result = solve_balance(balance, predicted, JacobianSolver(), 1e-10, Effort())
             assert result.converged
             predicted = result.evaluation.predicted_h

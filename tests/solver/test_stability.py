@@ -25,7 +25,7 @@ CASE = build_case(scene("vibro_impact"), 0.0, 1.55, SETTINGS)
 
 
 def balance_at(omega: float, history: FloatArray) -> Balance:
-    return Balance(CASE.joint(omega, FORCE), history, np.zeros(1), np.zeros(1))
+    return Balance.frozen(CASE.joint(omega, FORCE), history, np.zeros(1))
 
 
 @lru_cache

@@ -1,12 +1,14 @@
-"""A process that reads files of unknown origin, for the tests that have many of them read."""
+"""A folder of its own, a stand-in for the solver, and a process that reads files of unknown origin."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from studies import vetting
+from tests.studyrunner.faked_runs import Solver
 from tests.studyrunner.reading_process import ReadingProcess, reading_process
 
 
@@ -16,3 +18,16 @@ def reader() -> Iterator[ReadingProcess]:
     with reading_process() as process, pytest.MonkeyPatch.context() as patch:
         patch.setattr(vetting, "run_reader", process.read)
         yield process
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with nothing in it."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
+    """Stands for the solver in all runs of a test."""
+    return Solver(monkeypatch)

@@ -14,6 +14,15 @@ from tests.studyrunner.fakes import fake_evaluate
 
 Task = BranchTask | MarchTask
 
+SMALL = [
+    "sdof_slider",
+    *("--set", "axes.frequency=[100, 110]"),
+    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
+    *("--set", "axes.scheme=implicit"),
+    *("-o", "out.nc"),
+]
+"""A study of two start states and four histories."""
+
 
 class Solver:
     """A stand-in that counts what it does. disturb: called with each task and the number of its result."""

@@ -186,7 +186,7 @@ def test_a_result_of_an_interrupted_run_is_enough(slider: Path, monkeypatch: pyt
 
     with monkeypatch.context() as patch:
         patch.setattr(run, "run_tasks", ended)
-        patch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
+        patch.setattr("studyrunner.cli.take_endings", lambda: None)
         assert main(["slider.nc", "-o", "part.nc"]) == 130
     assert set(np.ravel(contents("part.nc").outcome)) != {0}
     assert main(["part.nc", "-o", "whole.nc"]) == 0

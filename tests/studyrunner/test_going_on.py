@@ -17,29 +17,13 @@ from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.results import Kept, MarchResult, StartResult
 from studyrunner.store import Store
 from studyrunner.tasks import BranchTask, MarchTask
-from tests.studyrunner.faked_runs import Solver, Task
+from tests.studyrunner.faked_runs import SMALL, Solver, Task
 from tests.studyrunner.fakes import fake_branch
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 N_POINTS, N_RESULTS = 8, 4 + 8
-SMALL = [
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110]"),
-    *("--set", "axes.sweep=['up', 'down']"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=implicit"),
-    *("-o", "out.nc"),
-]
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
-    return Solver(monkeypatch)
+TWO_WAYS = [*SMALL[:-2], "--set", "axes.sweep=['up', 'down']", *SMALL[-2:]]
 
 
 def load(name: str = "out.nc") -> xr.Dataset:
@@ -49,7 +33,7 @@ def load(name: str = "out.nc") -> xr.Dataset:
 
 def whole(solver: Solver) -> xr.Dataset:
     """The result of a run that nothing disturbs."""
-    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    assert main([*TWO_WAYS[:-1], "whole.nc"]) == 0
     solver.begin_again()
     return load("whole.nc")
 
@@ -75,13 +59,13 @@ def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.Captur
 
     solver.disturb = interrupt
     capsys.readouterr()
-    assert main(SMALL) == 130
+    assert main(TWO_WAYS) == 130
     n_there = assert_partial(load(), expected)
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == f"run-study: interrupted: out.nc holds {n_there} of {N_POINTS} points, the same command goes on"
     n_first = solver.n_results - 1
     solver.begin_again()
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     assert n_first + solver.n_results == N_RESULTS
     xr.testing.assert_identical(load(), expected)
     again = capsys.readouterr().err
@@ -110,10 +94,10 @@ def test_an_interrupt_anywhere_in_the_main_thread(
 
     with monkeypatch.context() as changed:
         changed.setattr(Store, where, called)
-        status = main(SMALL)
+        status = main(TWO_WAYS)
     assert status == (130 if n_calls >= at else 0)
     assert_partial(load(), expected)
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     xr.testing.assert_identical(load(), expected)
 
 
@@ -131,23 +115,23 @@ def test_an_interrupt_while_the_result_is_written(solver: Solver, monkeypatch: p
         return own(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(gather, "gather", interrupted)
-    assert main(SMALL) == 130
+    assert main(TWO_WAYS) == 130
     xr.testing.assert_identical(load(), expected)
     solver.begin_again()
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     assert solver.tasks == []
 
 
 def test_a_study_that_was_made_larger_holds_what_it_held_whenever_it_ends(solver: Solver) -> None:
     whole(solver)
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     before = load()
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     solver.disturb = interrupt
-    assert main([*SMALL[:-2], "--set", "axes.wear_coefficient=[5e-12, 3e-11, 1e-11]", "-o", "out.nc"]) == 130
+    assert main([*TWO_WAYS[:-2], "--set", "axes.wear_coefficient=[5e-12, 3e-11, 1e-11]", "-o", "out.nc"]) == 130
     assert int((load().outcome == 0).sum()) == N_POINTS
     xr.testing.assert_equal(load().sel(wear_coefficient=[5e-12, 1e-11]).worn_volume, before.worn_volume)
 
@@ -160,7 +144,7 @@ def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFix
             raise ZeroDivisionError("a bug in\nthe solver")
 
     solver.disturb = fail
-    assert main(SMALL) == 3
+    assert main(TWO_WAYS) == 3
     assert "1 x exception: The computation broke off with an error" in capsys.readouterr().out
     found = load()
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
@@ -172,11 +156,11 @@ def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFix
     xr.testing.assert_equal(found.worn_volume.where(good), expected.worn_volume.where(good))
     # another run does not try it again
     solver.begin_again()
-    assert main(SMALL) == 3
+    assert main(TWO_WAYS) == 3
     assert solver.tasks == []
     xr.testing.assert_identical(load(), found)
     # unless it is asked to
-    assert main([*SMALL, "--retry-failed"]) == 0
+    assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert len(solver.tasks) == 1
     xr.testing.assert_identical(load(), expected)
 
@@ -193,10 +177,10 @@ def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> N
 
     seen: dict[int, int] = {}
     solver.disturb = fail
-    assert main(SMALL) in (0, 3)
+    assert main(TWO_WAYS) in (0, 3)
     assert len(solver.tasks) == 2 + 8
     solver.begin_again()
-    assert main([*SMALL, "--retry-failed"]) == 0
+    assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert [type(task) for task in solver.tasks][:1] == [BranchTask]
     assert solver.n_results == 1 + 2 or solver.n_results == 1
     xr.testing.assert_identical(load(), expected)
@@ -204,10 +188,10 @@ def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> N
 
 def test_an_earlier_run_is_forgotten_where_asked_for(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
     expected = whole(solver)
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     n_tasks = len(solver.tasks)
     solver.begin_again()
-    assert main([*SMALL, "--fresh"]) == 0
+    assert main([*TWO_WAYS, "--fresh"]) == 0
     assert len(solver.tasks) == n_tasks
     assert "from an earlier run" not in capsys.readouterr().err
     xr.testing.assert_identical(load(), expected)
@@ -221,12 +205,12 @@ def test_a_second_run_of_the_same_study_is_refused(
     def run_again(_: Task, n_results: int) -> None:
         # signals are for the main thread
         if n_results == 1:
-            second.append(main(SMALL))
+            second.append(main(TWO_WAYS))
 
-    monkeypatch.setattr("studyrunner.cli.signal.signal", lambda *_: None)
+    monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
     monkeypatch.setattr("studyrunner.folder_lock._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
     assert "out.nc.parts: in use = by process" in line
@@ -247,7 +231,7 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(solver, "evaluate", slow)
     # each run comes as far as to the first half of one more march
-    assert [main(SMALL) for _ in range(9)] == [130] * 8 + [0]
+    assert [main(TWO_WAYS) for _ in range(9)] == [130] * 8 + [0]
     marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
     assert len(marches) == 8
     assert all(task.resume == Kept("half of it", (np.array([task.number]),)) for task in marches)
@@ -276,11 +260,11 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
                 keep(Kept("branch", (np.array(place + 1),)))
 
     monkeypatch.setattr(solver, "evaluate", resuming)
-    assert main(SMALL) == 130
+    assert main(TWO_WAYS) == 130
     assert list(Path("out.nc.parts").glob("*.progress"))
     for path in Path("out.nc.parts").glob("*.starts"):
         path.unlink()
-    assert main(SMALL) == 0
+    assert main(TWO_WAYS) == 0
     xr.testing.assert_identical(load(), expected)
 
 

@@ -12,30 +12,14 @@ import xarray as xr
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.provenance import POINTS_LEFT
-from tests.studyrunner.faked_runs import Solver, Task
+from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
-SMALL = [
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110]"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=implicit"),
-    *("--set", "solver.shortcuts=false"),
-    *("-o", "out.nc"),
-]
-VARIANT = [*SMALL, "--set", "axes.excitation_amplitude=11"]
-LARGER = [*SMALL, "--set", "axes.frequency=[100, 110, 120]"]
+pytestmark = pytest.mark.usefixtures("folder")
+
+APART = [*SMALL, "--set", "solver.shortcuts=false"]
+VARIANT = [*APART, "--set", "axes.excitation_amplitude=11"]
+LARGER = [*APART, "--set", "axes.frequency=[100, 110, 120]"]
 N_POINTS = 4
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
-    return Solver(monkeypatch)
 
 
 def interrupt(_: Task, n_results: int) -> None:
@@ -43,11 +27,11 @@ def interrupt(_: Task, n_results: int) -> None:
         raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("command", [VARIANT, LARGER, [*SMALL, "--fresh"]], ids=["variant", "larger", "fresh"])
+@pytest.mark.parametrize("command", [VARIANT, LARGER, [*APART, "--fresh"]], ids=["variant", "larger", "fresh"])
 def test_a_finished_result_is_not_replaced_by_less(
     command: list[str], solver: Solver, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     before = Path("out.nc").read_bytes()
     capsys.readouterr()
     solver.begin_again()
@@ -67,7 +51,7 @@ def test_a_finished_result_is_not_replaced_by_less(
 
 def test_an_unfinished_result_is_replaced_by_any(solver: Solver) -> None:
     solver.disturb = interrupt
-    assert main(SMALL) == 130
+    assert main(APART) == 130
     with xr.open_dataset("out.nc") as result:
         n_left = int((result.outcome == NOT_COMPUTED).sum())
         assert 0 < n_left <= N_POINTS
@@ -80,7 +64,7 @@ def test_an_unfinished_result_is_replaced_by_any(solver: Solver) -> None:
 
 
 def test_a_result_of_an_earlier_version_counts_as_finished(solver: Solver) -> None:
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     with h5py.File("out.nc", "r+") as file:
         del file.attrs[POINTS_LEFT]
     before = Path("out.nc").read_bytes()
@@ -91,9 +75,9 @@ def test_a_result_of_an_earlier_version_counts_as_finished(solver: Solver) -> No
 
 
 def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     assert main(VARIANT) == 0
-    for command in (SMALL, VARIANT):
+    for command in (APART, VARIANT):
         solver.begin_again()
         assert main(command) == 0
         assert solver.tasks == []
@@ -101,17 +85,17 @@ def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert solver.tasks == []
     assert main(VARIANT) == 0
     assert solver.tasks == []
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     assert len(solver.tasks) > N_POINTS
 
 
 def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     assert main([*VARIANT, "--fresh"]) == 0
     solver.begin_again()
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     assert solver.tasks == []
-    assert main([*SMALL, "--fresh"]) == 0
+    assert main([*APART, "--fresh"]) == 0
     assert len(solver.tasks) > N_POINTS
 
 
@@ -139,7 +123,7 @@ def test_a_file_of_something_else_is_not_overwritten(
     make(Path("out.nc"))
     before = Path("out.nc").read_bytes()
     capsys.readouterr()
-    assert main(SMALL) == 2
+    assert main(APART) == 2
     line = capsys.readouterr().err
     assert line.startswith('run-study: command line: -o = "')
     assert ": remove the file or give another name: it is no result of run-study" in line
@@ -150,7 +134,7 @@ def test_a_file_of_something_else_is_not_overwritten(
 
 def test_an_empty_file_is_nobodys(solver: Solver) -> None:
     Path("out.nc").touch()
-    assert main(SMALL) == 0
+    assert main(APART) == 0
 
 
 def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Path) -> None:
@@ -160,7 +144,7 @@ def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Pat
     for name in (".out.nc.notes.partial", ".other.nc.4711.partial"):
         Path(name).touch()
     Path(".out.nc.99.partial").symlink_to(".other.nc.4711.partial")
-    assert main(SMALL) == 0
+    assert main(APART) == 0
     left = {path.name for path in folder.iterdir()}
     foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
     assert left == {"out.nc", "out.nc.parts", *foreign}

@@ -21,15 +21,10 @@ from studyrunner.dispatch import Dispatcher
 from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.machine_faults import is_fault_of_machine, tells_of_machine
 from studyrunner.tasks import BranchTask, MarchTask
-from tests.studyrunner.faked_runs import Solver, Task
+from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
-SMALL = [
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110]"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=implicit"),
-    *("-o", "out.nc"),
-]
+pytestmark = pytest.mark.usefixtures("folder")
+
 FAULTS = [
     OSError(122, "Disk quota exceeded"),
     MemoryError(),
@@ -37,17 +32,6 @@ FAULTS = [
     EOFError("Ran out of input"),
     PermissionError(13, "Permission denied"),
 ]
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def solver(monkeypatch: pytest.MonkeyPatch) -> Solver:
-    return Solver(monkeypatch)
 
 
 def load() -> xr.Dataset:

@@ -12,7 +12,8 @@ import pytest
 
 from studyrunner.costs import LearnedCosts
 from studyrunner.dispatch import Assignment
-from studyrunner.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
+from studyrunner.launcher import LauncherError, launcher_rank, launcher_size
+from studyrunner.ranks import Alone, start_ranks
 from studyrunner.schedule import _Delivery, serve_tasks
 
 
