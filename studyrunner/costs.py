@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
-Kin = Sequence[Sequence[Hashable]]
+Kin = Sequence[tuple[Hashable, ...]]
 """What a task has in common with others, in several respects: for each, keys from the general to the special."""
 
 
@@ -27,6 +27,8 @@ class LearnedCosts:
 
     def __init__(self) -> None:
         self._sums: dict[Hashable, tuple[float, float, int]] = {}
+        # those asked for since something was learnt: of thousands of tasks that are put in order, most are alike
+        self._factors: dict[tuple[Hashable, ...], float] = {}
 
     def learn(self, kin: Kin, estimated: float, measured: float) -> Lesson:
         """Takes note of a task: times in seconds, the estimated one positive."""
@@ -52,16 +54,21 @@ class LearnedCosts:
         """Seconds that all tasks with this key took."""
         return self._sums.get(key, (0.0, 0.0, 0))[0]
 
-    def _factor(self, keys: Sequence[Hashable]) -> float:
+    def _factor(self, keys: tuple[Hashable, ...]) -> float:
+        known = self._factors.get(keys)
+        if known is not None:
+            return known
         found = 1.0
         for key in keys:
             measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
             if n > 0:
                 mean = expected / n
                 found = (measured + found * mean) / (expected + mean)
-        return max(found, _LEAST)
+        self._factors[keys] = found = max(found, _LEAST)
+        return found
 
     def _add(self, key: Hashable, measured: float, expected: float, n: int) -> None:
+        self._factors.clear()
         before = self._sums.get(key, (0.0, 0.0, 0))
         self._sums[key] = (before[0] + measured, before[1] + expected, before[2] + n)
 

@@ -76,7 +76,8 @@ class WaitingTasks(Generic[Task]):
 
     def __init__(self, costs: LearnedCosts) -> None:
         self._costs = costs
-        self._tasks: dict[int, Task] = {}
+        # with its kin, which takes a moment to tell
+        self._tasks: dict[int, tuple[Task, Kin]] = {}
         self._order: list[tuple[float, int]] = []
 
     def __len__(self) -> int:
@@ -84,21 +85,21 @@ class WaitingTasks(Generic[Task]):
 
     def add(self, number: int, task: Task) -> None:
         """One more."""
-        self._tasks[number] = task
-        heapq.heappush(self._order, (-self._expected(task), number))
+        self._tasks[number] = task, task.kin
+        heapq.heappush(self._order, (-self._expected(*self._tasks[number]), number))
 
     def pop(self) -> tuple[int, Task]:
         """The next one and its number. Raises IndexError where none waits."""
         _, number = heapq.heappop(self._order)
-        return number, self._tasks.pop(number)
+        return number, self._tasks.pop(number)[0]
 
     def reorder(self) -> None:
         """Puts all of them in the order of what is expected now."""
-        self._order = [(-self._expected(task), number) for number, task in self._tasks.items()]
+        self._order = [(-self._expected(task, kin), number) for number, (task, kin) in self._tasks.items()]
         heapq.heapify(self._order)
 
-    def _expected(self, task: Task) -> float:
-        return task.cost * self._costs.correction(task.kin)
+    def _expected(self, task: Task, kin: Kin) -> float:
+        return task.cost * self._costs.correction(kin)
 
 
 class Dispatcher(Generic[Task]):

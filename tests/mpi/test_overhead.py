@@ -10,8 +10,8 @@ import pytest
 from tests.benchmarks.overhead import run, spent_on_points
 
 N_POINTS = 10_000
-MILLISECONDS = 0.6
-"""Of the processor of rank 0, a point (measured: 0.44 to 0.46), on a machine that takes `UNIT` for a loop in Python."""
+MILLISECONDS = 0.5
+"""Of the processor of rank 0, a point (measured: 0.40 to 0.43), on a machine that takes `UNIT` for a loop in Python."""
 UNIT = 14.0
 
 
@@ -31,17 +31,17 @@ def test_ten_thousand_trivial_points_cost_little_time(tmp_path: Path) -> None:
 
     The least of some tries counts: what else runs here can only add to it.
     """
-    limit = MILLISECONDS * max(1.0, unit() / UNIT)
     tries = []
     for attempt in range(6):
         folder = tmp_path / str(attempt)
         folder.mkdir()
+        slowness = max(1.0, unit() / UNIT)
         spent = spent_on_points(4, N_POINTS, folder)
-        tries.append(1e3 * spent.of_rank_0 / N_POINTS)
-        if tries[-1] < limit:
+        tries.append(1e3 * spent.of_rank_0 / N_POINTS / slowness)
+        if tries[-1] < MILLISECONDS:
             break
     print(f"{N_POINTS} trivial points on 4 ranks: {min(tries):.3f} ms a point; rank 0 grows by {spent.memory:.0f} MiB")
-    assert min(tries) < limit
+    assert min(tries) < MILLISECONDS
     assert spent.memory < 1e-2 * N_POINTS
 
 
