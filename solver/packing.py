@@ -8,30 +8,32 @@ same numbers goes on from the unpacked value itself.
 from __future__ import annotations
 
 import json
-from dataclasses import fields, is_dataclass
-from typing import Any
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.balance import Evaluation
-from solver.certificate import Certificate
-from solver.estimate import Estimate
-from solver.history import PeriodicState, StartState
 from solver.outcome import Outcome
-from solver.packed import Packed
-from solver.path import PathPoint
-from solver.response import StateReport
-from solver.route import Step
-from solver.settings import Resolution
 
-_CLASSES: dict[str, type[Any]] = {
-    known.__name__: known
-    for known in (
-        *(Certificate, Estimate, Evaluation, PathPoint, PeriodicState),
-        *(Resolution, StartState, StateReport, Step),
-    )
-}
+T = TypeVar("T")
+
+_CLASSES: dict[str, type[Any]] = {}
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A value as JSON text that refers to arrays by their place."""
+
+    text: str
+    arrays: tuple[NDArray[np.generic], ...]
+
+
+def packable(known: type[T]) -> type[T]:
+    """Decorator of the frozen results of the solver that a march or a sweep carries on; no two of one name."""
+    assert known.__name__ not in _CLASSES
+    _CLASSES[known.__name__] = known
+    return known
 
 
 def pack(value: object) -> Packed:

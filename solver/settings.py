@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from solver.packing import packable
+
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
 """Of the steps on the slow time scale."""
@@ -35,6 +37,7 @@ class SolverSettings:
         return self.harmonics == "auto" or self.samples == "auto"
 
 
+@packable
 @dataclass(frozen=True)
 class Resolution:
     """Harmonics and samples of one solve.

@@ -10,10 +10,10 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.history import StartState, WearHistory
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
-from solver.packed import Packed
+from solver.packing import Packed
+from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, SolverSettings
 from studyrunner.machine_faults import MachineFaultError, guard_kernel_cache, is_fault_of_machine, tells_of_machine
 from studyrunner.places import describe_reach, known_to, show_count
@@ -67,7 +67,7 @@ def build_evaluator(
 def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
     """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
-    from solver.continuation import follow_branch
+    from solver.loading_history.start_states import follow_branch
     from solver.packing import pack
 
     wanted = sorted(task.order_left)
@@ -139,8 +139,8 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
 
 def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its shares is read."""
-    from solver.march import march_wear
     from solver.packing import unpack
+    from solver.wear.march import march_wear
 
     start = None if task.start is None else unpack(Packed(task.start.text, task.start.arrays))
     if not isinstance(start, StartState):

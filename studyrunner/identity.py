@@ -80,10 +80,16 @@ def solver_digest() -> str:
     specification = find_spec("solver")
     if specification is None or not specification.submodule_search_locations:
         raise ModuleNotFoundError("the package solver is not installed")
-    folder = Path(next(iter(specification.submodule_search_locations)))
     versions = [platform.python_version(), *(metadata.version(name) for name in _COMPUTING)]
-    sources = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in sorted(folder.glob("*.py"))]
-    return _digest(versions, sources)
+    return _digest(versions, source_hashes(Path(next(iter(specification.submodule_search_locations)))))
+
+
+def source_hashes(folder: Path) -> list[tuple[str, str]]:
+    """Place and hash of all source files of a package, those in its rooms included."""
+    return [
+        (path.relative_to(folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest())
+        for path in sorted(folder.rglob("*.py"))
+    ]
 
 
 def _digest(*values: object) -> str:

@@ -28,8 +28,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
-from solver.structure import condense
-from solver.trajectory import Scheme
+from solver.settings import Scheme
+from solver.structure.condensation import condense
 
 SALT = 1931  # Den Hartog's year: other seeds of the tests have nothing to do with these
 COMPONENTS = {

@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver import sweep as sweeps
-from solver.continuation import follow_branch
-from solver.history import StartState, WearHistory
-from solver.march import march_wear
+from solver.loading_history import sweep as sweeps
+from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
+from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa

@@ -26,10 +26,10 @@ NOISE = 1e-13
 
 def one_variant(mesh: int, seed: int) -> None:
     """Computes all points and prints them as JSON. seed: of the noise, 0 for none."""
-    from solver.continuation import follow_branch
-    from solver.march import march_wear
+    from solver.loading_history.start_states import follow_branch
     from solver.model import LinearModel
     from solver.settings import SolverSettings
+    from solver.wear.march import march_wear
     from tests.solver.models import scene
 
     model = scene("dovetail_sector", 13, mesh=mesh)

@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from solver.continuation import follow_branch
-from solver.march import march_wear
+from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
-from solver.record import CERTIFIED
+from solver.results.recorder import CERTIFIED
 from solver.settings import SolverSettings
+from solver.wear.march import march_wear
 from tests.random_scenes import RandomScene, random_scene
 
 SETTINGS = SolverSettings()

@@ -19,16 +19,15 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.balance import Balance
-from solver.continuation import follow_branch
-from solver.history import StartState
-from solver.joint import build_case
-from solver.linear import JacobianSolver
-from solver.march import march_wear
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
+from solver.newton.linear_solver import JacobianSolver
 from solver.outcome import Outcome
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import StartState
+from solver.settings import Scheme, SolverSettings
+from solver.structure.joint import build_case
+from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
 from tests.benchmarks import ranks
 

@@ -13,10 +13,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import eigh
 
-from solver.continuation import follow_branch
-from solver.march import march_wear
+from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.settings import SolverSettings
+from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
 
 HARMONICS = 21  # whose nodal diameters the scene holds

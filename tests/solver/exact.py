@@ -8,18 +8,20 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from solver import adapt
-from solver.arc import follow_arc
-from solver.balance import Balance
-from solver.estimate import Estimate
-from solver.harmonics import to_complex
-from solver.joint import Case, build_case
-from solver.linear import JacobianSolver
+from solver.accuracy import refinement as adapt
+from solver.accuracy.error_estimate import Estimate
+from solver.continuation.arc_length import follow_arc
+from solver.continuation.first_state import solve_first_state
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
 from solver.model import ReducedModel
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, follow_naturally
-from solver.response import solve_first_state
 from solver.settings import SolverSettings
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, build_case
 from tests import references
 from tests.solver.models import scene
 

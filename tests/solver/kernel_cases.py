@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from solver.harmonics import FourierBasis, build_basis
-from solver.inertia import march_masses
-from solver.kernels import march_period, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.contact.coulomb import march_period, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.contact.rigid_slider import march_masses
+from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.tangents import march_tangent, mass_tangent
+from solver.structure.fourier import FourierBasis, build_basis
 
 FRICTION = 0.4
 PERIODS = 3

@@ -8,16 +8,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.balance import Balance
-from solver.continuation import follow_branch
-from solver.history import PeriodicState, StartState
-from solver.joint import Case, Joint, build_case
-from solver.linear import JacobianSolver
+from solver.continuation.first_state import solve_first_state
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint
-from solver.response import periodic_state, solve_first_state
+from solver.results.history import PeriodicState, StartState
+from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings, first_resolution
+from solver.structure.joint import Case, Joint, build_case
 from studies.scenes import build_scene, scene_parameters
 
 STIFFNESS = 1e7  # N/m

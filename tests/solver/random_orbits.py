@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.continuation import follow_branch
-from solver.harmonics import synthesis, to_complex
-from solver.history import WearHistory
-from solver.joint import build_case
-from solver.march import march_wear
+from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
+from solver.results.history import WearHistory
 from solver.settings import SolverSettings
+from solver.structure.fourier import synthesis, to_complex
+from solver.structure.joint import build_case
+from solver.wear.march import march_wear
 from tests.contact_pair import ContactPair
 
 Draw = Callable[[np.random.Generator], "Scene"]

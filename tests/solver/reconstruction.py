@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.history import PeriodicState
 from solver.model import ComplexArray, FloatArray, LinearModel, ReducedModel
+from solver.results.history import PeriodicState
 
 
 def harmonic_structure(model: ReducedModel, harmonic: int) -> LinearModel:

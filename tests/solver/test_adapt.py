@@ -7,26 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from solver import adapt
-from solver.adapt import Refined, refine
-from solver.certificate import certify
-from solver.estimate import Estimate
-from solver.harmonics import to_complex
-from solver.joint import Case, build_case
-from solver.kernels import SLIP, STICK
-from solver.ladder import LADDER
-from solver.level import transfer
-from solver.linear import JacobianSolver
+from solver.accuracy import refinement as adapt
+from solver.accuracy.certificate import certify
+from solver.accuracy.error_estimate import Estimate
+from solver.accuracy.harmonic_levels import LADDER
+from solver.accuracy.refinement import Refined, refine
+from solver.contact.coulomb import SLIP, STICK
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.prolongation import transfer
+from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ReducedModel
-from solver.path import Effort, PathPoint, final_history, solve_balance
-from solver.peak import largest_responses
-from solver.settings import (
-    Resolution,
-    SolverSettings,
-    all_orders,
-    first_resolution,
-    samples_for,
-)
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.settings import Resolution, SolverSettings, all_orders, first_resolution, samples_for
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
 SLIDER_OMEGA = 0.6 * float(np.sqrt(1.6e6))

@@ -9,10 +9,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from solver import adaptive
-from solver.history import WearHistory
-from solver.march import march_wear
 from solver.outcome import Outcome
+from solver.results.history import WearHistory
+from solver.wear import bdf2 as adaptive
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, scene
 from tests.solver.test_march import AREA, COARSE, CYCLES, END, FRICTION, OMEGA, WEAR, march, slider_start
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.balance import Balance
-from solver.kernels import SEPARATED, SLIP, STICK
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.settings import Resolution, SolverSettings
 from tests.solver.models import cyclic_model, random_balance, random_model, scene, with_free_masses

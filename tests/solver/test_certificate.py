@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.balance import Balance, Evaluation
-from solver.certificate import LIMITS, Certificate, certify
-from solver.joint import Joint, build_case
+from solver.accuracy.certificate import LIMITS, Certificate, certify
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ReducedModel
 from solver.settings import SolverSettings
+from solver.structure.joint import Joint, build_case
 from tests.solver.models import OMEGA, branch_states, dovetail, first_point, random_model, scene
 
 TOLERANCE = SolverSettings().tolerance

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numba import njit
 
-from solver import response
 from solver.clock import computing_time
-from solver.continuation import follow_branch
-from solver.march import march_wear
+from solver.continuation import first_state as response
+from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.wear.march import march_wear
 from tests.solver.models import scene
 
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import march as march_module
-from solver import trajectory
-from solver.adapt import Refined, refine
-from solver.history import StartState, WearHistory
-from solver.march import march_wear
+from solver.accuracy.refinement import Refined, refine
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.record import _before
+from solver.results.history import StartState, WearHistory
+from solver.results.recorder import _before
 from solver.settings import Scheme, SolverSettings
-from solver.trajectory import Trajectory
+from solver.wear import march as march_module
+from solver.wear import trajectory
+from solver.wear.march import march_wear
+from solver.wear.trajectory import Trajectory
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, dovetail, scene
 

@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation import follow_branch
-from solver.history import PeriodicState
+from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
-from solver.penalty import build_penalty
+from solver.results.history import PeriodicState
 from solver.settings import SolverSettings
+from solver.structure.penalty import build_penalty
 from tests.references import coulomb_orbit, den_hartog_amplitude, slider_orbit, vibro_impact_orbit
 from tests.solver import mass_twin
 from tests.solver.models import branch_states, converged_state, random_model, scene

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.balance import Balance
-from solver.certificate import certify
-from solver.continuation import follow_branch
-from solver.creep import creep_work, creeps, rest_masses
-from solver.history import StartState
-from solver.joint import Joint, build_case
-from solver.level import Level
+from solver.accuracy.certificate import certify
+from solver.accuracy.level import Level
+from solver.continuation.ratcheting import creep_work, creeps, rest_masses
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.start_states import follow_branch
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint
+from solver.results.history import StartState
 from solver.settings import SolverSettings
+from solver.structure.joint import Joint, build_case
 from tests.random_scenes import random_scene
 
 SHAKEN_DOWN = 160  # seed: the vibration lets the mass slip until it sticks

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import continuation
-from solver.balance import Balance, Evaluation
-from solver.continuation import follow_branch
-from solver.doubling import doubles_period, linearise_over_two, odd_part, two_periods
-from solver.harmonics import synthesis, to_complex
-from solver.history import StartState
-from solver.joint import Case, Joint, build_case
-from solver.kernels import SEPARATED
-from solver.march import march_wear
+from solver.contact.coulomb import SEPARATED
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.loading_history import start_states as continuation
+from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort
+from solver.results.history import StartState
 from solver.settings import SolverSettings
+from solver.stability.period_doubling import doubles_period, linearise_over_two, odd_part, two_periods
+from solver.structure.fourier import synthesis, to_complex
+from solver.structure.joint import Case, Joint, build_case
+from solver.wear.march import march_wear
 from tests.solver.models import cyclic_model, random_balance, random_model, with_free_masses
 from tests.solver.models import scene as bundled
 from tests.solver.random_orbits import Scene, drawn

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from solver.history import PeriodicState, StartState, WearHistory
-from solver.march import march_wear
 from solver.outcome import Outcome
-from solver.penalty import build_penalty
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import PeriodicState, StartState, WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.structure.penalty import build_penalty
+from solver.wear.march import march_wear
 from tests.solver.contact_twin import pair_period
 from tests.solver.models import branch_states, dovetail
 from tests.solver.reconstruction import contact_work, full_motion, series

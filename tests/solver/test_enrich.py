@@ -7,15 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import adapt
-from solver.continuation import follow_branch
-from solver.enrich import _compliances, _Way, lead_to, start_with_tail
-from solver.harmonics import change_orders
-from solver.joint import Case
-from solver.level import Level, transfer
+from solver.accuracy import refinement as adapt
+from solver.accuracy.level import Level
+from solver.continuation.harmonic_homotopy import _compliances, _Way, lead_to, start_with_tail
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.prolongation import transfer
+from solver.loading_history.start_states import follow_branch
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint
 from solver.settings import Resolution, SolverSettings, all_orders
+from solver.structure.fourier import change_orders
+from solver.structure.joint import Case
 from tests.random_scenes import random_scene
 from tests.solver.models import OMEGA, random_model
 from tests.solver.test_adapt import FRICTION, SLIDER_OMEGA, SLIPPING, response, slider, solved_at, started

@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.history import WearHistory
-from solver.march import march_wear
 from solver.model import ContactInterface, LinearModel, ReducedModel
-from solver.oscillation import WearRates
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import WearHistory
+from solver.results.oscillation import WearRates
+from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, scene
 
 STIFFNESS = 1e6  # N/m, of each pair towards the block

@@ -12,16 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from solver.balance import Balance
-from solver.certificate import certify
-from solver.continuation import follow_branch
-from solver.history import StartState, WearHistory
-from solver.joint import build_case
-from solver.march import march_wear
+from solver.accuracy.certificate import certify
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.outcome import Outcome
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import StartState, WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.structure.joint import build_case
+from solver.wear.march import march_wear
 from tests.references import slider_amplitude
 from tests.solver.models import OMEGA, dovetail, random_model, scene
 

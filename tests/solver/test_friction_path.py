@@ -8,14 +8,15 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.joint import build_case
-from solver.linear import JacobianSolver
+from solver.continuation.first_state import solve_first_state, solve_static_state
+from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray, ReducedModel
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint
-from solver.response import solve_first_state, solve_static_state
 from solver.settings import SolverSettings
-from solver.structure import condense
+from solver.structure.condensation import condense
+from solver.structure.joint import build_case
 from tests.solver.models import dovetail, random_model
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)

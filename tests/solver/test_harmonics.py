@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.harmonics import build_basis, change_orders, derivative, from_complex, to_complex
+from solver.structure.fourier import build_basis, change_orders, derivative, from_complex, to_complex
 
 OMEGA = 37.0
 

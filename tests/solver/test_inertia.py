@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from solver.harmonics import build_basis, to_complex
-from solver.inertia import step_line, step_mass, step_plane
-from solver.kernels import SEPARATED, SLIP, STICK
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.contact.rigid_slider import step_line, step_mass, step_plane
+from solver.structure.fourier import build_basis, to_complex
 from tests.solver import mass_twin
 from tests.solver.kernel_cases import FRICTION, MASS_BASIS, MassCase, mass_case, masses_tangent, run_masses
 

@@ -7,12 +7,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.history import StartState, WearHistory
-from solver.march import march_wear
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import StartState, WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear
 from tests.references import vibro_impact_orbit
 from tests.solver.models import branch_states
 

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.harmonics import build_basis
-from solver.kernels import (
+from solver.contact.coulomb import (
     SEPARATED,
     SLIP,
     STICK,
@@ -24,7 +23,8 @@ from solver.kernels import (
     mean_normal_tangent,
     wear_integral,
 )
-from solver.tangents import march_tangent
+from solver.contact.tangent import march_tangent
+from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
 from tests.solver.kernel_cases import (
     BASIS,

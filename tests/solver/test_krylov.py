@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.krylov import GAIN, PATIENCE, solve_gmres
 from solver.model import FloatArray
+from solver.newton.krylov import GAIN, PATIENCE, solve_gmres
 
 
 def counted(matrix: FloatArray) -> tuple[list[int], object]:

@@ -7,12 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.inertia import march_masses
-from solver.joint import Joint, build_case
-from solver.kernels import SEPARATED, SLIP, STICK, march_period, mean_normal_force, mean_normal_tangent, wear_integral
-from solver.law import Marched, law_tangent, march_law
+from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
+from solver.contact.coulomb import (
+    SEPARATED,
+    SLIP,
+    STICK,
+    march_period,
+    mean_normal_force,
+    mean_normal_tangent,
+    wear_integral,
+)
+from solver.contact.rigid_slider import march_masses
+from solver.contact.tangent import march_tangent, mass_tangent
 from solver.settings import Resolution, SolverSettings
-from solver.tangents import march_tangent, mass_tangent
+from solver.structure.joint import Joint, build_case
 from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "3d", "constant_load_one_tangent")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import linear
-from solver.balance import Balance
-from solver.linear import JacobianSolver
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
+from solver.newton import linear_solver as linear
+from solver.newton.linear_solver import JacobianSolver
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 

@@ -7,14 +7,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.harmonics import synthesis
-from solver.history import StartState, WearHistory
-from solver.loops import LOOP_PHASES, at_phases, loop_phases
-from solver.march import march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.settings import SolverSettings, first_resolution
-from solver.trajectory import Scheme
+from solver.results.history import StartState, WearHistory
+from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
+from solver.settings import Scheme, SolverSettings, first_resolution
+from solver.structure.fourier import synthesis
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, random_model, scene
 
 FRICTION = 0.5

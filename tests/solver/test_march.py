@@ -10,13 +10,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from solver.history import StartState, WearHistory
-from solver.joint import build_case
-from solver.march import march_wear
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.settings import SolverSettings, first_resolution
-from solver.trajectory import Scheme
+from solver.results.history import StartState, WearHistory
+from solver.settings import Scheme, SolverSettings, first_resolution
+from solver.structure.joint import build_case
+from solver.wear.march import march_wear
 from tests.references import slider_amplitude, slider_orbit, slider_wear_depth
 from tests.solver.models import branch_states, random_model, scene
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from solver.newton import solve_newton
+from solver.newton.iteration import solve_newton
 
 Function = Callable[[np.ndarray], np.ndarray]
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import linear
-from solver.balance import Linearisation
-from solver.continuation import follow_branch
-from solver.history import StartState, WearHistory
-from solver.linear import JacobianSolver
-from solver.march import march_wear
+from solver.harmonic_balance.dlft import Linearisation
+from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
+from solver.newton import linear_solver as linear
+from solver.newton.linear_solver import JacobianSolver
 from solver.outcome import Outcome
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import StartState, WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
 
 SETTINGS = SolverSettings(harmonics=5, samples=64, tolerance=1e-10)

@@ -9,17 +9,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver import continuation, march
-from solver import sweep as sweeps
-from solver.continuation import follow_branch
-from solver.history import StartState, WearHistory
-from solver.march import march_wear
+from solver.loading_history import start_states as continuation
+from solver.loading_history import sweep as sweeps
+from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.packed import Packed
-from solver.packing import pack, unpack
-from solver.settings import Resolution, SolverSettings
-from solver.trajectory import Scheme
+from solver.packing import Packed, pack, unpack
+from solver.results.history import StartState, WearHistory
+from solver.settings import Resolution, Scheme, SolverSettings
+from solver.wear import march
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, dovetail, scene
 from tests.solver.test_explicit_limit import WEAR as SEESAW_WEAR
 from tests.solver.test_explicit_limit import exact_limit, seesaw

@@ -8,13 +8,15 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.arc import ARC_FAILURES, ARC_ITERATIONS, ARC_STEPS, follow_arc
-from solver.balance import Balance
-from solver.joint import build_case
-from solver.linear import JacobianSolver
+from solver.continuation.arc_length import ARC_FAILURES, ARC_ITERATIONS, ARC_STEPS, follow_arc
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
-from solver.path import Effort, PathPoint, final_history, follow_naturally, solve_balance
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
 from solver.settings import SolverSettings
+from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
 BalanceAt = Callable[[float, FloatArray], Balance]

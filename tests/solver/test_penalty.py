@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.harmonics import to_complex
-from solver.joint import build_case
 from solver.model import ContactInterface, LinearModel, ReducedModel
-from solver.penalty import build_penalty, static_penalty
 from solver.settings import Resolution, SolverSettings
+from solver.structure.fourier import to_complex
+from solver.structure.joint import build_case
+from solver.structure.penalty import build_penalty, static_penalty
 from tests.solver.models import OMEGA, dovetail, random_model, scene, with_free_masses
 
 DOVETAIL_OMEGA = 2 * np.pi * 212.0

@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import factor, linear, period_factor
-from solver.balance import Balance, Linearisation
-from solver.factor import HarmonicFactor, build_factor, build_harmonic_factor
-from solver.harmonics import build_basis
-from solver.joint import Joint, build_case
-from solver.kernels import SEPARATED, SLIP, STICK, contact_sample
-from solver.linear import JacobianSolver
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
+from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
-from solver.period_factor import (
+from solver.newton import linear_solver as linear
+from solver.newton import period_preconditioner as period_factor
+from solver.newton import preconditioner as factor
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.period_preconditioner import (
     PASSES,
     RESONANT,
     PeriodFactor,
@@ -26,7 +25,10 @@ from solver.period_factor import (
     sample_tangents,
     stiffness_of_most,
 )
+from solver.newton.preconditioner import HarmonicFactor, build_factor, build_harmonic_factor
 from solver.settings import Resolution, SolverSettings, all_orders
+from solver.structure.fourier import build_basis
+from solver.structure.joint import Joint, build_case
 from tests.solver.models import OMEGA, dovetail, random_balance, random_model, with_free_masses
 
 SETTINGS = SolverSettings(3, 24)

@@ -15,18 +15,18 @@ import numpy as np
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from solver.balance import Balance, Evaluation
-from solver.certificate import LIMITS, LOSS
-from solver.history import WearHistory
-from solver.joint import Joint, build_case
-from solver.linear import JacobianSolver
-from solver.march import march_wear
+from solver.accuracy.certificate import LIMITS, LOSS
+from solver.continuation.first_state import solve_first_state
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ReducedModel
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint
-from solver.response import solve_first_state
-from solver.settings import SolverSettings
-from solver.trajectory import Scheme
+from solver.results.history import WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.structure.joint import Joint, build_case
+from solver.wear.march import march_wear
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import start_state
 

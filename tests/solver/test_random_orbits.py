@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.kernels import SEPARATED, SLIP, STICK
-from solver.ladder import LADDER, steps_to_see
+from solver.accuracy.harmonic_levels import LADDER, steps_to_see
+from solver.accuracy.period_events import shortest_contact
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.outcome import Outcome
-from solver.period import shortest_contact
 from solver.settings import Resolution
 from tests.references import coulomb_orbit, vibro_impact_orbit
 from tests.solver.random_orbits import KINDS, Scene, behind_spring, drawn, find, wall

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.structure import condense
+from solver.structure.condensation import condense
 from studies.model_check import check_model
 from tests.benchmarks.random_scenes import run_scene, solved
 from tests.random_scenes import COMPONENTS, RandomScene, random_scene

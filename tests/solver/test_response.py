@@ -8,16 +8,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.balance import Balance, Evaluation
-from solver.certificate import certify
-from solver.harmonics import build_basis
-from solver.history import PeriodicState
-from solver.joint import Case, Joint, build_case
+from solver.accuracy.certificate import certify
+from solver.continuation.first_state import solve_static_state
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.response_peak import PEAK_POINTS
 from solver.model import FloatArray, ReducedModel
-from solver.path import Effort, PathPoint
-from solver.peak import PEAK_POINTS
-from solver.response import largest_distance, periodic_state, report_state, solve_static_state
+from solver.newton.solve_balance import Effort
+from solver.results.history import PeriodicState
+from solver.results.state_report import largest_distance, periodic_state, report_state
 from solver.settings import SolverSettings, all_orders
+from solver.structure.fourier import build_basis
+from solver.structure.joint import Case, Joint, build_case
 from tests.solver.contact_twin import pair_period, status
 from tests.solver.models import OMEGA, dovetail, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series

@@ -8,19 +8,19 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.enrich import carried_history
-from solver.harmonics import synthesis
-from solver.history import StartState
-from solver.joint import build_case
-from solver.level import Level
-from solver.march import march_wear
+from solver.accuracy.harmonic_reach import reach, reaches
+from solver.accuracy.level import Level
+from solver.harmonic_balance.prolongation import carried_history
+from solver.harmonic_balance.response_peak import largest_responses, tail_orders
 from solver.model import ReducedModel
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort
-from solver.peak import largest_responses, tail_orders
-from solver.penalty import build_penalty
-from solver.reach import reach, reaches
+from solver.results.history import StartState
 from solver.settings import Resolution, SolverSettings
+from solver.structure.fourier import synthesis
+from solver.structure.joint import build_case
+from solver.structure.penalty import build_penalty
+from solver.wear.march import march_wear
 from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact import NATURAL

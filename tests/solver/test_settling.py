@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from solver.balance import Balance
-from solver.harmonics import change_orders
-from solver.joint import Case, build_case
-from solver.linear import JacobianSolver
+from solver.continuation.first_state import solve_static_state
+from solver.continuation.transient import Motion, Transient, settle
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.origin import find_origin
 from solver.model import ReducedModel
-from solver.origin import find_origin
-from solver.path import Effort, PathPoint, solve_balance
-from solver.response import periodic_state, solve_static_state
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.settling import Motion, Transient, settle
+from solver.structure.fourier import change_orders
+from solver.structure.joint import Case, build_case
 from tests.references import coulomb_orbit, slider_orbit
 from tests.solver.models import OMEGA, converged_state, first_point, random_model, scene
 from tests.solver.reconstruction import full_motion

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import factor
-from solver.balance import Balance, Linearisation
-from solver.factor import HarmonicFactor, build_factor
-from solver.linear import JacobianSolver
+from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
+from solver.newton import preconditioner as factor
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.preconditioner import HarmonicFactor, build_factor
+from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
 from solver.settings import SolverSettings
-from solver.slip_space import build_slip_factor, find_slip_space
 from tests.solver.models import PRELOAD, random_balance, random_model
 
 SETTINGS = SolverSettings(3, 24)

@@ -7,16 +7,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver import linear
-from solver.arc import follow_arc
-from solver.balance import Balance
-from solver.joint import build_case
-from solver.krylov import ritz_values
-from solver.linear import JacobianSolver
+from solver.continuation.arc_length import follow_arc
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
-from solver.path import Effort, PathPoint
+from solver.newton import linear_solver as linear
+from solver.newton.krylov import ritz_values
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.settings import SolverSettings
-from solver.stability import is_stable
+from solver.stability.hill import is_stable
+from solver.structure.joint import build_case
 from tests.solver.models import converged_state, random_balance, random_model, scene
 
 FORCE = 0.02

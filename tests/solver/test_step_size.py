@@ -8,15 +8,15 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.history import StartState
-from solver.joint import build_case
-from solver.march import march_wear
+from solver.continuation.first_state import solve_static_state
 from solver.model import FloatArray
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort
-from solver.response import solve_static_state
+from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
-from solver.step_size import LARGEST, StepTooLongError, check_step, moved_share
+from solver.structure.joint import build_case
+from solver.wear.march import march_wear
+from solver.wear.step_limit import LARGEST, StepTooLongError, check_step, moved_share
 from tests.solver.models import OMEGA, branch_states, dovetail, random_model
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)

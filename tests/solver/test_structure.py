@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.harmonics import change_orders, from_complex, to_complex
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
-from solver.structure import build_structure, relative_indices
+from solver.structure.condensation import build_structure, relative_indices
+from solver.structure.fourier import change_orders, from_complex, to_complex
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver import sweep as sweeps
-from solver.continuation import _Line, follow_branch
-from solver.history import StartState
-from solver.origin import find_origin
+from solver.loading_history import sweep as sweeps
+from solver.loading_history.origin import find_origin
+from solver.loading_history.start_states import _Line, follow_branch
 from solver.outcome import Outcome
-from solver.packed import Packed
+from solver.packing import Packed
+from solver.results.history import StartState
 from solver.settings import SolverSettings
 from tests.solver.models import dovetail, scene
 

@@ -7,17 +7,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.balance import Balance
-from solver.history import StartState, WearHistory
-from solver.joint import Case, build_case
-from solver.linear import JacobianSolver
-from solver.march import march_wear
+from solver.continuation.first_state import solve_first_state
+from solver.continuation.transient import settle
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.path import Effort, PathPoint, final_history
-from solver.response import solve_first_state
+from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings
-from solver.settling import settle
-from solver.stability import is_stable
+from solver.stability.hill import is_stable
+from solver.structure.joint import Case, build_case
+from solver.wear.march import march_wear
 from tests.solver.models import branch_states, dovetail
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.history import WearHistory
 from solver.outcome import Outcome
+from solver.results.history import WearHistory
 
 
 def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np.ndarray | None = None) -> WearHistory:

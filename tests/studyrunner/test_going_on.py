@@ -291,7 +291,7 @@ def test_a_time_limit_is_one_bad_point() -> None:
 
 def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself: to the numbers of a march that had the time at once."""
-    from solver import path
+    from solver.continuation import natural as path
     from studyrunner import evaluate
 
     study = [

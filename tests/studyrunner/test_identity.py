@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import shutil
+from pathlib import Path
 
 import pytest
 
+import solver
 from studyrunner import identity
 from studyrunner.identity import Identities, hash_of_kind
 from studyrunner.records import record_type
@@ -215,3 +218,32 @@ def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
         assert hashes()[POINT][0] != before[POINT][0]
     finally:
         identity.solver_digest.cache_clear()
+
+
+def test_an_edit_anywhere_in_the_solver_makes_all_results_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every source file of a copy is changed in turn, and one is moved."""
+    copy = tmp_path / "solver"
+    shutil.copytree(Path(solver.__path__[0]), copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(solver, "__path__", [str(copy)])
+    monkeypatch.setattr(solver.__spec__, "submodule_search_locations", [str(copy)])
+
+    def digest() -> str:
+        identity.solver_digest.cache_clear()
+        return identity.solver_digest()
+
+    before, seen = digest(), set()
+    paths = sorted(copy.rglob("*.py"))
+    assert any(path.parent != copy for path in paths)
+    for path in paths:
+        text = path.read_bytes()
+        path.write_bytes(text + b"# changed\n")
+        seen.add(digest())
+        path.write_bytes(text)
+    assert digest() == before
+    room = next(path for path in paths if path.parent != copy and path.name != "__init__.py")
+    room.rename(copy / room.name)
+    seen.add(digest())
+    identity.solver_digest.cache_clear()
+    assert len(seen - {before}) == len(paths) + 1

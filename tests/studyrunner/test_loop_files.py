@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.loops import LOOP_PHASES, loop_phases
+from solver.results.loops import LOOP_PHASES, loop_phases
 from studyrunner import gather, variables
 from studyrunner.cli import main
 from studyrunner.scene import SceneFacts

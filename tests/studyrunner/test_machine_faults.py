@@ -97,7 +97,7 @@ def test_what_the_solver_says_of_an_error_tells_which_it_was() -> None:
 
 def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself, whose march breaks off in its midst."""
-    from solver import march
+    from solver.wear import march
 
     own, n_calls = march.Trajectory.check, 0
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.history import WearHistory
 from solver.outcome import Outcome
+from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main

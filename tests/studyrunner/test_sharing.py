@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.history import StartState, WearHistory
 from solver.outcome import Outcome
 from solver.packing import pack
+from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution
 from studyrunner.evaluate import build_result, march
 from studyrunner.results import Kept, MarchResult
@@ -286,7 +286,7 @@ def marched(
         calls.append((wear, cycles.tolist()))
         return change(history(cycles.tolist()), wear)
 
-    monkeypatch.setattr("solver.march.march_wear", fake)
+    monkeypatch.setattr("solver.wear.march.march_wear", fake)
     task = shared_task()
     return list(march(None, 0.5, task, no_keep)), calls  # type: ignore[arg-type]
 

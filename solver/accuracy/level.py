@@ -1,0 +1,277 @@
+"""A state at one of several resolutions: the same state at others, and how far they differ.
+
+What changes in a state that is solved again with more harmonics or with more samples is its error, up to the rest of
+the series (`*_SAFETY`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.accuracy.certificate import certify
+from solver.accuracy.error_estimate import UNKNOWN, Estimate
+from solver.accuracy.harmonic_levels import fewer, on_ladder, steps_to_reach, steps_to_see
+from solver.accuracy.harmonic_reach import reach
+from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
+from solver.continuation.harmonic_homotopy import lead_to, start_with_tail
+from solver.continuation.ratcheting import creeps, rest_masses
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.prolongation import transfer
+from solver.harmonic_balance.response_peak import largest_responses
+from solver.model import ComplexArray, FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.settings import Resolution, all_orders
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, Joint
+
+SEEN_SAMPLES = 2048  # a sine overtops a limit unseen by 1e-6 of its size then
+MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
+FEW_ITERATIONS = 30  # where they are dear
+DEAR = 1000  # unknowns
+MOST_FAR = 200  # of a balance that is solved to see a short contact
+FEW_PLACES = 2  # relative displacements: where there are more, states far up the ladder are rarely found at once
+MOST_REACHED = 400  # of a balance of so few that is solved to see how the structure goes on
+MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
+HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
+NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
+SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
+SCATTER_SAFETY = 2.0  # 1.5 to 1.1 times that to three times as many, but those of single events scatter
+SMALL_WORK = 0.001  # of the work of the excitation: where normal force times slip is less, it is judged against this
+SMALL_WORK_DEAR = 0.01  # the same where the unknowns are many
+NO_WORK = 1e-3  # of this: where even that is not reached, nothing wears
+CREEP = 0.1  # of rtol: share of the slip work that may be creep
+SMALL_SHARE = 0.01  # of the largest peak: responses that move less are judged against this
+SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
+SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
+FAINT = 0.1  # of rtol: share of the largest normal force below which it does not matter whether a contact is seen
+
+
+@dataclass(frozen=True)
+class Level:
+    """A state with the case that it was solved in."""
+
+    case: Case
+    joint: Joint
+    point: PathPoint
+
+    def solve_at(self, resolution: Resolution, effort: Effort) -> Level | None:
+        """The same state with other harmonics and samples; None where it is not found."""
+        return self._transferred(self.case, self.point.evaluation, resolution, effort)
+
+    def unknowns(self, resolution: Resolution) -> int:
+        """Unknowns of the balance with other harmonics."""
+        return self.joint.slots.size * (2 * len(resolution.orders) + 1)
+
+    def may_look_at(self, resolution: Resolution, most: int = MOST_FAR) -> bool:
+        """Whether a state of so many more harmonics is so cheap that it may be asked what these miss."""
+        return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
+
+    def led_to(self, resolution: Resolution, effort: Effort) -> Level | None:
+        """The same state with more harmonics, these raised from nothing; None where that way ends."""
+        if 2 * resolution.highest < self.case.resolution.samples:
+            case = self.case.at(resolution)
+            joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+            level = self._solved(
+                case,
+                joint,
+                *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders, self.case.penalty.inertial),
+                effort,
+            )
+            if level is not None:
+                return level
+        led = lead_to(self.case, self.joint, self.point.evaluation, resolution, effort)
+        if led is None:
+            return None
+        return self._transferred(replace(self.case, resolution=resolution), led, resolution, effort)
+
+    def _transferred(self, old: Case, evaluation: Evaluation, resolution: Resolution, effort: Effort) -> Level | None:
+        """State found from one with other harmonics or with the penalty of another case."""
+        case = self.case.at(resolution)
+        joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        return self._solved(
+            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), effort
+        )
+
+    def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, effort: Effort) -> Level | None:
+        most = MOST_ITERATIONS if start.size <= DEAR else FEW_ITERATIONS
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, most)
+        if not result.converged:
+            return None
+        point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
+        # the mean position of a mass depends a little on the harmonics
+        return Level(case, joint, point).at_rest(effort)
+
+    def at_rest(self, effort: Effort) -> Level:
+        """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
+        settings = self.case.settings
+        share = CREEP * settings.rtol
+        if not creeps(self.joint, self.point.evaluation, share):
+            return self
+        rested = rest_masses(self.joint, self.point, share, settings.tolerance, effort)
+        return Level(self.case, self.joint, rested)
+
+    def least_work(self) -> float:
+        """Slip work, N m, below which a relative error of it weighs less: a share of what the excitation does."""
+        motion = self.joint.to_relative(self.point.evaluation.displacement_h)
+        cheap = self.unknowns(self.case.resolution) <= DEAR
+        return (SMALL_WORK if cheap else SMALL_WORK_DEAR) * abs(self.joint.structure.input_work(motion))
+
+    def without_even(self, effort: Effort) -> Level | None:
+        """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
+        orders = self.case.resolution.orders
+        odd = tuple(order for order in orders if order % 2)
+        if odd == orders or not half_wave_symmetric(self.point.evaluation):
+            return None
+        return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
+
+    def with_even(self, effort: Effort) -> Level | None:
+        """The same state with all harmonics up to its highest, where it has odd ones alone and needs the others."""
+        resolution = self.case.resolution
+        if resolution.highest == 1 or not lacks_even(resolution.orders, self.point.evaluation):
+            return None
+        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), effort)
+
+    def missed_event(self, effort: Effort) -> Level | None:
+        """The same state with as many samples as it takes to see a pair slip or open, or the contact be made, between
+        the samples; None where nothing does. Harmonics without an event in between are exact: one look is enough.
+        """
+        orders, samples = self.case.resolution.orders, self.case.resolution.samples
+        finest = self.solve_at(Resolution(orders, max(SEEN_SAMPLES, 2 * samples)), effort)
+        if finest is None or nothing_happens(finest.point.evaluation):
+            return None
+        while (samples := 2 * samples) < finest.case.resolution.samples:
+            level = self.solve_at(Resolution(orders, samples), effort)
+            if level is not None and not nothing_happens(level.point.evaluation):
+                return level
+        return finest
+
+    def samples_error(self, effort: Effort) -> tuple[Estimate, Level | None]:
+        """Estimated error for want of samples, and the state with more of them that it comes from.
+
+        What is wrong is where in its step an event falls. A sample next to an extreme is also among twice as many and
+        may still be the one next to it: then both states are wrong by the same. So the others lie in between: three
+        times as many and two, which have only the phases 0 and pi in common with these. Where the unknowns are many so
+        are the events, and twice as many samples, with which the refinement can go on, tell enough. Where no state is
+        found it is the difference to the one with half as many, which is at least as large.
+        """
+        orders, samples = self.case.resolution.orders, self.case.resolution.samples
+        few = self.unknowns(self.case.resolution) <= DEAR
+        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), effort)
+        if finer is not None:
+            return self.difference(finer).times(SCATTER_SAFETY if few else SAMPLES_SAFETY), finer
+        coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
+        return (UNKNOWN if coarser is None else coarser.difference(self)), None
+
+    def harmonics_error(self, effort: Effort, known: Level | None = None) -> tuple[Estimate, Level | None]:
+        """Estimated error for want of harmonics, and the state with more of them that it comes from.
+
+        It is the difference to the state two steps up the ladder; where that is not found, takes too many unknowns, or
+        the scene does not hold the nodal diameters of so many, one step; where not even those, to the state one step
+        down, which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
+        and where none such is found the error is unknown, whatever the other states say; and to one with so many that
+        the structure answers those beyond as the penalty does (`reach`): below, a few more may change nothing.
+
+        known: a richer state that was compared before, which is not solved again where it reaches so far.
+        """
+        evaluation = self.point.evaluation
+        felt = FAINT * self.case.settings.rtol
+        contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
+        # a whole period of the highest harmonic in the contact shows it well, half a period shows it
+        far, seeing = (steps_to_see(self.case.resolution, share * contact, 2) for share in (0.5, 1.0))
+        while far > 2 and not self.may_look_at(on_ladder(self.case.resolution, far)):
+            far -= 1
+        seeing = min(seeing, far)
+        reaching = 2
+        most = MOST_REACHED if self.joint.slots.size <= FEW_PLACES else MOST_FAR
+        if self.may_look_at(on_ladder(self.case.resolution, 2), most):
+            reaching = steps_to_reach(
+                self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
+            )
+            while not self.may_look_at(on_ladder(self.case.resolution, reaching), most):
+                reaching -= 1
+        for steps in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
+            other = on_ladder(self.case.resolution, steps)
+            affordable = self.unknowns(other) <= MOST_COMPARED
+            if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
+                level = known if 2 < steps <= reaching and known is not None and known.covers(other) else None
+                level = level or self.solve_at(other, effort)
+                if level is None and 2 < steps <= reaching:
+                    level = self.climbed(steps, effort)
+                if level is not None:
+                    richer = level if steps > 0 else None
+                    if steps < seeing and seeing > 2:
+                        return UNKNOWN, richer
+                    return self.difference(level).times(NEAR_SAFETY if steps == 1 else HARMONICS_SAFETY), richer
+        return UNKNOWN, None
+
+    def covers(self, resolution: Resolution) -> bool:
+        """Whether this has these harmonics and at least so many samples."""
+        own = self.case.resolution
+        return own.orders == resolution.orders and own.samples >= resolution.samples
+
+    def climbed(self, steps: int, effort: Effort) -> Level | None:
+        """The same state so many steps up the ladder, where it is not found at once; None where a step fails."""
+        level: Level | None = self
+        for _ in range(steps):
+            level = None if level is None else level.solve_at(on_ladder(level.case.resolution, 1), effort)
+        return level
+
+    def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[Level, Estimate]:
+        """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.
+
+        Half of rtol is kept, so that the next state does not go up again at once.
+        """
+        here, enough = self, 0.5 * self.case.settings.rtol
+        while estimate.largest <= SPARE * enough:
+            lower = fewer(here.case.resolution, here.case.settings)
+            level = here.solve_at(lower, effort) if lower != here.case.resolution else None
+            if level is None:
+                break
+            larger = level.difference(here).times(HARMONICS_SAFETY) + estimate
+            if larger.largest > enough or not level.holds():
+                break
+            here, estimate = level, larger
+        return here, estimate
+
+    def response(self) -> ComplexArray:
+        """First harmonic of the responses (n_response,), m."""
+        structure = self.joint.structure
+        return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
+
+    def peaks(self) -> FloatArray:
+        """Largest magnitudes of the responses over the period (n_response,), m."""
+        return largest_responses(self.joint, self.point.evaluation)
+
+    def least_response(self) -> float:
+        """Response, m, below which a relative error says nothing: a small share of what the excitation would cause on
+        the joint's own stiffness. A mass that its friction holds does not respond at all.
+        """
+        structure, penalty = self.joint.structure, self.joint.penalty
+        stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
+        moved = structure.harmonic_force / stiffness[self.joint.slots]
+        response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
+        return max(SMALL_RESPONSE * float(np.linalg.norm(response)), 1e-300)
+
+    def holds(self) -> bool:
+        """Whether the certificate of the state holds."""
+        return certify(self.joint, self.point.evaluation).holds(self.case.settings.tolerance)
+
+    def difference(self, better: Level) -> Estimate:
+        """Relative differences of response and wear rate to a better state."""
+        mine, its = self.response(), better.response()
+        least = better.least_response()
+        first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
+        mine_peak, its_peak = self.peaks(), better.peaks()
+        size = np.maximum(its_peak, max(SMALL_SHARE * float(its_peak.max(initial=0.0)), least))
+        response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
+        mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
+        work = max(self.least_work(), better.least_work())
+        if max(its_slip, mine_slip) <= NO_WORK * work:
+            return Estimate(response, 0.0)
+        # no wear rate is surer than the motion that it comes from
+        slip = max(its_slip, NO_WORK * work)
+        return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

@@ -1,0 +1,55 @@
+"""What happens in the period of a state, as far as harmonics and samples are chosen by it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.contact.coulomb import SEPARATED, STICK
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import FloatArray, IntArray
+
+SYMMETRIC = 1e-9  # of the largest force: without even harmonics goes what has less of them
+ASYMMETRIC = 1e-6  # of the same: what has more of them takes them again
+STILL = 1e-9  # of the tangential state: less is no slip
+
+
+def nothing_happens(evaluation: Evaluation) -> bool:
+    """Whether every pair sticks or is open all period long: the joint is linear. What only touches its limit sticks."""
+    separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
+    still = (np.ptp(state_t, axis=2) <= STILL * np.abs(state_t).max(axis=2)).all(axis=1) & ~separated.any(axis=1)
+    sticks = (evaluation.status_t == STICK).all(axis=1)
+    return bool((sticks | still | separated.all(axis=1)).all())
+
+
+def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
+    """Whether a state of odd harmonics alone has contact forces with even ones: it was symmetric and no longer is."""
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ASYMMETRIC)
+
+
+def half_wave_symmetric(evaluation: Evaluation, share: float = SYMMETRIC) -> bool:
+    """Whether the contact force has no even harmonics but the static one, to a share of the largest force."""
+    half = evaluation.force_t.shape[2] // 2
+    if evaluation.force_t.shape[2] % 2:
+        return False
+    total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
+    size = np.abs(evaluation.force_t).max(initial=0.0)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= share * size)
+
+
+def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
+    """Share of the period that the shortest contact of a pair takes that opens; 1 where none does.
+
+    status_t (n_contact, N): states of the pairs at the samples. normal_force_t (n_contact, N): N. felt: share of the
+    largest normal force that a pair has to reach; those that hardly touch matter as little as their forces do.
+    """
+    n_samples = status_t.shape[1]
+    shortest = n_samples
+    pressed = normal_force_t.max(axis=1, initial=0.0)
+    for closed in status_t[pressed >= felt * pressed.max(initial=0.0)] != SEPARATED:
+        begins = np.flatnonzero(closed & ~np.roll(closed, 1))
+        ends = np.flatnonzero(~closed & np.roll(closed, 1))
+        if begins.size:
+            # the first end belongs to the last beginning where the period begins in contact
+            lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
+            shortest = min(shortest, int(lasted.min()))
+    return float(shortest / n_samples)

@@ -1,0 +1,151 @@
+"""How wrong a state is for its harmonics and samples, and which of them it needs.
+
+The error of a state is estimated by solving it again with more harmonics and with more samples, each warm started: what
+changes is the error, up to the rest of the series (`SAFETY`). Automatic settings go up, one or the other, until the
+estimate is below `rtol`; a state that carries no even harmonics goes on without them, and one in which nothing slips
+or opens keeps the first harmonic alone, which is then exact. Masses that creep are brought to rest first (`creep`), and
+where a warm start with more harmonics is thrown off the state is led to them (`enrich`), as far as that is cheap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
+from solver.accuracy.harmonic_levels import LADDER, MOST_HARMONICS, fewer, n_unknowns, on_ladder
+from solver.accuracy.level import DEAR, NEAR_SAFETY, SAMPLES_SAFETY, Level
+from solver.accuracy.period_events import nothing_happens
+from solver.harmonic_balance.converged import PathPoint
+from solver.newton.preconditioner import FEW_ROWS
+from solver.newton.solve_balance import Effort
+from solver.settings import Resolution
+from solver.structure.joint import Case, Joint
+
+MOST_SAMPLES = 8192
+MOST_LEADS = 5  # ways to more harmonics in one refinement
+MOST_REFINEMENT = 200  # iterations of one refinement in all
+MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
+CHEAP = 2000  # unknowns up to which they are that few, two steps up the ladder
+MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
+MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
+AIM = 0.8  # of rtol: an estimate is one within a factor
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A state with the harmonics and samples that it needs, or as many as there may be.
+
+    case: with the resolution of the state. point: the state; its parameter is that of the point refined. estimate: of
+    its errors. accurate: whether it is below rtol (that of the response, where only the finest samples show any slip);
+    for fixed settings always true. spare: whether fewer might do.
+    """
+
+    case: Case
+    point: PathPoint
+    estimate: Estimate
+    accurate: bool
+
+
+def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoint, effort: Effort) -> Refined:
+    """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
+
+    omega: rad/s. excitation_amplitude: N.
+    """
+    settings = case.settings
+    here = Level(case, case.joint(omega, excitation_amplitude), point)
+    here = here.at_rest(effort)
+    begun = effort.iterations
+    leads, faint = MOST_LEADS, False
+    richer: Level | None = None
+    while True:
+        if nothing_happens(here.point.evaluation):
+            if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
+                first = here.solve_at(Resolution((1,), here.case.resolution.samples), effort)
+                here = first or here
+            missed = here.missed_event(effort)
+            if missed is None:
+                return Refined(here.case, here.point, NOTHING, True)
+            if settings.samples != "auto":
+                missing = here.difference(missed).times(SAMPLES_SAFETY)
+                accurate = not settings.automatic or missing.largest <= settings.rtol
+                return Refined(here.case, here.point, missing, accurate)
+            here, faint = missed, True
+            continue
+        if settings.harmonics == "auto":
+            here = here.without_even(effort) or here.with_even(effort) or here
+        resolution = here.case.resolution
+        by_samples, finer = here.samples_error(effort)
+        by_harmonics, richer = here.harmonics_error(effort, richer)
+        above = on_ladder(resolution, 1)
+        cheap = here.unknowns(above) <= DEAR and _allowed(here, above)
+        if richer is None and settings.harmonics == "auto" and leads and cheap:
+            # impacts: a warm start with more harmonics is thrown off, though they have the state
+            leads -= 1
+            richer = here.led_to(above, effort)
+            by_harmonics = by_harmonics if richer is None else here.difference(richer).times(NEAR_SAFETY)
+        estimate = by_samples + by_harmonics
+        if not settings.automatic:
+            known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
+            return Refined(here.case, here.point, known, True)
+        holds = here.holds()
+        if estimate.largest <= AIM * settings.rtol and holds:
+            here, estimate = here.relaxed(estimate, effort)
+            return Refined(here.case, here.point, estimate, True)
+        more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
+        more_harmonics = settings.harmonics == "auto" and (not holds or by_harmonics.largest > by_samples.largest / 3.0)
+        wanted = resolution
+        if more_harmonics:
+            higher = above
+            wanted = higher if settings.samples == "auto" else Resolution(higher.orders, resolution.samples)
+        if more_samples:
+            wanted = Resolution(wanted.orders, 2 * resolution.samples)
+        next_level = None
+        most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= CHEAP else MOST_REFINEMENT)
+        if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
+            if finer is not None and finer.case.resolution == wanted:
+                next_level = finer
+            elif richer is not None and richer.case.resolution == wanted:
+                next_level = richer
+            else:
+                next_level = here.solve_at(wanted, effort)
+            if next_level is None and richer is not None and richer.case.resolution.highest > wanted.highest:
+                # what is not found from below may be found from above
+                next_level = richer.solve_at(wanted, effort)
+            if next_level is None and settings.harmonics == settings.samples and richer is not None:
+                next_level = richer if _allowed(here, richer.case.resolution) else None
+        if next_level is None:
+            # slip that few samples see is no reason to give up a motion that is known
+            judged = estimate.response if faint else estimate.largest
+            return Refined(here.case, here.point, estimate, judged <= settings.rtol)
+        here = next_level
+
+
+def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort) -> Refined | None:
+    """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
+    here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
+    while n_unknowns(here.case.resolution, here.joint.slots.size) > most:
+        lower = fewer(here.case.resolution, here.case.settings)
+        level = here.solve_at(lower, effort) if lower != here.case.resolution else None
+        if level is None:
+            return None
+        here = level
+    return Refined(here.case, here.point, UNKNOWN, False)
+
+
+def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
+    """Relative differences of response and wear rate of two states of one joint, judged like any error."""
+    return Level(case, joint, one).difference(Level(case, joint, other))
+
+
+def _allowed(here: Level, resolution: Resolution) -> bool:
+    if not here.case.model.holds(resolution.highest):
+        return False
+    most = MOST_OF_FEW if here.joint.slots.size <= FEW_ROWS else MOST_UNKNOWNS
+    if resolution.highest > MOST_HARMONICS:
+        # friction alone: motions that hit something take their time in vain
+        if not all(order % 2 for order in resolution.orders):
+            return False
+        most = min(most, DEAR)
+    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and here.unknowns(resolution) <= most

@@ -1,0 +1,269 @@
+"""Friction of a mass that sits directly on a slider, through one period. Floats and arrays only.
+
+A rigid Coulomb force jumps where the mass turns, so its harmonics fall as 1/n and the harmonics of the motion that are
+left out as 1/n^3: at a handful of harmonics a balance of truncated series is wrong by per cents. Above the highest
+harmonic, though, the structure answers with its mass alone. So the motion of such a pair is marched through the period,
+
+    m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
+
+where p is the predicted force of the pair. Its harmonics up to H are the unknowns of the balance, and (*) defines the
+motion that belongs to them, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: nothing is left out there. The harmonics
+of lambda above H act on the mass m in the march, which is what the structure does with them up to `k / (n w)^2 m`.
+So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the balance is closed by
+the tail. The drag c forgets the start of the period; it acts on p and on the march alike and cancels up to H.
+
+In a step of length dt the force and the friction limit are constant, `p` as the mean over the step (`step_mean`), and
+the instant at which the mass turns or comes to rest inside the step is resolved: the residual is then smooth, and the
+error of second order in dt. With two tangents there is no such instant, and the step is divided instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.model import FloatArray, IntArray
+
+PARTS = 8  # of a step of a pair with two tangents
+CLOSED = 1e-13  # of the velocity that the force reaches in a period
+MOST_PASSES = 500
+
+
+@njit(cache=True)
+def step_line(
+    force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
+) -> tuple[float, float, float, float]:
+    """One step along one line: mean friction force, velocity after it, and mean velocity and speed over it.
+
+    gain, loss: `m/dt + c/2` and `m/dt - c/2`, so that `gain after = force - friction + loss before`. `tangent` (3, 3)
+    receives the derivatives of (friction, velocity after, mean speed) with respect to (force, velocity, limit).
+    """
+    tangent[:, :] = 0.0
+    if velocity == 0.0:
+        if abs(force) <= limit:
+            tangent[0, 0] = 1.0
+            return force, 0.0, 0.0, 0.0
+        sign = 1.0 if force > 0.0 else -1.0
+        after = (force - sign * limit) / gain
+        tangent[0, 2] = sign
+        tangent[1, 0] = 1.0 / gain
+        tangent[1, 1] = loss / gain
+        tangent[1, 2] = -sign / gain
+        tangent[2, 0] = 0.5 * sign / gain
+        tangent[2, 1] = 0.5 * sign * (1.0 + loss / gain)
+        tangent[2, 2] = -0.5 / gain
+        return sign * limit, after, 0.5 * after, 0.5 * abs(after)
+    sign = 1.0 if velocity > 0.0 else -1.0
+    after = (force - sign * limit + loss * velocity) / gain
+    if after * sign > 0.0:
+        tangent[0, 2] = sign
+        tangent[1, 0] = 1.0 / gain
+        tangent[1, 1] = loss / gain
+        tangent[1, 2] = -sign / gain
+        tangent[2, 0] = 0.5 * sign * tangent[1, 0]
+        tangent[2, 1] = 0.5 * sign * (1.0 + tangent[1, 1])
+        tangent[2, 2] = 0.5 * sign * tangent[1, 2]
+        return sign * limit, after, 0.5 * (velocity + after), 0.5 * abs(velocity + after)
+    # the mass comes to rest after the share of the step in which the retarding force takes its momentum
+    retarding = limit - sign * force
+    share = sign * loss * velocity / retarding
+    share_force = sign * share / retarding
+    share_velocity = sign * loss / retarding
+    share_limit = -share / retarding
+    speed = sign * velocity
+    if sign * force >= -limit:
+        # it stays: what is left of the step holds the force itself
+        tangent[0, 0] = 1.0
+        tangent[0, 1] = loss
+        tangent[2, 0] = 0.5 * share_force * speed
+        tangent[2, 1] = 0.5 * (share_velocity * speed + share * sign)
+        tangent[2, 2] = 0.5 * share_limit * speed
+        return force + loss * velocity, 0.0, 0.5 * share * velocity, 0.5 * share * speed
+    friction = (2.0 * share - 1.0) * sign * limit
+    tangent[0, 0] = 2.0 * sign * limit * share_force
+    tangent[0, 1] = 2.0 * sign * limit * share_velocity
+    tangent[0, 2] = 2.0 * sign * limit * share_limit + (2.0 * share - 1.0) * sign
+    after = (force - friction + loss * velocity) / gain
+    tangent[1, 0] = (1.0 - tangent[0, 0]) / gain
+    tangent[1, 1] = (loss - tangent[0, 1]) / gain
+    tangent[1, 2] = -tangent[0, 2] / gain
+    backward = -sign * after
+    tangent[2, 0] = 0.5 * (share_force * (speed - backward) - (1.0 - share) * sign * tangent[1, 0])
+    tangent[2, 1] = 0.5 * (share_velocity * (speed - backward) + share * sign - (1.0 - share) * sign * tangent[1, 1])
+    tangent[2, 2] = 0.5 * (share_limit * (speed - backward) - (1.0 - share) * sign * tangent[1, 2])
+    mean = 0.5 * (share * velocity + (1.0 - share) * after)
+    return friction, after, mean, 0.5 * (share * speed + (1.0 - share) * backward)
+
+
+@njit(cache=True)
+def step_plane(
+    force: FloatArray,
+    velocity: FloatArray,
+    limit: float,
+    gain: float,
+    loss: float,
+    out: FloatArray,
+    tangent: FloatArray,
+) -> None:
+    """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, force and velocity (2,).
+
+    `out` (7,) receives the mean friction force (2), the velocity after (2), the mean velocity (2) and the mean speed.
+    `tangent` (5, 5): of (friction, velocity after, mean speed) with respect to (force, velocity, limit).
+    """
+    mass, drag = 0.5 * (gain + loss), gain - loss
+    gain = PARTS * mass + 0.5 * drag
+    loss = PARTS * mass - 0.5 * drag
+    out[:] = 0.0
+    tangent[:, :] = 0.0
+    first, second = velocity[0], velocity[1]
+    inner = np.zeros((2, 5))  # of the velocity, with respect to (force, velocity, limit)
+    inner[0, 2] = 1.0
+    inner[1, 3] = 1.0
+    drive = np.empty((2, 5))
+    friction = np.empty((2, 5))
+    for _ in range(PARTS):
+        drive_1 = force[0] + loss * first
+        drive_2 = force[1] + loss * second
+        for k in range(5):
+            drive[0, k] = loss * inner[0, k]
+            drive[1, k] = loss * inner[1, k]
+        drive[0, 0] += 1.0
+        drive[1, 1] += 1.0
+        size = np.hypot(drive_1, drive_2)
+        before = np.hypot(first, second)
+        if before > 0.0:
+            for k in range(5):
+                tangent[4, k] += 0.5 * (first * inner[0, k] + second * inner[1, k]) / before / PARTS
+        if size <= limit:
+            out[0] += drive_1 / PARTS
+            out[1] += drive_2 / PARTS
+            for k in range(5):
+                tangent[0, k] += drive[0, k] / PARTS
+                tangent[1, k] += drive[1, k] / PARTS
+            inner[:, :] = 0.0
+            out[4] += 0.5 * first / PARTS
+            out[5] += 0.5 * second / PARTS
+            out[6] += 0.5 * before / PARTS
+            first = 0.0
+            second = 0.0
+            continue
+        unit_1 = drive_1 / size
+        unit_2 = drive_2 / size
+        ratio = limit / size
+        for k in range(5):
+            along = unit_1 * drive[0, k] + unit_2 * drive[1, k]
+            friction[0, k] = ratio * (drive[0, k] - unit_1 * along)
+            friction[1, k] = ratio * (drive[1, k] - unit_2 * along)
+        friction[0, 4] += unit_1
+        friction[1, 4] += unit_2
+        next_1 = (drive_1 - limit * unit_1) / gain
+        next_2 = (drive_2 - limit * unit_2) / gain
+        after = np.hypot(next_1, next_2)
+        for k in range(5):
+            inner[0, k] = (drive[0, k] - friction[0, k]) / gain
+            inner[1, k] = (drive[1, k] - friction[1, k]) / gain
+            tangent[0, k] += friction[0, k] / PARTS
+            tangent[1, k] += friction[1, k] / PARTS
+            if after > 0.0:
+                tangent[4, k] += 0.5 * (next_1 * inner[0, k] + next_2 * inner[1, k]) / after / PARTS
+        out[0] += limit * unit_1 / PARTS
+        out[1] += limit * unit_2 / PARTS
+        out[4] += 0.5 * (first + next_1) / PARTS
+        out[5] += 0.5 * (second + next_2) / PARTS
+        out[6] += 0.5 * (before + after) / PARTS
+        first = next_1
+        second = next_2
+    out[2] = first
+    out[3] = second
+    tangent[2, :] = inner[0]
+    tangent[3, :] = inner[1]
+
+
+@njit(cache=True)
+def step_mass(
+    force: FloatArray,
+    velocity: FloatArray,
+    limit: float,
+    gain: float,
+    loss: float,
+    line: int,
+    out: FloatArray,
+    tangent: FloatArray,
+) -> None:
+    """One step of a pair, as `step_plane`; line: 0 or 1 where only that tangent exists, -1 where both do."""
+    if line < 0:
+        step_plane(force, velocity, limit, gain, loss, out, tangent)
+        return
+    small = np.empty((3, 3))
+    friction, after, mean, speed = step_line(force[line], velocity[line], limit, gain, loss, small)
+    out[:] = 0.0
+    tangent[:, :] = 0.0
+    out[line] = friction
+    out[2 + line] = after
+    out[4 + line] = mean
+    out[6] = speed
+    rows = (line, 2 + line, 4)
+    for i in range(3):
+        for j in range(3):
+            tangent[rows[i], rows[j]] = small[i, j]
+
+
+@njit(cache=True)
+def march_masses(
+    predicted_t: FloatArray, friction: float, mass: FloatArray, drag: FloatArray, line: IntArray, step: float
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
+    """March every pair through the period until its velocity repeats.
+
+    predicted_t (n_contact, 3, N): N; the normal one at the samples, the tangential ones as means over the steps around
+    them. mass, drag (n_contact,): kg, N s/m. line (n_contact,): as in `step_mass`. step: dt, s. Returns
+
+    - force_t (n_contact, 3, N): contact force, N, the tangential one as the mean over the step;
+    - velocity_t (n_contact, 2, N+1): at the ends of the steps, m/s;
+    - place_t (n_contact, 2, N+1): displacement since the start of the period, m;
+    - status_t (n_contact, N): SEPARATED, STICK, SLIP;
+    - slip_work (n_contact,): integral of normal force times speed over the period, N m;
+    - drift (n_contact,): what is left of the change of the velocity over the last pass, as a force m v / dt, N.
+    """
+    n_contact, _, n_samples = predicted_t.shape
+    force_t = np.zeros((n_contact, 3, n_samples))
+    velocity_t = np.zeros((n_contact, 2, n_samples + 1))
+    place_t = np.zeros((n_contact, 2, n_samples + 1))
+    status_t = np.zeros((n_contact, n_samples), np.int64)
+    slip_work = np.zeros(n_contact)
+    drift = np.zeros(n_contact)
+    out = np.empty(7)
+    tangent = np.empty((5, 5))
+    for pair in range(n_contact):
+        gain = mass[pair] / step + 0.5 * drag[pair]
+        loss = mass[pair] / step - 0.5 * drag[pair]
+        largest = np.abs(predicted_t[pair, 1:]).max()
+        velocity = np.zeros(2)
+        for _ in range(MOST_PASSES):
+            velocity_t[pair, :, 0] = velocity
+            slip_work[pair] = 0.0
+            for n in range(n_samples):
+                normal = max(predicted_t[pair, 0, n], 0.0)
+                rests = velocity[0] == 0.0 and velocity[1] == 0.0
+                step_mass(predicted_t[pair, 1:, n], velocity, friction * normal, gain, loss, line[pair], out, tangent)
+                force_t[pair, 0, n] = normal
+                force_t[pair, 1, n] = out[0]
+                force_t[pair, 2, n] = out[1]
+                velocity[0] = out[2]
+                velocity[1] = out[3]
+                velocity_t[pair, 0, n + 1] = out[2]
+                velocity_t[pair, 1, n + 1] = out[3]
+                place_t[pair, 0, n + 1] = place_t[pair, 0, n] + step * out[4]
+                place_t[pair, 1, n + 1] = place_t[pair, 1, n] + step * out[5]
+                slip_work[pair] += normal * out[6] * step
+                if predicted_t[pair, 0, n] <= 0.0:
+                    status_t[pair, n] = SEPARATED
+                elif rests and out[2] == 0.0 and out[3] == 0.0:
+                    status_t[pair, n] = STICK
+                else:
+                    status_t[pair, n] = SLIP
+            change = np.hypot(velocity[0] - velocity_t[pair, 0, 0], velocity[1] - velocity_t[pair, 1, 0])
+            drift[pair] = change * mass[pair] / step
+            if change * mass[pair] <= CLOSED * largest * step * n_samples:
+                break
+    return force_t, velocity_t, place_t, status_t, slip_work, drift

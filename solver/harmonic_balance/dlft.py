@@ -1,0 +1,218 @@
+"""The harmonic balance of a joint: residual, exact Jacobian, and wear that goes with the motion.
+
+The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eq. (10). It gives at each pair, by itself, the
+contact force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` (Eqs. (10)-(12), with `X` the corrected
+motion), so that
+
+    R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
+
+is the only coupled equation. For a given wear depth this is the residual in u of the paper after a linear change of
+variable, so a Newton iteration takes the same steps. With the implicit scheme `W = W_k + h g(p)`, Eq. (24) (the print
+of (26b) lacks h): the wear rate of a pair depends on its own p alone, W is eliminated there, and the Jacobian changes
+by a rank-one block a pair:
+
+    dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
+from solver.model import ComplexArray, FloatArray, IntArray, Matrix
+from solver.packing import packable
+from solver.structure.joint import Joint
+
+
+@dataclass(frozen=True)
+class Balance:
+    """A periodic problem: a joint, the history of its pairs and the wear.
+
+    history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start
+    of the slow step. wear_gain (n_contact,): `h k_w / alpha`, 1/N; zero where W does not grow with the motion.
+    """
+
+    joint: Joint
+    history: FloatArray
+    wear_depth: FloatArray
+    wear_gain: FloatArray
+
+    @classmethod
+    def frozen(cls, joint: Joint, history: FloatArray, wear_depth: FloatArray) -> Balance:
+        """The wear is held: the depths do not depend on the motion."""
+        return cls(joint, history, wear_depth, np.zeros_like(wear_depth))
+
+    def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
+        """Predicted force (n_rel, m), N, that gives a motion, m, and contact force, N, (n_contact, 3, m) of a state."""
+        motion = displacement_h.copy()
+        motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
+        held = self.joint.penalty.inertial
+        motion[held, 1:, 0] -= self.history[held]
+        return self.joint.to_relative(force_h + self.joint.surplus(motion))
+
+    def evaluate(self, predicted_h: FloatArray) -> Evaluation:
+        """Residual and everything that it passes through, for a predicted force (n_rel, 2H+1), N."""
+        joint = self.joint
+        pairs = joint.to_pairs(predicted_h)
+        pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
+        marched = march_law(joint, pairs, self.history)
+        wear_depth = self.wear_depth + self.wear_gain * marched.slip_work
+        displacement_h = joint.motion(pairs - marched.force_h)
+        displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
+        inertial = joint.penalty.inertial
+        displacement_h[inertial, 1:, 0] += self.history[inertial]
+        motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
+        reduced_force = joint.structure.force_h()
+        residual = joint.structure.apply(motion) + force - reduced_force
+        return Evaluation(
+            **vars(marched),
+            predicted_h=predicted_h,
+            residual=residual,
+            scale=_residual_scale(reduced_force, force),
+            history=self.history,
+            displacement_h=displacement_h,
+            wear_depth=wear_depth,
+        )
+
+    def linearise(self, at: Evaluation) -> Linearisation:
+        """Exact derivative of the residual: closure of the history and wear included."""
+        joint = self.joint
+        force_tangent, slip_tangent = law_tangent(joint, at)
+        m = joint.basis.synthesis.shape[0]
+        surplus = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
+        motion_tangent = joint.motion(surplus).reshape(-1, 3 * m, 3 * m)
+        motion_tangent[:, 0, :] += self.wear_gain[:, None] * slip_tangent
+        return Linearisation(joint, at, force_tangent, motion_tangent)
+
+
+@packable
+@dataclass(frozen=True)
+class Evaluation(Marched):
+    """Residual (n_rel, 2H+1), N, of a predicted force (n_rel, 2H+1), N, with what the pairs do under it.
+
+    scale: N, of the static and of the other harmonics. history (n_contact, 2): m, as in `Balance`.
+    displacement_h (n_contact, 3, 2H+1), wear_depth (n_contact,): m.
+    """
+
+    predicted_h: FloatArray
+    residual: FloatArray
+    scale: tuple[float, float]
+    history: FloatArray
+    displacement_h: FloatArray
+    wear_depth: FloatArray
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Euclidean norm of the residual, the static harmonic and the others each over its scale."""
+        static, moving = scale or self.scale
+        return float(
+            np.hypot(np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving)
+        )
+
+
+def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tuple[float, float]:
+    """Scales of the residual, N: the static preload must not hide an error in the vibration, which may be far less."""
+    moving = max(float(np.linalg.norm(reduced_force[:, 1:])), float(np.linalg.norm(contact_force[:, 1:])))
+    static = max(float(np.linalg.norm(reduced_force[:, 0])), float(np.linalg.norm(contact_force[:, 0])), moving)
+    if static == 0.0:
+        return 1.0, 1.0
+    # below this share of the preload the vibration is lost in round-off
+    return static, max(moving, 1e-6 * static)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
+
+    at: what the pairs do where this is the derivative. Where a pair stays stuck or closed all period long its motion
+    does not depend on p: these unknowns stand in the Jacobian as columns of the identity, are left out of the coupled
+    system and follow from it (`active`).
+    """
+
+    joint: Joint
+    at: Marched
+    force_tangent: FloatArray
+    motion_tangent: FloatArray
+
+    def active(self) -> IntArray:
+        """Pairs whose motion depends on their predicted force."""
+        return np.flatnonzero(np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2)) > 1e-14)
+
+    def apply(self, step: FloatArray) -> FloatArray:
+        """Jacobian times a step (n_rel, m), N."""
+        joint = self.joint
+        spread = joint.to_pairs(step).reshape(joint.contact.n_contact, -1, 1)
+        shape = (joint.contact.n_contact, 3, step.shape[1])
+        motion = np.matmul(self.motion_tangent, spread).reshape(shape)
+        force = np.matmul(self.force_tangent, spread).reshape(shape)
+        return joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
+
+    def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
+        """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic).
+
+        n_harmonics: where given, of the lowest harmonics only.
+        """
+        whole = self.joint.basis.synthesis.shape[0]
+        m = whole if n_harmonics is None else 2 * n_harmonics + 1
+        rows, pair, component = self._rows(pairs)
+        n_rows = rows.size
+        # blocks of the pairs, spread over the rows and columns that there are: (row, harmonic, column, harmonic)
+        spread = np.zeros((2, n_rows, m, n_rows, m))
+        same = pair[:, None] == pair[None, :]
+        row, column = np.nonzero(same)
+        for place, part in enumerate((self.motion_tangent, self.force_tangent)):
+            blocks = part[pairs].reshape(pairs.size, 3, whole, 3, whole)
+            spread[place][row, :, column] = blocks[pair[row], component[row], :m, component[column], :m]
+        motion, matrix = spread[0].reshape(n_rows, m, -1), spread[1].reshape(n_rows, m, -1)
+        structure = self.joint.structure
+        matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
+        if m > 1:
+            amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
+            stiffness = structure.dynamic_stiffness[: (m - 1) // 2, rows[:, None], rows]
+            moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
+            matrix[:, 1::2] += moved.real
+            matrix[:, 2::2] -= moved.imag
+        return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
+
+    def dense_harmonic(self, pairs: IntArray, place: int) -> ComplexArray:
+        """What the Jacobian does within one harmonic above the static one: a complex matrix over the rows of `pairs`.
+
+        place: of the harmonic among those of the basis. The pairs' tangents mix its cosine and sine in any way; the
+        part that a complex factor can express is taken.
+        """
+        whole = self.joint.basis.synthesis.shape[0]
+        rows, pair, component = self._rows(pairs)
+        cosine = 2 * place + 1
+        motion, force = (
+            _complex_part(
+                part[pairs].reshape(-1, 3, whole, 3, whole)[:, :, cosine : cosine + 2, :, cosine : cosine + 2]
+            )
+            for part in (self.motion_tangent, self.force_tangent)
+        )
+        matrix = self._spread(self.joint.structure.dynamic_stiffness[place], rows, pair, component, motion[..., None])
+        matrix[np.arange(rows.size), pair] += force[pair, component][..., None]
+        return cast("ComplexArray", matrix.reshape(rows.size, -1)[:, 3 * pair + component])
+
+    def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Rows of `pairs`, and for each its place in `pairs` and its component."""
+        rows = np.flatnonzero(np.isin(self.joint.slots // 3, pairs))
+        return rows, np.searchsorted(pairs, self.joint.slots[rows] // 3), self.joint.slots[rows] % 3
+
+    def _spread(
+        self, stiffness: Matrix, rows: IntArray, pair: IntArray, component: IntArray, motion: Matrix
+    ) -> NDArray[Any]:
+        """`stiffness motion` (n_rows, n_pairs, 3, k) of blocks (n_pairs, 3, 3, k) that act within a pair."""
+        n_pairs = motion.shape[0]
+        spread = np.zeros((n_pairs, 3, rows.size), stiffness.dtype)
+        spread[pair, component] = stiffness[np.ix_(rows, rows)].T
+        moved = np.matmul(spread.transpose(0, 2, 1), motion.reshape(n_pairs, 3, -1))
+        return np.asarray(moved.transpose(1, 0, 2).reshape(rows.size, n_pairs, 3, -1))
+
+
+def _complex_part(tangent: FloatArray) -> ComplexArray:
+    """Complex-linear part (..., 3, 3) of a real map (..., 3, 2, 3, 2) between amplitudes `cosine - i sine`."""
+    cc, cs, sc, ss = tangent[:, :, 0, :, 0], tangent[:, :, 0, :, 1], tangent[:, :, 1, :, 0], tangent[:, :, 1, :, 1]
+    return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))

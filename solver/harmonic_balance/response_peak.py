@@ -1,0 +1,61 @@
+"""The largest magnitude of the responses over a period, with the tail that friction on rigid ground leaves in it.
+
+The force on a mass that slides on rigid ground jumps where the mass turns. Its harmonics above the highest one of the
+balance are known from the time samples, and the structure answers them by its receptance, `u_n = -lambda_n / Z_n` (tail
+closure, PHYSICS section 5). At the turn they all have one sign: what is left out of the peak falls with the square of
+the highest harmonic, what is left out of the first harmonic with a higher power. Other pairs add nothing: their force
+has corners only, and where they bounce its higher harmonics are those of an impact that more of them would change.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import FloatArray
+from solver.structure.condensation import build_structure
+from solver.structure.fourier import build_basis, from_complex, to_complex
+from solver.structure.joint import Joint, step_share
+
+PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
+TAIL = 3  # times the highest harmonic: up to there eight samples a harmonic tell the harmonics of the force
+
+
+def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
+    """Largest magnitudes over a period of the responses (n_response,), m, the static ones included."""
+    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    response_t = response_h @ build_basis(joint.basis.orders, PEAK_POINTS).synthesis
+    orders = tail_orders(joint)
+    if orders:
+        response_t = response_t + tail_h(joint, evaluation, orders) @ build_basis(orders, PEAK_POINTS).synthesis
+    return np.asarray(np.abs(response_t).max(axis=1))
+
+
+def tail_orders(joint: Joint) -> tuple[int, ...]:
+    """Harmonics above the highest one that are taken from the samples: odd ones where the others are odd, none where no
+    mass sits on rigid ground.
+    """
+    orders = joint.basis.orders
+    if not orders or not joint.penalty.inertial.any():
+        return ()
+    stride = 2 if orders[-1] > 1 and all(order % 2 for order in orders) else 1
+    last = min(TAIL * orders[-1], joint.basis.n_samples // 2 - orders[-1], PEAK_POINTS // 4)
+    return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
+
+
+def tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> FloatArray:
+    """Responses (n_response, 2k+1), m, in k harmonics above the highest one to the friction on masses."""
+    still = np.zeros(joint.structure.static_response.shape[0])
+    try:
+        # the load acts in the first harmonic alone
+        structure = build_structure(joint.model, joint.omega, 0.0, orders)
+    except np.linalg.LinAlgError:
+        # at one of them the structure is singular with its joint held
+        return np.zeros((still.size, 2 * len(orders) + 1))
+    marched, n_samples = joint.penalty.inertial, joint.basis.n_samples
+    force_h = np.zeros((marched.size, 3, 2 * len(orders) + 1))
+    mean_h = evaluation.force_t[marched, 1:] @ build_basis(orders, n_samples).analysis
+    force_h[marched, 1:] = mean_h / step_share(orders, n_samples)
+    force = to_complex(joint.to_relative(force_h)).T[:, :, None]
+    moved = -np.linalg.solve(structure.dynamic_stiffness, force)
+    return from_complex(still, np.matmul(structure.dynamic_response, moved)[:, :, 0].T)

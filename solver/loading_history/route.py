@@ -1,0 +1,115 @@
+"""One step along frequency or excitation to a stable state: naturally, through folds, or where the joint settles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.continuation.arc_length import JUMP, follow_arc
+from solver.continuation.natural import follow_naturally
+from solver.continuation.transient import settle
+from solver.harmonic_balance.converged import PathPoint, vibration_change
+from solver.harmonic_balance.dlft import Balance
+from solver.model import FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
+from solver.outcome import Outcome
+from solver.packing import packable
+from solver.stability.hill import is_stable
+from solver.structure.joint import Case, Joint
+
+FINE = 1e-3
+"""Of the parameter: steps that may always be taken within a step, however much the vibration changes."""
+
+SPAN = 0.05
+"""Of the parameter: natural length of arc-length steps."""
+
+MOST_LANDINGS = 6
+"""Ends of branches within a step."""
+
+
+@packable
+@dataclass(frozen=True)
+class Step:
+    """A state reached by a step and the folds that were jumped over in it (values of the parameter)."""
+
+    point: PathPoint
+    folds: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Route:
+    """The unworn joint along its frequency (parameter: rad/s; omega: None) or, at a frequency omega, rad/s, along its
+    excitation (parameter: share of excitation_amplitude, N).
+    """
+
+    case: Case
+    excitation_amplitude: float
+    omega: float | None = None
+
+    def joint_at(self, parameter: float) -> Joint:
+        """Joint at a value of the parameter."""
+        if self.omega is None:
+            return self.case.joint(parameter, self.excitation_amplitude)
+        return self.case.joint(self.omega, parameter * self.excitation_amplitude)
+
+    def balance_at(self, parameter: float, history: FloatArray) -> Balance:
+        """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
+        unworn = np.zeros(self.case.model.contact.n_contact)
+        return Balance.frozen(self.joint_at(parameter), history, unworn)
+
+    def scale(self, parameter: float) -> float:
+        """What lengths are shares of."""
+        return abs(parameter) if self.omega is None else 1.0
+
+    def step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | Outcome:
+        """Stable state at a target from a state of the same harmonics and samples, or why there is none."""
+        tolerance = self.case.settings.tolerance
+        scale = self.scale(target)
+        folds: list[float] = []
+
+        def stays(point: PathPoint) -> bool:
+            balance = self.balance_at(point.parameter, point.evaluation.history)
+            return is_stable(balance.linearise(point.evaluation), solver)
+
+        for _ in range(MOST_LANDINGS):
+            if effort.exhausted:
+                break
+            point, arrived = follow_naturally(
+                self.balance_at, start, target, solver, tolerance, effort, fine=FINE * scale
+            )
+            if arrived and stays(point):
+                return Step(point, tuple(folds))
+            # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
+            end = start if arrived else point
+            arc = follow_arc(self.balance_at, end, target, SPAN * scale, solver, tolerance, effort, stays)
+            if arc.point is not None:
+                return Step(arc.point, (*folds, *arc.jumps))
+            landed = self._settled(end, target, arc.folds, solver, effort)
+            if isinstance(landed, Outcome):
+                return landed
+            folds.extend(landed.folds)
+            if landed.point.parameter == target:
+                return Step(landed.point, tuple(folds))
+            start = landed.point
+        return Outcome.BRANCH_LOST
+
+    def _settled(
+        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
+    ) -> Step | Outcome:
+        """State that the structure settles to from the end of a branch, a little beyond it on the way to the target."""
+        fine = FINE * self.scale(end.parameter)
+        beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
+        joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
+        unworn = np.zeros(self.case.model.contact.n_contact)
+        why, found = settle(self.case, joint, unworn, end.evaluation, before, end.history, solver, effort)
+        if found is None:
+            return why
+        landed = PathPoint(beyond, found.evaluation, found.history)
+        if vibration_change(end.evaluation, found.evaluation) <= JUMP:
+            return Step(landed)
+        # an arc that broke off behind the fold has found it all the same
+        return Step(
+            landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (target - end.parameter)),)
+        )

@@ -1,0 +1,224 @@
+"""An approximate inverse of the balance's Jacobian that marches through the period, for joints that slip and open.
+
+With the state `x` of a pair (normal: what of the predicted force it does not take up; tangents: Eqs. (11)-(15)), which
+moves it by `x / eps`, the Jacobian takes a step `dp` to `dp + (Z_r / eps - 1) dx`. Were Z_r one real stiffness Z in all
+harmonics, this would hold sample by sample,
+
+    dp(t) + (Z / eps - 1) dx(t) = r(t),      dx(t) = A(t) dp(t) + B(t) dx(t - 1),
+
+with A and B the derivatives of the contact law at a sample, blocks of the pairs; B is the history. So
+
+    [1 + (Z / eps - 1) A(t)] dp(t) = r(t) - (Z / eps - 1) B(t) dx(t - 1)
+
+is solved by a march with one small system a sample, whatever the number of harmonics that the pairs couple, and costs
+less than one factorisation in harmonics. The stiffness of an elastic joint does hardly change with the harmonic, but
+for resonances of what lies behind it, each of which adds next to nothing but a rank of two, `U V^T`, in the harmonics
+that it is near. With T the march to `dp` and T_x that to `dx`,
+
+    J^-1 r = T r - T U (1 + V^T T_x U)^-1 V^T T_x r
+
+takes them in. What cutting off the series changes is less than that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from solver.contact.alternating_frequency_time import Marched
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.harmonic_balance.dlft import Linearisation
+from solver.model import FloatArray, IntArray
+from solver.structure.fourier import FourierBasis, build_basis
+from solver.structure.joint import Joint
+
+PASSES = 2  # through the period: slip forgets what was before it
+RESONANT = 0.2  # of the penalty: a difference of stiffness that is taken in
+RANK = 6  # the most of them in a harmonic
+POWERS = 2
+
+
+@dataclass(frozen=True)
+class SampleMarch:
+    """What the march through N samples needs; n = 3 n_contact, with identity rows where a pair has no displacement.
+
+    inverse (N, n, n): of `1 + (Z / eps - 1) A`. coupling (n, n): `Z / eps - 1`. own (N, n_contact, 3, 3): A. carried
+    (N, n_contact, 2, 2): B.
+    """
+
+    joint: Joint
+    basis: FourierBasis
+    inverse: FloatArray
+    coupling: FloatArray
+    own: FloatArray
+    carried: FloatArray
+
+    def solve(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Step `T r` and change of the state `T_x r` (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
+        spread = self.joint.to_pairs(right).reshape(-1, right.shape[1])
+        right_t = np.ascontiguousarray((spread @ self.basis.synthesis).T)
+        both_t = march_samples(self.inverse, self.coupling, self.own, self.carried, right_t, PASSES)
+        step, state = (
+            self.joint.to_relative((part_t.T @ self.basis.analysis).reshape(-1, 3, right.shape[1])) for part_t in both_t
+        )
+        return step, state
+
+
+@dataclass(frozen=True)
+class PeriodFactor:
+    """The march, and k directions in which the harmonics differ.
+
+    seen (k, n_rel (2H+1)): `V^T`. bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`. pairs, rows: all of the joint.
+    """
+
+    march: SampleMarch
+    seen: FloatArray
+    bent: FloatArray
+    pairs: IntArray
+    rows: IntArray
+    exact: bool = False
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Approximate solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
+        step, state = self.march.solve(right)
+        return step - (self.bent @ (self.seen @ state.ravel())).reshape(right.shape)
+
+
+def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
+    """Factor of a Jacobian; None where it has none: a sample's system is singular, or pairs are marched with masses."""
+    joint = tangent.joint
+    if joint.penalty.inertial.any():
+        return None
+    try:
+        march = build_march(tangent)
+        added, seen = resonances(joint)
+        both = [march.solve(column.reshape(joint.slots.size, -1)) for column in added]
+        steps, states = (np.reshape([part[place] for part in both], added.shape).T for place in (0, 1))
+        bent = np.linalg.solve((np.eye(len(seen)) + seen @ states).T, steps.T).T
+    except np.linalg.LinAlgError:
+        return None
+    return PeriodFactor(march, seen, bent, np.arange(joint.contact.n_contact), np.arange(joint.slots.size))
+
+
+def build_march(tangent: Linearisation) -> SampleMarch:
+    """March of a Jacobian. Raises numpy.linalg.LinAlgError where a sample's system is singular."""
+    joint = tangent.joint
+    # every sample costs a system: as few as tell the harmonics apart
+    n_samples, highest = joint.basis.n_samples, max(joint.basis.orders, default=0)
+    while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
+        n_samples //= 2
+    own, carried = sample_tangents(joint, tangent.at, joint.basis.n_samples // n_samples)
+    n_contact, size = joint.contact.n_contact, 3 * joint.contact.n_contact
+    coupling = np.zeros((size, size))
+    coupling[np.ix_(joint.slots, joint.slots)] = stiffness_of_most(joint) / _penalty(joint)
+    coupling[joint.slots, joint.slots] -= 1.0
+    blocks = np.ascontiguousarray(coupling.reshape(size, n_contact, 3).transpose(1, 0, 2))
+    matrix = np.empty((n_samples, size, size))
+    for sample in range(n_samples):
+        matrix[sample] = np.matmul(blocks, own[sample]).transpose(1, 0, 2).reshape(size, size)
+    matrix[:, np.arange(size), np.arange(size)] += 1.0
+    basis = build_basis(joint.basis.orders, n_samples)
+    return SampleMarch(joint, basis, np.asarray(np.linalg.inv(matrix), np.float64), coupling, own, carried)
+
+
+def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
+    """Directions in which the stiffness over the penalty differs from that of most harmonics: their sum `U V^T`.
+
+    Rows (k, n_rel (2H+1)) of U and V, for each harmonic those of the singular values above `RESONANT`, of which no more
+    than `RANK` are looked for: by a few powers of the difference on fixed vectors, which finds large ones well enough.
+    """
+    structure, n_rel, m = joint.structure, joint.slots.size, joint.basis.synthesis.shape[0]
+    most, penalty = stiffness_of_most(joint), _penalty(joint)
+    added, seen = [], []
+    for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
+        change = (stiffness - most) / penalty
+        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(RANK, n_rel)))
+        for _ in range(POWERS):
+            image = change @ (change.conj().T @ np.linalg.qr(image)[0])
+        basis = np.linalg.qr(image)[0]
+        left, size, right = np.linalg.svd(basis.conj().T @ change, full_matrices=False)
+        for direction in np.flatnonzero(size > RESONANT):
+            force, motion = size[direction] * (basis @ left[:, direction]), right[direction]
+            both = np.zeros((2, 2, n_rel, m))
+            if place == 0:
+                both[:, 0, :, 0] = force.real, motion.real
+            else:
+                # an amplitude `cosine - i sine`: real and imaginary part of its product with the motion
+                cosine, sine = 2 * place - 1, 2 * place
+                both[0, :, :, cosine], both[0, :, :, sine] = (force.real, -force.imag), (-force.imag, -force.real)
+                both[1, :, :, cosine], both[1, :, :, sine] = (motion.real, motion.imag), (motion.imag, -motion.real)
+            added += list(both[0, : 1 + (place > 0)])
+            seen += list(both[1, : 1 + (place > 0)])
+    shape = (len(seen), n_rel * m)
+    return np.reshape(added, shape), np.reshape(seen, shape)
+
+
+def _penalty(joint: Joint) -> FloatArray:
+    """Penalty (n_rel,), N/m, of each relative displacement."""
+    penalty = joint.penalty
+    return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.slots]
+
+
+def stiffness_of_most(joint: Joint) -> FloatArray:
+    """Real stiffness (n_rel, n_rel), N/m, that most harmonics have: the median leaves out those near a resonance."""
+    structure = joint.structure
+    return np.asarray(
+        np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
+    )
+
+
+def sample_tangents(joint: Joint, at: Marched, stride: int) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample.
+
+    With respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state before it
+    (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
+    """
+    status = at.status_t[:, ::stride].T
+    normal = at.predicted_t[:, 0, ::stride].T
+    ahead = (at.predicted_t[:, 1:, ::stride] - at.state_t[:, :, :-1:stride]).transpose(2, 0, 1)
+    size = np.linalg.norm(ahead, axis=2)
+    unit = ahead / np.where(size > 0.0, size, 1.0)[:, :, None]
+    slips = status == SLIP
+    limit = np.where(slips, joint.friction_coefficient * normal, 0.0)
+    ratio = limit / np.where(size > 0.0, size, 1.0)
+    across = ratio[:, :, None, None] * (np.eye(2) - unit[:, :, :, None] * unit[:, :, None, :])
+    own, carried = np.zeros((*status.shape, 3, 3)), across
+    own[:, :, 0, 0] = status == SEPARATED
+    own[:, :, 1:, 1:] = np.where((status == STICK)[:, :, None, None], 0.0, np.eye(2) - across)
+    pushed = slips & joint.has_normal
+    own[:, :, 1:, 0] = np.where(pushed[:, :, None], -joint.friction_coefficient * unit, 0.0)
+    carried[status == STICK] = np.eye(2)
+    return own, carried
+
+
+@njit(cache=True)
+def march_samples(
+    inverse: FloatArray, coupling: FloatArray, own: FloatArray, carried: FloatArray, right_t: FloatArray, passes: int
+) -> tuple[FloatArray, FloatArray]:
+    """Steps of the predicted force and changes of the state (N, n) for right-hand sides (N, n), from no change of the
+    state before the first pass; the other arrays as in `SampleMarch`.
+    """
+    n_samples, size = right_t.shape
+    n_contact = size // 3
+    step_t, state_t = np.zeros((n_samples, size)), np.zeros((n_samples, size))
+    state, before = np.zeros((n_contact, 2)), np.zeros(size)
+    for _ in range(passes):
+        for n in range(n_samples):
+            for pair in range(n_contact):
+                for i in range(2):
+                    before[3 * pair + 1 + i] = (
+                        carried[n, pair, i, 0] * state[pair, 0] + carried[n, pair, i, 1] * state[pair, 1]
+                    )
+            step = np.dot(inverse[n], right_t[n] - np.dot(coupling, before))
+            for pair in range(n_contact):
+                for i in range(3):
+                    changed = before[3 * pair + i]
+                    for k in range(3):
+                        changed += own[n, pair, i, k] * step[3 * pair + k]
+                    state_t[n, 3 * pair + i] = changed
+                    if i > 0:
+                        state[pair, i - 1] = changed
+            step_t[n] = step
+    return step_t, state_t

@@ -1,0 +1,121 @@
+"""A factorisation of the balance's Jacobian that GMRES on the exact one is preconditioned with.
+
+In the space in which the pairs slip or open where that is small (`slip_preconditioner`), else by a march through the
+period (`period_preconditioner`). That one knows no determinant and no masses on sliders: there it is by groups of
+harmonics. The harmonics of a balance are coupled by the pairs that slip or open. That coupling is strong among the
+lowest ones, which are factorised together as far as `DENSE` unknowns go; above, each harmonic is factorised on its own
+with the part of the pairs' tangents that keeps it to itself, a complex matrix of as many rows as there are relative
+displacements.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import scipy.linalg
+
+from solver.harmonic_balance.dlft import Linearisation
+from solver.model import ComplexArray, FloatArray, IntArray
+from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
+from solver.newton.slip_preconditioner import (
+    NEUTRAL,
+    SlipFactor,
+    SlipSpace,
+    build_slip_factor,
+    find_slip_space,
+    sign_of,
+)
+
+EXACT = 600  # directions of the slip space that are all kept: 48 pairs with five harmonics near a resonance
+FEW_ROWS = 40  # relative displacements up to which impacts couple most harmonics and directions
+EXACT_FEW = 2500  # directions that are all kept then
+MOST = 1000  # directions of the slip space beyond which it is not factorised
+CUTOFF = 0.05  # of a pair that slips: directions that are left out where there are more than are all kept
+DENSE = 800  # unknowns of the lowest harmonics that are factorised together
+
+RealFactor = tuple[FloatArray, IntArray]
+
+
+@dataclass(frozen=True)
+class HarmonicFactor:
+    """pairs: those whose rows (n_rows,) it holds, all harmonics of them, 2H+1.
+
+    low: factorisation of the lowest harmonics up to `n_low`. high (H - n_low, n_rows, n_rows): inverses of the others.
+    """
+
+    pairs: IntArray
+    rows: IntArray
+    n_low: int
+    low: RealFactor
+    high: ComplexArray
+    exact: bool = False
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant, 0 where it is singular; a complex factor has the square of a modulus."""
+        return sign_of(self.low)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Approximate solution (n_rows, 2H+1) for a right-hand side (n_rows, 2H+1)."""
+        m_low = 2 * self.n_low + 1
+        solved = np.empty_like(right)
+        low = scipy.linalg.lu_solve(self.low, np.ascontiguousarray(right[:, :m_low]).ravel(), check_finite=False)
+        solved[:, :m_low] = low.reshape(-1, m_low)
+        # inverses, because one product of all harmonics takes less time than solves one by one
+        moving = (right[:, m_low::2] - 1j * right[:, m_low + 1 :: 2]).T[:, :, None]
+        amplitude = np.matmul(self.high, np.ascontiguousarray(moving))[:, :, 0].T
+        solved[:, m_low::2], solved[:, m_low + 1 :: 2] = amplitude.real, -amplitude.imag
+        return solved
+
+
+SignedFactor = SlipFactor | HarmonicFactor
+Factor = SignedFactor | PeriodFactor
+
+
+def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
+    """Factorisation of a Jacobian whose pairs other than `pairs` do not depend on their predicted force."""
+    space = _slip_space(tangent)
+    if space is not None:
+        return build_slip_factor(tangent, space)
+    return build_period_factor(tangent) or build_harmonic_factor(tangent, pairs)
+
+
+def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor:
+    """The same, one that knows the sign of its determinant."""
+    space = _slip_space(tangent)
+    return build_harmonic_factor(tangent, pairs) if space is None else build_slip_factor(tangent, space)
+
+
+def _slip_space(tangent: Linearisation) -> SlipSpace | None:
+    few = tangent.joint.slots.size <= FEW_ROWS
+    return find_slip_space(tangent, EXACT_FEW if few else EXACT, MOST, CUTOFF)
+
+
+def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:
+    """Factorisation of the rows and columns of `pairs`; singular matrices give infinities, not errors."""
+    rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+    n_harmonics = tangent.joint.basis.n_harmonics
+    n_low = n_harmonics
+    while n_low > 0 and rows.size * (2 * n_low + 1) > DENSE:
+        n_low -= 1
+    matrix = tangent.dense(pairs, n_low)
+    matrix[np.diag_indices_from(matrix)] += NEUTRAL
+    with warnings.catch_warnings():
+        # an exactly singular matrix: Newton's method goes on and judges by the residual
+        warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
+        low = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+    high = np.empty((n_harmonics - n_low, rows.size, rows.size), complex)
+    for place in range(n_low, n_harmonics):
+        high[place - n_low] = _inverse(tangent.dense_harmonic(pairs, place))
+    return HarmonicFactor(pairs, rows, n_low, low, high)
+
+
+def _inverse(matrix: ComplexArray) -> ComplexArray:
+    """Inverse of a matrix, the identity where it has none: it only steers an iteration."""
+    try:
+        return cast("ComplexArray", np.linalg.inv(matrix))
+    except np.linalg.LinAlgError:
+        return np.eye(matrix.shape[0], dtype=complex)

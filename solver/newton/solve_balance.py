@@ -1,0 +1,70 @@
+"""Newton's method on a harmonic balance, and what a computation may spend on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.clock import computing_time
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.prolongation import transfer
+from solver.model import FloatArray
+from solver.newton.iteration import NewtonResult, solve_newton
+from solver.newton.linear_solver import JacobianSolver
+from solver.structure.joint import Case, Joint
+
+
+@dataclass
+class Effort:
+    """Newton iterations spent; shared by the parts of one computation. limit: after which a branch is given up.
+    deadline: CPU time of the thread, s, after which the whole computation is.
+    """
+
+    iterations: int = 0
+    limit: float = np.inf
+    deadline: float = np.inf
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no more steps are to be begun."""
+        return self.iterations > self.limit
+
+    def check_time(self) -> None:
+        """Raises OutOfTimeError behind the deadline."""
+        if self.deadline < np.inf and computing_time() > self.deadline:
+            raise OutOfTimeError
+
+
+class OutOfTimeError(Exception):
+    """A computation has taken the CPU time that it may take; those who began it say so in an outcome."""
+
+
+def solve_balance(
+    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, effort: Effort, most: int = 30
+) -> NewtonResult[Evaluation]:
+    """Newton on one balance from a predicted force (n_rel, 2H+1), N. Raises OutOfTimeError."""
+
+    def direction(at: Evaluation) -> FloatArray:
+        effort.check_time()
+        return solver.solve(balance.linearise(at), -at.residual)
+
+    result = solve_newton(
+        balance.evaluate,
+        direction,
+        start,
+        tolerance,
+        most,
+    )
+    effort.iterations += result.iterations
+    return result
+
+
+def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, effort: Effort) -> PathPoint | None:
+    """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
+    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
+    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
+    if not result.converged:
+        return None
+    return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))

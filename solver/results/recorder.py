@@ -1,0 +1,234 @@
+"""From the steps of a march to the cycle counts that were asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
+from solver.results.history import WearHistory
+from solver.results.loops import LOOP_PHASES
+from solver.results.state_report import StateReport
+from solver.settings import Scheme
+
+REPORTED = (
+    "wear_depth",
+    "mean_pressure",
+    "slip_range",
+    "open_fraction",
+    "response",
+    "response_peak",
+    "loop_displacement",
+    "loop_force",
+)
+CERTIFIED = (
+    "residual",
+    "penetration",
+    "tension",
+    "cone_violation",
+    "energy_error",
+    "response_error",
+    "wear_rate_error",
+)
+
+SAFETY = {"implicit": 1.5, "explicit": 0.8, "adaptive": 0.6}
+"""Error of a history over its difference to the companion. Expected where steps are short: 1, 1/3 and 1/3. Measured on
+the dovetail: 0.6 to 1.3, 0.2 to 0.9, 0.05 to 0.4."""
+
+NEAR = 0.5
+"""Share of the cycle count: histories that differ by when something happens cross each other, and where they do their
+difference is small and says nothing. It is the largest one since this share of the count (measured on the dovetail,
+211.25 Hz, steps of 2000 cycles: without it a quarter of the true error at the crossing). What comes later has no part
+in it, so that an error does not depend on how far a study goes."""
+
+_CARRIED = ("_kept", "_last", "_local", "_truncation", "_pair_truncation")
+
+
+@dataclass
+class Recorder:
+    """Takes the state after every step and keeps the requested counts.
+
+    Between two steps they are interpolated linearly. Adaptive: the depth by cubics with the wear rates at both ends
+    instead, and all else by the share of the step's worn volume, of which the state is a function: long steps of higher
+    order are worth that. Fretting loops (n_loops of them) are interpolated phase by phase like all else, so that they
+    close, stay within the friction cone and have the mean pressure that is reported at the same count.
+    """
+
+    model: ReducedModel
+    cycles: FloatArray
+    start_iterations: int
+    start_time: float
+    scheme: Scheme
+    n_loops: int = 0
+    _kept: dict[str, Any] = field(init=False, repr=False)
+    _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
+    _local: float = field(init=False, default=0.0, repr=False)
+    _truncation: float = field(init=False, default=0.0, repr=False)
+    _pair_truncation: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        n_output, n_contact = self.cycles.size, self.model.contact.n_contact
+        n_response = len(self.model.response_names)
+        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(REPORTED, (n_contact,))
+        shapes |= dict.fromkeys(("response", "response_peak"), (n_response,))
+        shapes |= dict.fromkeys(("loop_displacement", "loop_force"), (self.n_loops, LOOP_PHASES, 3))
+        self._kept = {
+            name: np.full((n_output, *shape), np.nan, complex if name == "response" else float)
+            for name, shape in shapes.items()
+        }
+        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "local", "truncation", *CERTIFIED)}
+        self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
+        self._kept["stable"] = np.zeros(n_output, np.bool_)
+        self._kept["pair_truncation"] = np.full((n_output, n_contact), np.nan)
+        self._pair_truncation = np.zeros(n_contact)
+
+    def carried(self) -> dict[str, Any]:
+        """What was kept so far, to be packed."""
+        return {name: getattr(self, name) for name in _CARRIED}
+
+    def take_up(self, carried: dict[str, Any]) -> None:
+        """Go on from what another one has kept so far."""
+        for name in _CARRIED:
+            setattr(self, name, carried[name])
+
+    def add(self, cycle: float, report: StateReport, wear_coefficient: float, error: float | None = None) -> None:
+        """State at the end of a step; `cycle` never falls.
+
+        error: estimated local error of the step, as worn volume, m3; None for that of an Euler step, which is its
+        difference to the trapezoidal rule.
+        """
+        per_work = wear_coefficient / self.model.contact.area
+        rate = wear_coefficient * float(report.slip_work.sum())
+        smooth = self.scheme == "adaptive"
+        if self._last is None:
+            wanted = self.cycles == cycle
+            before, before_report, before_rate = cycle, report, rate
+        else:
+            before, before_report, before_rate = self._last
+            wanted = (self.cycles > before) & (self.cycles <= cycle)
+            self._local += 0.5 * (cycle - before) * abs(rate - before_rate) if error is None else error
+            # what the wear rates are wrong by for want of harmonics and samples, of all pairs together and of each
+            for value, of in ((before_rate, before_report), (rate, report)):
+                half = 0.5 * (cycle - before)
+                self._truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
+                self._pair_truncation = self._pair_truncation + half * per_work * of.slip_work_error
+        share = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
+        ends = [(of.wear_depth, per_work * of.slip_work) for of in (before_report, report)]
+        depth = depth_within(share, cycle - before, ends[0], ends[1], smooth)
+        if smooth and cycle > before:
+            share = self._worn_share(depth, before_report.wear_depth, report.wear_depth, share)
+        for name in REPORTED:
+            old, new = getattr(before_report, name), getattr(report, name)
+            shares = share.reshape(-1, *(1,) * old.ndim)
+            self._kept[name][wanted] = depth if name == "wear_depth" else old + shares * (new - old)
+        self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
+        for name in CERTIFIED:
+            # what holds for both states holds in between
+            self._kept[name][wanted] = np.fmax(
+                getattr(before_report.certificate, name), getattr(report.certificate, name)
+            )
+        self._kept["harmonics_used"][wanted] = report.resolution.highest
+        self._kept["samples_used"][wanted] = report.resolution.samples
+        self._kept["stable"][wanted] = report.certificate.stable
+        self._kept["local"][wanted] = self._local
+        self._kept["truncation"][wanted] = self._truncation
+        self._kept["pair_truncation"][wanted] = self._pair_truncation
+        self._last = (cycle, report, rate)
+
+    def _worn_share(
+        self, depth: FloatArray, before: FloatArray, after: FloatArray, otherwise: FloatArray
+    ) -> FloatArray:
+        """Share (n,) of the worn volume of a step."""
+        area = self.model.contact.area
+        whole = float((after - before) @ area)
+        return np.asarray((depth - before) @ area / whole) if whole > 0.0 else otherwise
+
+    def failed(self, outcome: Outcome, run_time: float) -> WearHistory:
+        """History of a point that has no start state: NaN everywhere."""
+        return self.finish(outcome, np.nan, 0, run_time, self._kept["wear_depth"])
+
+    def finish(
+        self,
+        outcome: Outcome,
+        jump_cycle: float,
+        iterations: int,
+        run_time: float,
+        companion: FloatArray,
+        met: Sequence[tuple[float, float]] = (),
+        start_share: float = 0.0,
+    ) -> WearHistory:
+        """The history as far as it was computed.
+
+        companion (n_output, n_contact): m, depths of the coarser history, NaN at counts that it has not come to. met:
+        counts at which it has come to the history, and how much both differ there, m3. start_share: error of the wear
+        rates of the start state, which is at least that of what they wear.
+        """
+        kept, area = dict(self._kept), self.model.contact.area
+        local, truncation, of_pairs = (kept.pop(name) for name in ("local", "truncation", "pair_truncation"))
+        difference = _held(np.abs(kept["wear_depth"] - companion)) * SAFETY[self.scheme]
+        volume = kept["wear_depth"] @ area
+        # rates that are all wrong by one share are those of another time: this counts where the wear rises steeply
+        late = np.divide(self.cycles * kept["wear_rate"], volume, out=np.ones_like(volume), where=volume > 0.0)
+        # in the first steps both histories are wrong by the same, which only the rates at their ends show
+        differs = np.fmax(difference @ area, SAFETY[self.scheme] * _before(self.cycles, met))
+        differs = np.fmax(differs, start_share * volume)
+        error = np.fmax(differs, local) + truncation * np.fmax(late, 1.0)
+        relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
+        relative[np.isnan(volume)] = np.nan
+        # what the volume is wrong by beyond the difference of the histories falls to the pairs as they are worn
+        rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
+        reached = np.flatnonzero(np.isfinite(volume))
+        return WearHistory(
+            outcome=outcome,
+            cycles=self.cycles,
+            worn_volume=volume,
+            worn_volume_error=relative,
+            wear_depth_error=difference + of_pairs + rest[:, None] * kept["wear_depth"],
+            jump_cycle=jump_cycle,
+            error_estimate=float(relative[reached[-1]]) if reached.size else float("nan"),
+            newton_iterations=self.start_iterations + iterations,
+            run_time=self.start_time + run_time,
+            last_cycle=float("nan") if self._last is None else min(self._last[0], float(self.cycles[-1])),
+            **kept,
+        )
+
+
+def _held(difference: FloatArray) -> FloatArray:
+    """Differences (n_output, n_contact) of two histories; the last one where the coarser of them knows no more."""
+    held = difference.copy()
+    for row in range(1, len(held)):
+        held[row] = np.where(np.isnan(held[row]), held[row - 1], held[row])
+    return held
+
+
+def _before(cycles: FloatArray, met: Sequence[tuple[float, float]]) -> FloatArray:
+    """Largest of the differences met since a share of each count; 0 where there is none."""
+    at, differences = (np.array(values, dtype=float) for values in (zip(*met, strict=True) if met else ((), ())))
+    first, last = np.searchsorted(at, NEAR * cycles, "left"), np.searchsorted(at, cycles, "right")
+    return np.array([differences[one:other].max(initial=0.0) for one, other in zip(first, last, strict=True)])
+
+
+def depth_within(
+    fraction: FloatArray,
+    length: float,
+    before: tuple[FloatArray, FloatArray],
+    after: tuple[FloatArray, FloatArray],
+    smooth: bool,
+) -> FloatArray:
+    """Depth (n, n_contact), m, at fractions (n,) of a step of so many cycles.
+
+    before, after: depth, m, and wear rate, m per cycle, (n_contact,) at its ends. Linear, or smooth: Hermite's cubic
+    with slopes that are cut so that wear never falls; a cubic is monotone where both slopes are at most three times
+    the mean one (Fritsch and Carlson 1980).
+    """
+    s = fraction[:, None]
+    grown = after[0] - before[0]
+    if not smooth or length <= 0.0:
+        return np.asarray(before[0] + s * grown)
+    slopes = [np.minimum(rate * length, 3.0 * grown) for _, rate in (before, after)]
+    bent = (1.0 - s) ** 2 * s * slopes[0] - s**2 * (1.0 - s) * slopes[1]
+    return np.asarray(before[0] + s**2 * (3.0 - 2.0 * s) * grown + bent)

@@ -1,0 +1,96 @@
+"""What is reported of a converged state: pressures, slip, responses, loops, its certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from solver.accuracy.certificate import Certificate
+from solver.contact.coulomb import SEPARATED
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.response_peak import largest_responses
+from solver.model import ComplexArray, FloatArray
+from solver.packing import packable
+from solver.results.history import PeriodicState
+from solver.results.loops import contact_loops
+from solver.settings import Resolution
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Joint
+
+
+def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
+    """The frozen state that is handed on, in physical units; its arrays lie in rows, as when read from a file."""
+    at = point.evaluation
+    return PeriodicState(
+        omega=joint.omega,
+        excitation_amplitude=joint.excitation_amplitude,
+        displacement_h=np.array(at.displacement_h, order="C"),
+        contact_force_h=np.array(at.force_h, order="C"),
+        start_history=np.array(at.history, order="C"),
+        wear_depth=np.array(at.wear_depth, order="C"),
+    )
+
+
+@packable
+@dataclass(frozen=True)
+class StateReport:
+    """What is reported of a state; units and shapes as in `WearHistory`, without the cycle dimension.
+
+    slip_work (n_contact,): N m, and what it is wrong by for want of harmonics.
+    """
+
+    wear_depth: FloatArray
+    slip_work: FloatArray
+    slip_work_error: FloatArray
+    mean_pressure: FloatArray
+    slip_range: FloatArray
+    open_fraction: FloatArray
+    response: ComplexArray
+    response_peak: FloatArray
+    loop_displacement: FloatArray
+    loop_force: FloatArray
+    certificate: Certificate
+    resolution: Resolution
+
+
+def report_state(
+    joint: Joint,
+    evaluation: Evaluation,
+    certificate: Certificate,
+    slip_work_error: FloatArray,
+    loops: tuple[int, ...] = (),
+) -> StateReport:
+    """Pressures, slip and responses of a converged state. loops: pairs whose fretting loops are reported, too."""
+    loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
+    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    return StateReport(
+        wear_depth=evaluation.wear_depth,
+        slip_work=evaluation.slip_work,
+        slip_work_error=slip_work_error,
+        mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
+        slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
+        open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
+        response=to_complex(response_h)[:, 0],
+        response_peak=largest_responses(joint, evaluation),
+        loop_displacement=loop_displacement,
+        loop_force=loop_force,
+        certificate=certificate,
+        resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
+    )
+
+
+@njit(cache=True)
+def largest_distance(state_t: FloatArray) -> FloatArray:
+    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period."""
+    n_contact, _, n_points = state_t.shape
+    largest = np.zeros(n_contact)
+    for pair in range(n_contact):
+        for i in range(n_points):
+            for j in range(i):
+                first = state_t[pair, 0, i] - state_t[pair, 0, j]
+                second = state_t[pair, 1, i] - state_t[pair, 1, j]
+                largest[pair] = max(largest[pair], first * first + second * second)
+    return np.sqrt(largest)

@@ -1,0 +1,30 @@
+"""Whether a periodic state is one that the structure stays at: the sign of the determinant of its Jacobian.
+
+Let the harmonic amplitudes vary slowly as exp(sigma t). A disturbance of a state then obeys
+
+    [Z_r(i n w + sigma) du/dp + dlambda/dp] p' = 0,
+
+Hill's equation in the unknown p of the balance. Its determinant is real for real sigma and is that of the Jacobian at
+sigma = 0. For sigma towards infinity the structure is so stiff that the determinant has the sign of that of du/dp,
+which is not negative: a pair takes away a share between nothing (stuck: its columns are those of the identity) and all
+(open) of what is predicted. The same sign belongs to the joint that is stuck all over (identity) and to the one that is
+open all over (Z_n / eps: the square of a modulus for each complex harmonic, a positive definite static stiffness).
+So a negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the
+real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
+
+What this does not see: an even number of such multipliers, a period doubling (see `doubling`), a Neimark-Sacker
+bifurcation (complex pair). Disturbances of friction are taken as slow, with the closure over one period.
+"""
+
+from __future__ import annotations
+
+from solver.harmonic_balance.dlft import Linearisation
+from solver.newton.linear_solver import JacobianSolver
+
+
+def is_stable(tangent: Linearisation, solver: JacobianSolver) -> bool:
+    """False where the state has an odd number of real multipliers beyond +1.
+
+    tangent: of a state at a fixed wear depth (`wear_gain` zero): the vibration is fast, the wear is slow.
+    """
+    return solver.determinant_sign(tangent) >= 0.0

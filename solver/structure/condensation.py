@@ -1,0 +1,160 @@
+"""The linear structure at one frequency, condensed on the relative displacements of the contact pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.structure.fourier import from_complex, to_complex
+
+
+@dataclass(frozen=True)
+class CondensedStructure:
+    """`Z_r u + lambda = F_r` per harmonic, Eq. (8), and how responses follow from u.
+
+    `n_rel` relative displacements, in the order pair by pair: closing, tangent 1, tangent 2, those that exist.
+
+    static_stiffness (n_rel, n_rel): N/m. dynamic_stiffness (H, n_rel, n_rel) complex: the harmonics above it, N/m.
+    static_force (n_rel,): N. harmonic_force (n_rel,) complex: N, harmonic 1, for the actual excitation amplitude.
+    static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
+    static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
+    drive (n_rel,), drive_offset complex: `conj(F) . x` of the harmonic load F and its displacements x, N m, from u and
+    with u = 0.
+    """
+
+    static_stiffness: FloatArray
+    dynamic_stiffness: ComplexArray
+    static_force: FloatArray
+    harmonic_force: ComplexArray
+    static_response: FloatArray
+    dynamic_response: ComplexArray
+    static_offset: FloatArray
+    harmonic_offset: ComplexArray
+    drive: ComplexArray
+    drive_offset: complex
+
+    def force_h(self) -> FloatArray:
+        """Reduced force F_r (n_rel, 2H+1), N."""
+        amplitudes = np.zeros((self.static_force.size, self.dynamic_stiffness.shape[0]), complex)
+        if amplitudes.shape[1]:
+            amplitudes[:, 0] = self.harmonic_force
+        return from_complex(self.static_force, amplitudes)
+
+    def apply(self, displacement_h: FloatArray) -> FloatArray:
+        """`Z_r u`, N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
+        moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
+        force = np.matmul(self.dynamic_stiffness, moving)[:, :, 0].T
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
+
+    def response_h(self, displacement_h: FloatArray) -> FloatArray:
+        """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""
+        moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
+        amplitudes = np.matmul(self.dynamic_response, moving)[:, :, 0].T
+        if amplitudes.shape[1]:
+            amplitudes[:, 0] += self.harmonic_offset
+        return from_complex(self.static_response @ displacement_h[:, 0] + self.static_offset, amplitudes)
+
+    def input_work(self, displacement_h: FloatArray) -> float:
+        """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
+        if not self.dynamic_stiffness.shape[0]:
+            return 0.0
+        return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
+
+
+def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
+    """Indices of the relative displacements in the linear model, (n_rel,), and their slots `3 pair + component`."""
+    slots = np.flatnonzero(contact.dofs.ravel() >= 0)
+    return contact.dofs.ravel()[slots], slots
+
+
+def build_structure(
+    model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
+) -> CondensedStructure:
+    """Dynamic stiffness `K + i n w C - (n w)^2 M` of the harmonics n, condensed; omega in rad/s, amplitude in N.
+
+    orders: harmonics above the static one, ascending; the excitation acts in the first of them, which is 1.
+
+    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
+    """
+    relative, _ = relative_indices(model.contact)
+    still = model.linear[0]
+    static = condense(np.real(still.stiffness), relative, still.load_static)
+    n_response = still.response.shape[0]
+    stiffness = np.empty((len(orders), relative.size, relative.size), complex)
+    response = np.empty((len(orders), n_response, relative.size), complex)
+    force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
+    drive, drive_offset = np.zeros(relative.size, complex), 0.0 + 0.0j
+    for (linear, conjugate), places in _by_structure(model, orders):
+        # a folded nodal diameter has the conjugate matrices, not the conjugate of the sum: damping stays positive
+        mass, damping, elastic, shape, rows = (
+            part.conj() if conjugate else part
+            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
+        )
+        harmonics = np.array(orders)[places]
+        frequency = omega * harmonics[:, None, None]
+        full = elastic + 1j * frequency * damping - frequency**2 * mass
+        moving = condense(full, relative, np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape)
+        stiffness[places] = moving.stiffness
+        response[places] = rows @ moving.motion
+        if harmonics[0] == 1:
+            force, offset = moving.force[0], rows @ moving.held_motion[0]
+            load = excitation_amplitude * shape.conj()
+            drive, drive_offset = load @ moving.motion[0], complex(load @ moving.held_motion[0])
+    return CondensedStructure(
+        static_stiffness=np.real(static.stiffness),
+        dynamic_stiffness=stiffness,
+        static_force=np.real(static.force),
+        harmonic_force=force,
+        static_response=np.real(still.response @ static.motion),
+        dynamic_response=response,
+        static_offset=np.real(still.response @ static.held_motion),
+        harmonic_offset=offset,
+        drive=drive,
+        drive_offset=drive_offset,
+    )
+
+
+def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
+    """Linear model (and whether its conjugate holds) with the places of the harmonics that see it."""
+    seen = [model.harmonic_structure(harmonic) for harmonic in orders]
+    for number, (linear, conjugate) in enumerate(seen):
+        same = [other is linear and folded == conjugate for other, folded in seen]
+        if same.index(True) == number:
+            yield (linear, conjugate), np.flatnonzero(same)
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
+
+    stiffness (..., n_rel, n_rel): Schur complement, N/m. force (..., n_rel): reduced load, N. motion (..., n, n_rel):
+    all displacements that follow a unit u. held_motion (..., n): displacement under the load with u = 0, m.
+    """
+
+    stiffness: Matrix
+    force: Matrix
+    motion: Matrix
+    held_motion: Matrix
+
+
+def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
+    """Static condensation of (dynamic) stiffnesses; raises numpy.linalg.LinAlgError where the rest is singular."""
+    n = full.shape[-1]
+    internal = np.setdiff1d(np.arange(n), relative)
+    motion = cast("Matrix", np.zeros((*full.shape[:-1], relative.size), full.dtype))
+    motion[..., relative, np.arange(relative.size)] = 1.0
+    held_motion = np.zeros((*full.shape[:-2], n), np.result_type(full, load))
+    stiffness: Matrix = full[..., relative[:, None], relative]
+    force: Matrix = load[..., relative]
+    if internal.size:
+        right = np.concatenate([full[..., internal[:, None], relative], load[..., internal, None]], axis=-1)
+        solved = np.linalg.solve(full[..., internal[:, None], internal], right)
+        motion[..., internal, :], held_motion[..., internal] = -solved[..., :-1], solved[..., -1]
+        coupling = full[..., relative[:, None], internal]
+        stiffness = stiffness + coupling @ motion[..., internal, :]
+        force = force - (coupling @ held_motion[..., internal, None])[..., 0]
+    return Condensed(stiffness, force, motion, held_motion)

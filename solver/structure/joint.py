@@ -1,0 +1,184 @@
+"""The joint at one frequency and load: condensed structure, contact pairs, friction and penalty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.settings import Resolution, SolverSettings, first_resolution
+from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
+from solver.structure.fourier import FourierBasis, build_basis, from_complex, to_complex
+from solver.structure.penalty import Penalty, build_penalty, static_penalty
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Everything that stays the same while a periodic state is sought, with H harmonics.
+
+    model: what the structure was condensed from.
+    slots (n_rel,): place `3 pair + component` of each relative displacement. has_normal (n_contact,): False where the
+    normal force is constant. line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
+    """
+
+    model: ReducedModel
+    omega: float
+    excitation_amplitude: float
+    friction_coefficient: float
+    structure: CondensedStructure
+    contact: ContactInterface
+    basis: FourierBasis
+    slots: IntArray
+    penalty: Penalty
+    has_normal: BoolArray
+    line: IntArray
+
+    @property
+    def state_stiffness(self) -> FloatArray:
+        """Tangential state over slip (n_contact,), N/m; 1 where the state is the slip itself, of inertial pairs."""
+        return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
+
+    @property
+    def sample_step(self) -> float:
+        """Time between two samples, s."""
+        return 2.0 * np.pi / (self.omega * self.basis.n_samples)
+
+    def step_share(self) -> FloatArray:
+        """Harmonics (2H+1,) of the mean over a step around each sample, over those of the samples."""
+        return step_share(self.basis.orders, self.basis.n_samples)
+
+    def _inertial_compliance(self) -> ComplexArray:
+        """Displacement per force (n_inertial, H), m/N, of the marched masses, exactly as the steps see it."""
+        orders = np.array(self.basis.orders, np.float64)
+        angle = np.pi * orders / self.basis.n_samples
+        mass, drag = (part[self.penalty.inertial][:, None] for part in (self.penalty.mass, self.penalty.drag))
+        impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
+        return cast("ComplexArray", np.sin(angle) / angle / (1j * self.omega * orders * impedance))
+
+    def motion(self, surplus: FloatArray) -> FloatArray:
+        """Motion (n_contact, 3, 2H+1, ...), m, from the predicted force beyond the contact force, same shape, N.
+
+        Linear; Eq. (12) divided by the penalty, for inertial pairs Newton's law. The mean position of inertial pairs is
+        relative to their history.
+        """
+        shape = (-1,) + (1,) * (surplus.ndim - 2)
+        moved = np.empty_like(surplus)
+        moved[:, 0] = surplus[:, 0] / self.penalty.normal.reshape(shape)
+        moved[:, 1:] = surplus[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
+        if self.penalty.inertial.any() and surplus.shape[2] > 1:
+            self._move_masses(surplus, moved)
+        return moved
+
+    def _move_masses(self, surplus: FloatArray, moved: FloatArray) -> None:
+        fast = self.penalty.inertial
+        # harmonics last, as `to_complex` has them
+        force = np.moveaxis(surplus[fast, 1:], 2, -1)
+        compliance = self._inertial_compliance().reshape((-1,) + (1,) * (force.ndim - 2) + (self.basis.n_harmonics,))
+        mean = force[..., 0] / self.penalty.mean[fast].reshape((-1,) + (1,) * (force.ndim - 2))
+        moved[fast, 1:] = np.moveaxis(from_complex(mean, compliance * to_complex(force)), -1, 2)
+
+    def surplus(self, motion: FloatArray) -> FloatArray:
+        """Predicted force beyond the contact force, N, from a motion (n_contact, 3, 2H+1), m; undoes `motion`."""
+        force = np.empty_like(motion)
+        force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
+        force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]
+        fast = self.penalty.inertial
+        if fast.any() and motion.shape[2] > 1:
+            mean = motion[fast, 1:, 0] * self.penalty.mean[fast, None]
+            force[fast, 1:] = from_complex(mean, to_complex(motion[fast, 1:]) / self._inertial_compliance()[:, None])
+        return force
+
+    def to_pairs(self, values: FloatArray) -> FloatArray:
+        """(n_contact, 3, m) from (n_rel, m): zero where a pair has no such displacement."""
+        spread = np.zeros((3 * self.contact.n_contact, values.shape[1]))
+        spread[self.slots] = values
+        return spread.reshape(self.contact.n_contact, 3, values.shape[1])
+
+    def to_relative(self, values: FloatArray) -> FloatArray:
+        """(n_rel, m) from (n_contact, 3, m)."""
+        return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.slots]
+
+
+def step_share(orders: tuple[int, ...], n_samples: int) -> FloatArray:
+    """Harmonics (2H+1,) of the mean over a step around each of the samples, over those of the samples."""
+    share = np.ones(2 * len(orders) + 1)
+    angle = np.pi * np.array(orders) / n_samples
+    share[1::2] = share[2::2] = np.sin(angle) / angle
+    return share
+
+
+@dataclass(frozen=True)
+class Case:
+    """What all states of one computation have in common; `joint` gives the joint at a frequency and amplitude.
+
+    penalty_omega: rad/s, where the penalty is taken. resolution: harmonics and samples in use.
+    """
+
+    model: ReducedModel
+    friction_coefficient: float
+    penalty_omega: float
+    penalty: Penalty
+    settings: SolverSettings
+    resolution: Resolution
+
+    def joint(self, omega: float, excitation_amplitude: float) -> Joint:
+        """Joint at the angular frequency omega (rad/s) and excitation amplitude (N).
+
+        Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
+        """
+        _, slots = relative_indices(self.model.contact)
+        tangents = self.model.contact.dofs[:, 1:] >= 0
+        one = tangents.sum(axis=1) == 1
+        return Joint(
+            model=self.model,
+            omega=omega,
+            excitation_amplitude=excitation_amplitude,
+            friction_coefficient=self.friction_coefficient,
+            structure=build_structure(self.model, omega, excitation_amplitude, self.resolution.orders),
+            contact=self.model.contact,
+            basis=build_basis(self.resolution.orders, self.resolution.samples),
+            slots=slots,
+            penalty=self.penalty,
+            has_normal=self.model.contact.dofs[:, 0] >= 0,
+            line=np.where(one, np.argmax(tangents, axis=1), -1),
+        )
+
+    def at(self, resolution: Resolution) -> Case:
+        """The same case with other harmonics and samples."""
+        if resolution == self.resolution:
+            return self
+        penalty = build_penalty(self.model, self.penalty_omega, resolution.highest)
+        return replace(self, penalty=penalty, resolution=resolution)
+
+
+def build_case(
+    model: ReducedModel,
+    friction_coefficient: float,
+    omega: float,
+    settings: SolverSettings,
+    resolution: Resolution | None = None,
+) -> Case:
+    """Case of a scene; omega, rad/s, is where the penalty is taken: the same for states that are compared.
+
+    resolution: to begin with; by default the first one that the settings allow.
+    """
+    chosen = resolution or first_resolution(settings)
+    penalty = build_penalty(model, omega, chosen.highest)
+    return Case(model, friction_coefficient, omega, penalty, settings, chosen)
+
+
+def static_joint(joint: Joint, load_factor: float) -> Joint:
+    """The same joint under a part of its static load alone: no harmonics, one sample."""
+    structure = joint.structure
+    held = replace(
+        structure,
+        dynamic_stiffness=structure.dynamic_stiffness[:0],
+        dynamic_response=structure.dynamic_response[:0],
+        static_force=load_factor * structure.static_force,
+        static_offset=load_factor * structure.static_offset,
+    )
+    # a static load has no velocity: every pair is held at displacement level
+    penalty = static_penalty(joint.penalty)
+    return replace(joint, excitation_amplitude=0.0, structure=held, basis=build_basis((), 1), penalty=penalty)

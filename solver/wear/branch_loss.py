@@ -1,0 +1,41 @@
+"""The branch of a joint that wears has ended: the stable state beyond, at which the vibration goes on."""
+
+from __future__ import annotations
+
+from solver.continuation.after_fold import landings
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.model import FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
+from solver.outcome import Outcome
+from solver.stability.hill import is_stable
+from solver.structure.joint import Case, Joint
+from solver.wear.euler import held_wear
+
+
+def stays(joint: Joint, evaluation: Evaluation, solver: JacobianSolver) -> bool:
+    """Whether a state is stable with its wear held."""
+    held = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
+    return is_stable(held.linearise(evaluation), solver)
+
+
+def state_after_fold(
+    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
+) -> PathPoint | Outcome:
+    """A stable state at the depths `worn` (n_contact,), m, just beyond the end of the branch of `last`; why there is
+    none. Raises OutOfTimeError.
+    """
+    for landed in landings(case, joint, last, worn, solver, effort):
+        if isinstance(landed, Outcome):
+            return landed
+        # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
+        balance_at = held_wear(joint, landed.evaluation.wear_depth, worn)
+        start = PathPoint(0.0, landed.evaluation, landed.history)
+        point, arrived = follow_naturally(
+            balance_at, start, 1.0, solver, case.settings.tolerance, effort, keep_history=True
+        )
+        if arrived and stays(joint, point.evaluation, solver):
+            return PathPoint(0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation))
+    return Outcome.MARCH_FAILED
