@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from studyrunner.toml_text import read_toml
+from studyrunner.study.toml_text import read_toml
 from studyrunner.user_error import UserError
 
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.endings import take_endings
-from studyrunner.launcher import LauncherError, job_size, launcher_rank
-from studyrunner.ranks import POLL_SECONDS, Ranks, start_ranks, wait_for_message
-from studyrunner.streams import keep_talking, last_error
+from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
+from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks, wait_for_message
+from studyrunner.system.endings import take_endings
+from studyrunner.system.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
-    from studyrunner.study import Study
+    from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit statuses."""
@@ -182,7 +182,7 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
     Whether it had come to its end already, with nothing left to do here.
     """
-    from studyrunner.schedule import RankInterrupted
+    from studyrunner.mpi.schedule import RankInterrupted
 
     ranks.send(RankInterrupted(), 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
@@ -198,11 +198,11 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
     try:
-        from studyrunner.roll_call import call_roll
+        from studyrunner.mpi.version_check import call_roll
 
         call_roll(ranks)
         options = parse_options(arguments)
-        from studyrunner.study_file import read_study
+        from studyrunner.study.study_file import read_study
 
         study = read_study(options.study, options.overrides)
         if options.plan:
@@ -226,7 +226,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.roll_call import answer_roll_call
+    from studyrunner.mpi.version_check import answer_roll_call
 
     answer_roll_call(ranks)
     job = wait_for_message(ranks)
@@ -240,9 +240,9 @@ def _follow(ranks: Ranks) -> int:
 
 
 def _show_plan(study: Study) -> int:
-    from studyrunner.plan import format_plan
-    from studyrunner.scene import build_study_scene, describe_scene
-    from studyrunner.tasks import build_tasks
+    from studyrunner.plan.printed import format_plan
+    from studyrunner.plan.tasks import build_tasks
+    from studyrunner.scene.scene import build_study_scene, describe_scene
 
     facts = describe_scene(build_study_scene(study))
     print(format_plan(study, facts, build_tasks(study, facts.n_displacements)), flush=True)
@@ -253,8 +253,8 @@ def _show_plan(study: Study) -> int:
 
 
 def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.output import check_output
-    from studyrunner.scene import write_study_scene
+    from studyrunner.netcdf.output import check_output
+    from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
     write_study_scene(study, target)
@@ -263,11 +263,11 @@ def _write_scene(study: Study, path: Path) -> int:
 
 
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
-    from studyrunner.output import check_output
+    from studyrunner.netcdf.output import check_output
+    from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.progress import RunProgress, format_seconds
-    from studyrunner.provenance import compare_with_archived
     from studyrunner.run import Interrupted, run_study
-    from studyrunner.scene import build_study_scene
+    from studyrunner.scene.scene import build_study_scene
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_output("-o", path, study.files)

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from studyrunner.costs import LearnedCosts
-from studyrunner.crashes import MOST_DEATHS, Crash
+from studyrunner.checkpoint.completion_index import Ledger
 from studyrunner.evaluate import CRASHED, NOT_COMPUTED
-from studyrunner.ledger import Ledger
+from studyrunner.mpi.crashes import MOST_DEATHS, Crash
+from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.results import MarchResult, StartResult
+from studyrunner.plan.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
 from studyrunner.progress import Standing
-from studyrunner.results import MarchResult, StartResult
-from studyrunner.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
 
 _TRIES_AGAIN = 1
 """So often a task that a fault of the machine has ended is done again by itself."""

@@ -15,12 +15,17 @@ from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, SolverSettings
-from studyrunner.machine_faults import MachineFaultError, guard_kernel_cache, is_fault_of_machine, tells_of_machine
-from studyrunner.places import describe_reach, known_to, show_count
-from studyrunner.records import failed_result
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.study import AUTO
-from studyrunner.tasks import BranchTask, MarchTask, Settings
+from studyrunner.checkpoint.records import failed_result
+from studyrunner.plan.places import describe_reach, known_to, show_count
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask, Settings
+from studyrunner.study.study import AUTO
+from studyrunner.system.machine_faults import (
+    MachineFaultError,
+    guard_kernel_cache,
+    is_fault_of_machine,
+    tells_of_machine,
+)
 
 
 @dataclass(frozen=True)

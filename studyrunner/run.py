@@ -8,8 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, Ledger
+from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.store import Store
 from studyrunner.course import Course, fault_of
-from studyrunner.crashes import (
+from studyrunner.evaluate import COMPLETE, CRASHED, NOT_COMPUTED, build_evaluator, failed_results
+from studyrunner.mpi.crashes import (
     MOST_DEATHS,
     Crash,
     Evaluate,
@@ -19,35 +23,25 @@ from studyrunner.crashes import (
     note_tasks,
     read_tally,
 )
-from studyrunner.earlier import holds_finished_result
-from studyrunner.evaluate import (
-    COMPLETE,
-    CRASHED,
-    NOT_COMPUTED,
-    build_evaluator,
-    failed_results,
-)
-from studyrunner.folder_lock import StoreInUseError
-from studyrunner.identity import Identities, hash_of_kind
-from studyrunner.ledger import MOST_OF_OTHERS, Ledger
-from studyrunner.output import parts_folder, remove_leftovers
+from studyrunner.mpi.ranks import Ranks
+from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
+from studyrunner.netcdf.earlier import holds_finished_result
+from studyrunner.netcdf.output import parts_folder, remove_leftovers
+from studyrunner.plan.identity import Identities, hash_of_kind
+from studyrunner.plan.results import MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 from studyrunner.progress import RunProgress, count
-from studyrunner.ranks import Ranks
-from studyrunner.records import record_type
-from studyrunner.results import MarchResult, StartResult
-from studyrunner.scene import describe_scene, scene_to_keep
-from studyrunner.scene_variables import build_scene_variables
-from studyrunner.schedule import serve_tasks, work_on_tasks
-from studyrunner.store import Store
-from studyrunner.study import Study
-from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.scene.scene import describe_scene, scene_to_keep
+from studyrunner.scene.variables import build_scene_variables
+from studyrunner.study.study import Study
+from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
     import numpy as np
 
     from solver.model import ReducedModel
-    from studyrunner.gather import Gathered
+    from studyrunner.netcdf.gather import Gathered
 
 
 class Interrupted(KeyboardInterrupt):
@@ -132,7 +126,7 @@ def run_study(
 
         def write() -> RunSummary:
             # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-            from studyrunner.gather import gather
+            from studyrunner.netcdf.gather import gather
 
             store.flush()
             gathered = gather(study, facts, ledger, path, of_scene, kept_scene, keep_finished)

@@ -1,0 +1,1 @@
+"""The linear structure: Fourier basis, condensation on the relative displacements, penalty; and the joint."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.streams import keep_talking
+from studyrunner.system.streams import keep_talking
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -99,10 +99,10 @@ def _report(options: Options) -> int:
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.progress import count, format_seconds
-        from studyrunner.report.door import check_numbers, reading_errors
         from studyrunner.report.gallery import draw_report
-        from studyrunner.report.page import write_page
-        from studyrunner.report.result import open_result
+        from studyrunner.report.page.page import write_page
+        from studyrunner.report.reading.door import check_numbers, reading_errors
+        from studyrunner.report.reading.result import open_result
 
         result = open_result(options.result)
         with result.dataset, reading_errors(str(options.result)):

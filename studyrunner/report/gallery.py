@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from studyrunner.report.drawing import Drawing, Missing, Table, style
-from studyrunner.report.figures_flank import draw_flanks
-from studyrunner.report.figures_loops import draw_loops
-from studyrunner.report.figures_outcome import draw_certificates, draw_outcomes
-from studyrunner.report.figures_response import draw_responses
-from studyrunner.report.figures_sector import draw_sector
-from studyrunner.report.figures_stability import list_branches, list_stability
-from studyrunner.report.figures_volume import draw_volumes
-from studyrunner.report.precision import study_precision
-from studyrunner.report.precision_figures import draw_precision
-from studyrunner.report.result import Result
+from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.figures.loops import draw_loops
+from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes
+from studyrunner.report.figures.response import draw_responses
+from studyrunner.report.figures.sector import draw_sector
+from studyrunner.report.figures.stability import list_branches, list_stability
+from studyrunner.report.figures.volume import draw_volumes
+from studyrunner.report.precision.errors import study_precision
+from studyrunner.report.precision.figures import draw_precision
+from studyrunner.report.reading.result import Result
 
 Item = Drawing | Missing | Table
 _Part = Callable[[Result], Iterator[Item]]

@@ -14,10 +14,10 @@ import time
 
 from studyrunner.course import start_marches
 from studyrunner.evaluate import build_evaluator
-from studyrunner.results import StartResult
-from studyrunner.scene import build_study_scene, describe_scene
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.plan.results import StartResult
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.study.study_file import read_study
 
 STUDY = (
     "axes.frequency={start = 209.5, stop = 213.5, num = 100}",

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.results import StartResult
-from studyrunner.study_file import read_study
-from studyrunner.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.plan.results import StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.study.study_file import read_study
 from tests.benchmarks.simulation import Overheads, Replay, lognormal, replay
 
 N_DISPLACEMENTS = 144

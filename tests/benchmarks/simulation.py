@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.dispatch`, `studyrunner.costs` and `studyrunner.run.Course`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `studyrunner.plan.costs` and `studyrunner.run.Course`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from studyrunner.course import Course
-from studyrunner.dispatch import Assignment, Dispatcher
-from studyrunner.results import MarchResult, StartResult
-from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.mpi.dispatch import Assignment, Dispatcher
+from studyrunner.plan.results import MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 
 Task = BranchTask | MarchTask
 
@@ -32,7 +32,7 @@ class Overheads:
 
 
 class MemoryLedger:
-    """Takes the place of `studyrunner.ledger.Ledger`, without a disk: nothing is there from an earlier run."""
+    """Takes the place of `Ledger`, without a disk: nothing is there from an earlier run."""
 
     n_points_finished = 0
 

@@ -28,12 +28,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner import progress, run, schedule
+from studyrunner import progress, run
 from studyrunner.cli import main
-from studyrunner.launcher import launcher_rank
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.mpi import schedule
+from studyrunner.mpi.launcher import launcher_rank
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_branch, fake_evaluate
 
 BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner.part_files import load_keys
+from studyrunner.checkpoint.part_files import load_keys
 from tests.mpi.launching import CHEAP, FAKED, results, run_to_end
 
 STUDY = [

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner import ranks
 from studyrunner.evaluate import CRASHED, NOT_COMPUTED
+from studyrunner.mpi import ranks
 from tests.mpi.conftest import OpenMpi
 from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Ended, Running, results, watch_to_end
 

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.evaluate import endings
-from studyrunner.gather import coordinates
-from studyrunner.provenance import POINTS_LEFT, describe_run
-from studyrunner.results import MarchResult
-from studyrunner.scene import SceneFacts
-from studyrunner.scene_variables import SceneVariable
-from studyrunner.study import Study
+from studyrunner.netcdf.gather import coordinates
+from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
+from studyrunner.plan.results import MarchResult
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.variables import SceneVariable
+from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 

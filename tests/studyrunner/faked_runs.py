@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from studyrunner import run
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
 
 Task = BranchTask | MarchTask

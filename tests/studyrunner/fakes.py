@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from studyrunner.checkpoint.completion_index import Ledger
+from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.store import Store
 from studyrunner.course import start_marches
-from studyrunner.identity import Identities, hash_of_kind
-from studyrunner.ledger import Ledger
-from studyrunner.records import record_type
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import SceneFacts
-from studyrunner.sharing import Index
-from studyrunner.store import Store
-from studyrunner.study import Study
-from studyrunner.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.plan.identity import Identities, hash_of_kind
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.sharing import Index
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(

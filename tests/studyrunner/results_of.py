@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.records import pack, record_type
-from studyrunner.results import MarchResult
-from studyrunner.sharing import Index
-from studyrunner.study import Study
-from studyrunner.tasks import build_tasks
+from studyrunner.checkpoint.records import pack, record_type
+from studyrunner.plan.results import MarchResult
+from studyrunner.plan.sharing import Index
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.study.study import Study
 from tests.studyrunner.fakes import FACTS, fake_histories
 
 Batch = tuple[list[tuple[Index, ...]], NDArray[np.void]]

@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 
 from studies.scene_file import read_mesh, read_scene
-from studyrunner import provenance
 from studyrunner.cli import main
-from studyrunner.scene import build_study_scene, describe_scene
-from studyrunner.study_file import read_study
+from studyrunner.netcdf import provenance
+from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.study.study_file import read_study
 
 pytestmark = pytest.mark.usefixtures("reader")
 

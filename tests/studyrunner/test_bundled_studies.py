@@ -10,7 +10,7 @@ import xarray as xr
 
 from studyrunner.cli import main
 from studyrunner.evaluate import COMPLETE
-from studyrunner.study_file import bundled_studies
+from studyrunner.study.study_file import bundled_studies
 
 SMALL = {
     "dovetail": [

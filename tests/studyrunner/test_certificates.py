@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studyrunner.certificates import CertificateTable
-from studyrunner.records import pack, record_type
-from studyrunner.results import MarchResult
-from studyrunner.study import Study
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.checkpoint.records import pack, record_type
+from studyrunner.plan.results import MarchResult
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.certificates import CertificateTable
 from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS, fake_histories, without_values
 

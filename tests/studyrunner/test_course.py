@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from studyrunner.course import Course
-from studyrunner.results import StartResult
-from studyrunner.study_file import read_study
-from studyrunner.tasks import BranchTask, TaskPlan, build_tasks
+from studyrunner.plan.results import StartResult
+from studyrunner.plan.tasks import BranchTask, TaskPlan, build_tasks
+from studyrunner.study.study_file import read_study
 from tests.benchmarks.scheduling import SHAPES, replay_shape
 from tests.benchmarks.simulation import MemoryLedger, Overheads, replay
 from tests.studyrunner.fakes import fake_branch, fake_march

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from studyrunner import dispatch
-from studyrunner.costs import LearnedCosts
-from studyrunner.dispatch import AHEAD_SECONDS, WATCH_SECONDS, Dispatcher
+from studyrunner.mpi import dispatch
+from studyrunner.mpi.dispatch import AHEAD_SECONDS, WATCH_SECONDS, Dispatcher
+from studyrunner.plan.costs import LearnedCosts
 
 
 @dataclass(frozen=True)

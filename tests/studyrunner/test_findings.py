@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from solver.outcome import Outcome
-from studyrunner.findings import MOST_NAMED, Findings
-from studyrunner.sharing import Index
-from studyrunner.study_file import read_study
+from studyrunner.plan.sharing import Index
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.findings import MOST_NAMED, Findings
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results_of import batches, results_of
 

@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import files, gather
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.evaluate import NOT_COMPUTED, endings
-from studyrunner.gather import Gathered
-from studyrunner.output import parts_folder
-from studyrunner.results import MarchResult
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.netcdf import gather
+from studyrunner.netcdf.gather import Gathered
+from studyrunner.netcdf.output import parts_folder
+from studyrunner.plan.results import MarchResult
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.study.study_file import read_study
+from studyrunner.system import files
 from studyrunner.user_error import StorageError
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
 from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger, fake_march, fake_starts, without_values

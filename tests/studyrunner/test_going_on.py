@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import schedule
+from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.store import Store
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.mpi import schedule
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 from tests.studyrunner.fakes import fake_branch
 
@@ -103,7 +103,7 @@ def test_an_interrupt_anywhere_in_the_main_thread(
 
 def test_an_interrupt_while_the_result_is_written(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = whole(solver)
-    from studyrunner import gather
+    from studyrunner.netcdf import gather
 
     own, n_calls = gather.gather, 0
 
@@ -208,7 +208,7 @@ def test_a_second_run_of_the_same_study_is_refused(
             second.append(main(TWO_WAYS))
 
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-    monkeypatch.setattr("studyrunner.folder_lock._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.system.folder_lock._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(TWO_WAYS) == 0
     assert second == [2]

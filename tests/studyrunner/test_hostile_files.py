@@ -13,8 +13,8 @@ from typing import Protocol
 import h5py
 import pytest
 
-from studyrunner.archive import check_result_file
 from studyrunner.cli import main
+from studyrunner.study.archive import check_result_file
 from studyrunner.user_error import UserError
 from tests.studyrunner.hostile_files import ALLOWED, SCENES, STUDY, TEXTS, change_scene, sparse_file
 from tests.studyrunner.own_time import Stopwatch

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import solver
-from studyrunner import identity
-from studyrunner.identity import Identities, hash_of_kind
-from studyrunner.records import record_type
-from studyrunner.study_file import read_study
-from studyrunner.tasks import TaskPlan, build_tasks
+from studyrunner.checkpoint.records import record_type
+from studyrunner.plan import identity
+from studyrunner.plan.identity import Identities, hash_of_kind
+from studyrunner.plan.tasks import TaskPlan, build_tasks
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS
 
 BASE = {

@@ -11,7 +11,7 @@ import xarray as xr
 
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
-from studyrunner.provenance import POINTS_LEFT
+from studyrunner.netcdf.provenance import POINTS_LEFT
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
 pytestmark = pytest.mark.usefixtures("folder")

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, Ledger
 from studyrunner.course import Course
 from studyrunner.evaluate import COMPLETE
-from studyrunner.ledger import MOST_OF_OTHERS, Ledger
-from studyrunner.results import Kept
-from studyrunner.study_file import read_study
-from studyrunner.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.plan.results import Kept
+from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_branch, fake_march, open_ledger, without_values
 
 BASE = (

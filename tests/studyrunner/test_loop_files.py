@@ -12,11 +12,12 @@ import pytest
 import xarray as xr
 
 from solver.results.loops import LOOP_PHASES, loop_phases
-from studyrunner import gather, variables
+from studyrunner import variables
 from studyrunner.cli import main
-from studyrunner.scene import SceneFacts
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.netcdf import gather
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, open_ledger, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")

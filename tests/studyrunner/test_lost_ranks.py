@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studyrunner.checkpoint.completion_index import Ledger
 from studyrunner.course import Course
-from studyrunner.crashes import Crash
 from studyrunner.evaluate import CRASHED
-from studyrunner.ledger import Ledger
-from studyrunner.results import Kept
-from studyrunner.study_file import read_study
-from studyrunner.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.mpi.crashes import Crash
+from studyrunner.plan.results import Kept
+from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import fake_branch, fake_march, open_ledger
 
 OVERRIDES = ("axes.frequency={start=1, stop=2, num=5}", "axes.step=[100, 200]", "axes.wear_coefficient=[1e-11, 5e-12]")

@@ -16,11 +16,11 @@ import xarray as xr
 from solver.outcome import describe_error
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.costs import Kin, LearnedCosts, Lesson
-from studyrunner.dispatch import Dispatcher
 from studyrunner.evaluate import NOT_COMPUTED
-from studyrunner.machine_faults import is_fault_of_machine, tells_of_machine
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.mpi.dispatch import Dispatcher
+from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.system.machine_faults import is_fault_of_machine, tells_of_machine
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
 pytestmark = pytest.mark.usefixtures("folder")

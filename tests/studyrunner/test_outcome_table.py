@@ -6,9 +6,9 @@ import itertools
 
 import pytest
 
-from studyrunner.outcome_table import OutcomeTable
-from studyrunner.sharing import Index
-from studyrunner.study_file import read_study
+from studyrunner.plan.sharing import Index
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.outcome_table import OutcomeTable
 from tests.studyrunner.results_of import batches, results_of
 
 GRID = (

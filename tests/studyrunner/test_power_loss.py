@@ -10,8 +10,9 @@ from typing import IO
 import numpy as np
 import pytest
 
-from studyrunner import files, part_writer
-from studyrunner.store import Store
+from studyrunner.checkpoint import part_writer
+from studyrunner.checkpoint.store import Store
+from studyrunner.system import files
 from tests.studyrunner.test_store import KIND, assert_same, kept, key, record
 
 
@@ -144,7 +145,7 @@ def test_the_result_is_on_the_disk_before_anything_is_removed(tmp_path: Path, mo
 
 def test_a_new_folder_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[Path] = []
-    from studyrunner import store as store_module
+    from studyrunner.checkpoint import store as store_module
 
     monkeypatch.setattr(store_module, "sync_folder", synced.append)
     Store(tmp_path / "parts", KIND).close()

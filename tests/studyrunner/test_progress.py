@@ -14,10 +14,10 @@ from rich.console import Console
 
 from studyrunner import progress, run
 from studyrunner.cli import main
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.progress import RunProgress, Standing
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
-from studyrunner.tasks import BranchTask, MarchTask
+from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
 
 LINE = re.compile(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studyrunner.part_files import KEY
-from studyrunner.records import empty_record, failed_result, pack, record_type
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.checkpoint.part_files import KEY
+from studyrunner.checkpoint.records import empty_record, failed_result, pack, record_type
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.study.study_file import read_study
 from studyrunner.variables import KEPT
 from tests.studyrunner.fakes import FACTS, fake_histories
 

@@ -19,11 +19,11 @@ from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.evaluate import _solver_settings, build_result
+from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.progress import format_seconds
-from studyrunner.results import Kept, MarchResult, StartResult
-from studyrunner.scene import describe_scene
-from studyrunner.study_file import read_study
-from studyrunner.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.scene.scene import describe_scene
+from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED
 from tests.studyrunner.fakes import fake_evaluate, without_values
 from tests.studyrunner.histories import history

@@ -10,8 +10,8 @@ import pytest
 from solver.model import ReducedModel, needed_nodal_diameters
 from studies.scene_file import write_scene
 from studyrunner.cli import main
-from studyrunner.scene import AUTOMATIC_HARMONICS_OF_A_WAVE, build_study_scene, describe_scene, largest_harmonics
-from studyrunner.study_file import read_study
+from studyrunner.scene.scene import AUTOMATIC_HARMONICS_OF_A_WAVE, build_study_scene, describe_scene, largest_harmonics
+from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.studies.scene_models import plain, sector
 

@@ -11,13 +11,14 @@ import xarray as xr
 
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import dovetail_sector, scene_mesh
-from studyrunner import gather, scene_variables
 from studyrunner.cli import main
-from studyrunner.output import parts_folder
-from studyrunner.scene import build_study_scene
-from studyrunner.scene_variables import build_scene_variables
-from studyrunner.study_file import read_study
-from studyrunner.tasks import build_tasks
+from studyrunner.netcdf import gather
+from studyrunner.netcdf.output import parts_folder
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.scene import variables as scene_variables
+from studyrunner.scene.scene import build_study_scene
+from studyrunner.scene.variables import build_scene_variables
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
 from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger
 

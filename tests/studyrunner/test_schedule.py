@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from studyrunner.costs import LearnedCosts
-from studyrunner.dispatch import Assignment
-from studyrunner.launcher import LauncherError, launcher_rank, launcher_size
-from studyrunner.ranks import Alone, start_ranks
-from studyrunner.schedule import _Delivery, serve_tasks
+from studyrunner.mpi.dispatch import Assignment
+from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
+from studyrunner.mpi.ranks import Alone, start_ranks
+from studyrunner.mpi.schedule import _Delivery, serve_tasks
+from studyrunner.plan.costs import LearnedCosts
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,11 @@ from solver.packing import pack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution
 from studyrunner.evaluate import build_result, march
-from studyrunner.results import Kept, MarchResult
-from studyrunner.sharing import Share, march_counts, share_histories
-from studyrunner.study import Study
-from studyrunner.study_file import read_study
-from studyrunner.tasks import MarchTask, build_tasks
+from studyrunner.plan.results import Kept, MarchResult
+from studyrunner.plan.sharing import Share, march_counts, share_histories
+from studyrunner.plan.tasks import MarchTask, build_tasks
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import no_keep
 from tests.studyrunner.histories import history
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.study_file import read_study
+from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, CERTIFICATE, KEPT
 
 STUDY = [

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studyrunner.small_wear import SMALL, SmallWear, pair_spacing
-from studyrunner.study_file import read_study
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.small_wear import SMALL, SmallWear, pair_spacing
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results_of import batches, results_of
 

@@ -14,14 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studyrunner import folder_lock, part_writer, stock
-from studyrunner import store as store_module
-from studyrunner.crashes import count_crashes, forget_crashes, read_tally
-from studyrunner.folder_lock import StoreInUseError
-from studyrunner.part_files import KEY, KEY_TYPE
-from studyrunner.results import Kept
-from studyrunner.shelf import FILES_A_MERGE
-from studyrunner.store import SECONDS_A_FILE, SECONDS_A_PROGRESS, Store
+from studyrunner.checkpoint import part_writer, stock
+from studyrunner.checkpoint import store as store_module
+from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
+from studyrunner.checkpoint.shelf import FILES_A_MERGE
+from studyrunner.checkpoint.store import SECONDS_A_FILE, SECONDS_A_PROGRESS, Store
+from studyrunner.mpi.crashes import count_crashes, forget_crashes, read_tally
+from studyrunner.plan.results import Kept
+from studyrunner.system import folder_lock
+from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.user_error import StorageError
 
 KIND = np.dtype([(KEY, KEY_TYPE, ()), ("outcome", "int8", ()), ("values", "float64", (5,))])

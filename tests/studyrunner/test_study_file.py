@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studyrunner.study_file import bundled_studies, format_study, read_study
+from studyrunner.study.study_file import bundled_studies, format_study, read_study
 from studyrunner.variables import ASKED
 
 SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'

@@ -11,11 +11,11 @@ import pytest
 
 from studyrunner.cli import main
 from studyrunner.course import start_marches
-from studyrunner.estimate import AUTOMATIC_HARMONICS
-from studyrunner.results import StartResult
-from studyrunner.study import Study
-from studyrunner.study_file import read_study
-from studyrunner.tasks import Settings, TaskPlan, build_tasks
+from studyrunner.plan.estimate import AUTOMATIC_HARMONICS
+from studyrunner.plan.results import StartResult
+from studyrunner.plan.tasks import Settings, TaskPlan, build_tasks
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import read_study
 from studyrunner.variables import CERTIFICATE
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import folder_lock
+from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.evaluate import NOT_COMPUTED
-from studyrunner.store import Store
+from studyrunner.system import folder_lock
 from tests.studyrunner.faked_runs import Solver, Task
 from tests.studyrunner.test_store import KIND, assert_same, kept, key, names, record, records_of
 

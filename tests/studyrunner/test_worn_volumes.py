@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from studyrunner.sharing import Index
-from studyrunner.study_file import read_study
-from studyrunner.worn_volumes import WornVolumes
+from studyrunner.plan.sharing import Index
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.worn_volumes import WornVolumes
 from tests.studyrunner.results_of import batches, results_of
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")

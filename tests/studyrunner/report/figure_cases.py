@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.report.result import Result
+from studyrunner.report.reading.result import Result
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawing, Table
 from studyrunner.report.gallery import draw_report
-from studyrunner.report.result import Result
+from studyrunner.report.reading.result import Result
 
 
 def draw_figure(result: Result, name: str) -> Drawing:

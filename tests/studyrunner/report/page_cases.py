@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.result import Result, open_result
+from studyrunner.report.reading.result import Result, open_result
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 FAILED = 4

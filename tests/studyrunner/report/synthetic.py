@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.report.result import Result
+from studyrunner.report.reading.result import Result
 
 CYCLES = (0.0, 500.0, 1000.0)
 WORN = 2e-9

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import studyrunner.report.page
-from studyrunner.report.page import write_page
+import studyrunner.report.page.page
+from studyrunner.report.page.page import write_page
 from tests.studyrunner.report.page_cases import AXES, SENTENCES, as_result, build_file
 
 CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
@@ -408,7 +408,7 @@ def test_a_thinned_page_says_what_it_shows(browser: Any, tmp_path: Path, monkeyp
 
     cycles = np.linspace(0.0, 2000.0, 21)
     dataset = build_file(cycles=cycles.tolist())
-    monkeypatch.setattr(studyrunner.report.page, "DATA_LIMIT", 6e4)
+    monkeypatch.setattr(studyrunner.report.page.page, "DATA_LIMIT", 6e4)
     load(browser, write(dataset, tmp_path))
     notes = browser.execute_script("return document.querySelector('#explore .notes').innerText")
     assert "Maps are on this page at 11 of the 21 cycle counts" in notes

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, Table, line_style
 from studyrunner.report.gallery import draw_report
-from studyrunner.report.result import Result
+from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import (
     make_result,
     with_loops,

@@ -14,10 +14,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from studyrunner.report import page
 from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
-from studyrunner.report.page import inline_svg, write_page
-from studyrunner.report.page_data import MOST_POINTS
+from studyrunner.report.page import page
+from studyrunner.report.page.data import MOST_POINTS
+from studyrunner.report.page.page import inline_svg, write_page
 from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 
 EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'"

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from studyrunner.report.precision import Measured, Precision, pareto_front, study_precision
-from studyrunner.report.precision_findings import (
+from studyrunner.report.precision.errors import Measured, Precision, pareto_front, study_precision
+from studyrunner.report.precision.findings import (
     TARGETS,
     find_orders,
     find_stable_step,
@@ -17,8 +17,8 @@ from studyrunner.report.precision_findings import (
     recommend,
     recommendations,
 )
-from studyrunner.report.precision_settings import Setting
-from studyrunner.report.result import Result
+from studyrunner.report.precision.settings import Setting
+from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.synthetic import WORN, Point, synthetic
 
 STEPS = (10.0, 20.0, 50.0, 100.0)

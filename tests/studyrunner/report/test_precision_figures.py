@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.precision import Precision, study_precision
-from studyrunner.report.precision_figures import draw_precision
-from studyrunner.report.precision_findings import show_percent
+from studyrunner.report.precision.errors import Precision, study_precision
+from studyrunner.report.precision.figures import draw_precision
+from studyrunner.report.precision.findings import show_percent
 from tests.studyrunner.report.synthetic import Point, synthetic
 from tests.studyrunner.report.test_precision import HARMONICS, STEPS, exact_file, finest_file, precision_of
 

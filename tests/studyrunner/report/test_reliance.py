@@ -9,10 +9,10 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from studyrunner.report.page_data import build_page_data
-from studyrunner.report.page_sections import study_section
-from studyrunner.report.reliance import describe_ended, tell_ends, tell_volumes
-from studyrunner.report.result import Result
+from studyrunner.report.page.data import build_page_data
+from studyrunner.report.page.sections import study_section
+from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_endings
 from tests.studyrunner.report.figure_numbers import draw_figure, lines_of, values_of
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report.result import Result, as_sentences, open_result
-from studyrunner.report.units import Scale, scale_for, show_cycles, show_number, show_power
+from studyrunner.report.reading.result import Result, as_sentences, open_result
+from studyrunner.report.reading.units import Scale, scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result, with_variables
 

@@ -1,0 +1,192 @@
+"""What of a plan is finished, and what an earlier run of it has left: the link between tasks and the store."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from studyrunner.checkpoint.records import failed_result, pack
+from studyrunner.checkpoint.shelf import Place
+from studyrunner.checkpoint.store import Store
+from studyrunner.plan.identity import Identities
+from studyrunner.plan.results import Kept, MarchResult, StartResult, read_start
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+
+MOST_OF_OTHERS = 2.0**30
+"""Bytes: what other studies have left under the same name is kept up to this size."""
+
+
+class Ledger:
+    """Every finished history and start state of a plan, in a store that may hold them from earlier runs.
+
+    What a task computes does not depend on what was there before: a run that goes on ends with the same numbers.
+    """
+
+    def __init__(self, plan: TaskPlan, identities: Identities, store: Store) -> None:
+        self.plan = plan
+        self.store = store
+        self._starts = [identities.of_starts(branch) for branch in plan.branches]
+        self._branches = [identities.of_branch(branch) for branch in plan.branches]
+        self._histories: dict[int, tuple[str, ...]] = {}
+        self._marches: dict[int, str] = {}
+        for branch, line in zip(plan.branches, plan.marches, strict=True):
+            for march in line:
+                self._histories[march.number] = identities.of_histories(branch, march)
+                self._marches[march.number] = identities.of_march(self._histories[march.number])
+
+    def histories(self, march: MarchTask) -> tuple[str, ...]:
+        """What the histories of a march are known by, one for each share."""
+        return self._histories[march.number]
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """What all tasks are known by."""
+        return frozenset((*self._branches, *self._marches.values()))
+
+    def is_left(self, key: str) -> bool:
+        """Whether the task of this key is one of this plan from which a history is missing."""
+        return any(
+            not self.is_finished(march)
+            for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
+            for march in line
+            if key in (self.key(branch), self.key(march))
+        )
+
+    def places(self, march: MarchTask) -> tuple[Place | None, ...]:
+        """Where the histories of a march are, one for each share; None for those that are not finished."""
+        return tuple(self.store.histories.get(key) for key in self._histories[march.number])
+
+    def is_finished(self, march: MarchTask) -> bool:
+        """Whether all histories of a march are on the disk."""
+        return all(key in self.store.histories for key in self._histories[march.number])
+
+    @property
+    def n_points_finished(self) -> int:
+        """Points whose history is on the disk."""
+        return sum(len(march.points) for line in self.plan.marches for march in line if self.is_finished(march))
+
+    def key(self, task: BranchTask | MarchTask) -> str:
+        """What a task and its progress are known by."""
+        return self._branches[task.number] if isinstance(task, BranchTask) else self._marches[task.number]
+
+    def branches_left(self) -> list[BranchTask]:
+        """Branches on whose way are start states that are not known and from which there is something to march."""
+        left = []
+        for branch, keys in zip(self.plan.branches, self._starts, strict=True):
+            needed = self._needed(branch)
+            known = frozenset(
+                place for place, key in enumerate(keys) if place not in needed or self.store.has_start(key)
+            )
+            if len(known) < len(keys):
+                key = self.key(branch)
+                left.append(replace(branch, known=known, resume=self.store.read_progress(key), key=key))
+        return left
+
+    def known_starts(self, branch: BranchTask) -> list[StartResult]:
+        """Start states of a branch that are known and from which there is something to march."""
+        keys, needed = self._starts[branch.number], self._needed(branch)
+        return [
+            read_start(place, self.store.read_start(key))
+            for place, key in enumerate(keys)
+            if place in needed and self.store.has_start(key)
+        ]
+
+    def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
+        """The marches from one start state that are not finished, each with its progress."""
+        keys = {march.number: self.key(march) for march in self.plan.marches_from(branch, position)}
+        return tuple(
+            replace(march, resume=self.store.read_progress(keys[march.number]), key=keys[march.number])
+            for march in self.plan.marches_from(branch, position)
+            if not self.is_finished(march)
+        )
+
+    def renew(self, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+        """A task of this run that is to be done again, with what has come of it."""
+        self.store.flush()
+        resume = self.store.read_progress(self.key(task))
+        if isinstance(task, MarchTask):
+            return replace(task, resume=resume)
+        given = {place for place, key in enumerate(self._starts[task.number]) if self.store.has_start(key)}
+        return replace(task, resume=resume, known=task.known | given)
+
+    def add_start(self, branch: BranchTask, result: StartResult) -> None:
+        """A start state has come."""
+        self.store.add_start(self._starts[branch.number][result.position], result.keep())
+
+    def add_history(self, march: MarchTask, result: MarchResult) -> None:
+        """A history has come."""
+        key = self._histories[march.number][result.share]
+        ended = result.share == march.n_results - 1 and result.progress is None
+        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
+        if result.progress is not None:
+            self.store.keep_progress(self.key(march), result.progress)
+
+    def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
+        """A task says how far it is."""
+        if not isinstance(progress, Kept):
+            raise TypeError(f"{progress!r} is no progress of {task}")
+        self.store.keep_progress(self.key(task), progress)
+
+    def forget_failed(self, complete: Collection[int]) -> None:
+        """Points that failed are to be computed again. complete: outcomes of those that did not."""
+        failed = self.store.select(lambda records: ~np.isin(records["outcome"], list(complete)))
+        for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
+            without_state = {
+                place
+                for place, key in enumerate(keys)
+                if self.store.has_start(key) and read_start(place, self.store.read_start(key)).failed
+            }
+            for place in without_state:
+                self.store.forget_start(keys[place])
+            if without_state:
+                self.store.forget_progress(self.key(branch))
+            for march in line:
+                for key in self._histories[march.number]:
+                    if key in failed or march.position in without_state:
+                        self.store.forget_history(key)
+
+    def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
+        """The task of this key ends its processes: no other run tries it again. How many points are lost with it.
+
+        position: place on a branch that it was on the way to, None for a march. The branch ends before that place.
+        """
+        n_points = 0
+        for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
+            lost: set[int] = set()
+            if self.key(branch) == key and position in branch.order:
+                behind = branch.order[branch.order.index(position) :]
+                lost = {place for place in behind if not self.store.has_start(starts[place])}
+            for march in line:
+                if self.key(march) != key and march.position not in lost:
+                    continue
+                for place, known in enumerate(self.places(march)):
+                    if known is None:
+                        n_points += len(march.shares[place].points)
+                        self.add_history(march, failed_result(march, place, outcome, message))
+        self.store.flush()
+        return n_points
+
+    def forget_all(self) -> None:
+        """Nothing that an earlier run has left of this study counts any more; what it holds of others stays."""
+        for key in self._all_histories():
+            self.store.forget_history(key)
+        for key in itertools.chain.from_iterable(self._starts):
+            self.store.forget_start(key)
+        for key in self.keys:
+            self.store.forget_progress(key)
+        self.store.remove_forgotten()
+
+    def prune(self, most: float = MOST_OF_OTHERS) -> None:
+        """Leaves at most so many bytes in the store that are not of this study; for 0 bytes nothing else."""
+        self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
+
+    def _all_histories(self) -> set[str]:
+        return set(itertools.chain.from_iterable(self._histories.values()))
+
+    def _needed(self, branch: BranchTask) -> frozenset[int]:
+        """Places on a branch from which there is something to march."""
+        line = self.plan.marches[branch.number]
+        return frozenset(march.position for march in line if not self.is_finished(march))

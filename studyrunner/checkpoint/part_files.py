@@ -1,0 +1,223 @@
+"""The files of a run's folder: records of histories, and bundles of start states or of the progress of tasks.
+
+Records are one array of numpy, an element a history. A bundle is three parts: the keys of its entries, where each of
+them ends, and the entries, each a few arrays of numpy of which the first is a text. No file holds a pickle. A check sum
+at the end tells whether a file is what was written.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from studyrunner.plan.results import Kept
+from studyrunner.system.files import open_plain
+
+KEY = "key"
+"""Name of the field of a record that holds its hash."""
+
+KEY_TYPE = "S32"
+
+LARGEST_PART = 2**32
+"""Bytes: no file of a run's folder is larger."""
+
+_CHECK_SUM_BYTES = 4
+_BYTES_AT_ONCE = 2**20
+
+Rows = Sequence[int]
+"""Places of entries in a file."""
+
+
+class _Summed:
+    """A file that is written, with the sum of what was written so far."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._sum = 0
+
+    def write(self, content: bytes | memoryview) -> int:
+        self._sum = zlib.crc32(content, self._sum)
+        return self._file.write(content)
+
+    def end(self) -> None:
+        """Writes the check sum."""
+        self._file.write(self._sum.to_bytes(_CHECK_SUM_BYTES, "little"))
+
+
+def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
+    """Records (n,) of one type, piece by piece."""
+    summed = _Summed(file)
+    _write_header(summed, pieces[0].dtype, sum(map(len, pieces)))
+    for piece in pieces:
+        step = max(1, _BYTES_AT_ONCE // piece.itemsize)
+        for first in range(0, len(piece), step):
+            summed.write(piece[first : first + step].tobytes())
+    summed.end()
+
+
+def load_records(path: Path, *, check: bool = True) -> NDArray[np.void]:
+    """Records that stay on the disk until they are used. check: the sum as well.
+
+    Raises ValueError where they are damaged and OSError where they cannot be read.
+    """
+    with open_plain(path, LARGEST_PART) as file:
+        kind, n_records = _read_header(file)
+        first = file.tell()
+        if first + n_records * kind.itemsize + _CHECK_SUM_BYTES != os.fstat(file.fileno()).st_size:
+            raise ValueError("the file has another length than it says")
+        if check:
+            _check_sum(file)
+        return np.memmap(file, kind, "r", first, (n_records,))
+
+
+def merge_records(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None:
+    """Writes records of some files, of one type, into a new one."""
+    write_records(file, [_some(load_records(path), rows) for path, rows in sources])
+
+
+def record_keys(records: NDArray[np.void]) -> list[str]:
+    """Their hashes."""
+    return [_text(key) for key in records[KEY].tolist()]
+
+
+def write_bundle(file: IO[bytes], entries: Mapping[str, Kept]) -> None:
+    """Entries by their key."""
+    contents = [_as_bytes(entry) for entry in entries.values()]
+    _write_entries(file, list(entries), list(map(len, contents)), contents)
+
+
+def load_keys(path: Path) -> list[str]:
+    """Keys of a bundle. Raises ValueError where any of it is damaged and OSError where it cannot be read."""
+    with open_plain(path, LARGEST_PART) as file:
+        _check_sum(file)
+        return list(_Contents.of(file).keys)
+
+
+def read_entry(path: Path, place: int) -> Kept:
+    """An entry of a bundle. Raises ValueError where it is damaged and OSError where it cannot be read."""
+    with open_plain(path, LARGEST_PART) as file:
+        return _from_bytes(_Contents.of(file).read(file, place))
+
+
+def merge_bundles(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None:
+    """Writes entries of some bundles into a new one."""
+    keys: list[str] = []
+    lengths: list[int] = []
+    for path, rows in sources:
+        with open_plain(path, LARGEST_PART) as source:
+            _check_sum(source)
+            contents = _Contents.of(source)
+            keys += [contents.keys[row] for row in rows]
+            lengths += [contents.ends[row] - contents.begins[row] for row in rows]
+    _write_entries(file, keys, lengths, _entries_of(sources))
+
+
+def _entries_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[bytes]:
+    """Entries of some bundles, one in memory at a time."""
+    for path, rows in sources:
+        with open_plain(path, LARGEST_PART) as source:
+            contents = _Contents.of(source)
+            yield from (contents.read(source, row) for row in rows)
+
+
+@dataclass(frozen=True)
+class _Contents:
+    """What the beginning of a bundle says: keys, and where each entry begins and ends in the file."""
+
+    keys: tuple[str, ...]
+    begins: tuple[int, ...]
+    ends: tuple[int, ...]
+
+    @classmethod
+    def of(cls, file: IO[bytes]) -> _Contents:
+        keys, ends = _read_column(file, KEY_TYPE), _read_column(file, "<i8")
+        first, left = file.tell(), os.fstat(file.fileno()).st_size - file.tell() - _CHECK_SUM_BYTES
+        lengths = np.diff(ends, prepend=0)
+        if len(keys) != len(ends) or not len(ends) or (lengths < 0).any() or ends[-1] != left:
+            raise ValueError("the bundle has other entries than it says")
+        begins = first + ends - lengths
+        return cls(tuple(map(_text, keys.tolist())), tuple(begins.tolist()), tuple((first + ends).tolist()))
+
+    def read(self, file: IO[bytes], place: int) -> bytes:
+        file.seek(self.begins[place])
+        return file.read(self.ends[place] - self.begins[place])
+
+
+def _write_entries(file: IO[bytes], keys: Sequence[str], lengths: Sequence[int], entries: Iterable[bytes]) -> None:
+    summed = _Summed(file)
+    for column in (np.array(keys, KEY_TYPE), np.cumsum(lengths, dtype="<i8")):
+        _write_header(summed, column.dtype, len(column))
+        summed.write(column.tobytes())
+    for entry in entries:
+        summed.write(entry)
+    summed.end()
+
+
+def _as_bytes(entry: Kept) -> bytes:
+    buffer = io.BytesIO()
+    for array in (np.frombuffer(entry.text.encode(), np.uint8), *entry.arrays):
+        npy.write_array(buffer, np.asanyarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _from_bytes(content: bytes) -> Kept:
+    text, *arrays = _arrays_in(content)
+    return Kept(text.tobytes().decode(), tuple(arrays))
+
+
+def _arrays_in(content: bytes) -> Iterator[NDArray[np.generic]]:
+    buffer = io.BytesIO(content)
+    while buffer.tell() < len(content):
+        yield npy.read_array(buffer, allow_pickle=False)
+
+
+def _write_header(file: _Summed, kind: np.dtype[np.generic], length: int) -> None:
+    header = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": (length,)}
+    npy.write_array_header_1_0(file, header)
+
+
+def _read_header(file: IO[bytes]) -> tuple[np.dtype[np.generic], int]:
+    """Type and length of an array of one dimension that is no larger than the file. Raises ValueError."""
+    if npy.read_magic(file) != (1, 0):
+        raise ValueError("not written by a run")
+    shape, _, kind = npy.read_array_header_1_0(file)
+    if len(shape) != 1 or kind.hasobject or not 0 < kind.itemsize * shape[0] <= os.fstat(file.fileno()).st_size:
+        raise ValueError("not written by a run")
+    return kind, shape[0]
+
+
+def _read_column(file: IO[bytes], expected: str) -> NDArray[np.generic]:
+    kind, length = _read_header(file)
+    if kind != np.dtype(expected):
+        raise ValueError("not written by a run")
+    return np.frombuffer(file.read(kind.itemsize * length), kind)
+
+
+def _check_sum(file: IO[bytes]) -> None:
+    """Raises ValueError where a file is not what was written; it is read on from where it was."""
+    before = file.tell()
+    file.seek(0)
+    left, found = os.fstat(file.fileno()).st_size - _CHECK_SUM_BYTES, 0
+    while left > 0 and (some := file.read(min(left, _BYTES_AT_ONCE))):
+        found, left = zlib.crc32(some, found), left - len(some)
+    if found.to_bytes(_CHECK_SUM_BYTES, "little") != file.read():
+        raise ValueError("the check sum is another one")
+    file.seek(before)
+
+
+def _some(records: NDArray[np.void], rows: Rows) -> NDArray[np.void]:
+    """Rows of records; all of them as they stand on the disk."""
+    return records if len(rows) == len(records) else records[list(rows)]
+
+
+def _text(key: bytes) -> str:
+    return key.decode("ascii")

@@ -1,0 +1,147 @@
+"""What is written at once into a run's folder: some new files, then old ones made into one, then what is left over.
+
+A new file is written under a temporary name, put on the disk and renamed; that its name is on the disk as well comes
+before anybody hears of it, and before anything is removed that it stands for. So neither a kill nor a loss of power
+costs what was said to be there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.checkpoint.part_files import Rows, merge_bundles, merge_records, write_bundle, write_records
+from studyrunner.checkpoint.shelf import PartFile
+from studyrunner.plan.results import Kept
+from studyrunner.system import files
+from studyrunner.user_error import StorageError
+
+RECORDS, STARTS, PROGRESS = ".npy", ".starts", ".progress"
+"""How the names of files end: sorts of entries."""
+
+PARTIAL = ".partial"
+
+
+@dataclass
+class Batch:
+    """Entries that are written together, by key. finished: keys of tasks whose progress is of no use after that."""
+
+    records: dict[str, NDArray[np.void]] = field(default_factory=dict)
+    starts: dict[str, Kept] = field(default_factory=dict)
+    progress: dict[str, Kept] = field(default_factory=dict)
+    finished: set[str] = field(default_factory=set)
+    n_bytes: float = 0.0
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to write."""
+        return not (self.records or self.starts or self.progress)
+
+    def behind(self, earlier: Batch) -> Batch:
+        """Both in one."""
+        # what an earlier one has said of a task that is finished meanwhile is not said again
+        progress = {key: kept for key, kept in earlier.progress.items() if key not in self.finished}
+        return Batch(
+            earlier.records | self.records,
+            earlier.starts | self.starts,
+            progress | self.progress,
+            earlier.finished | self.finished,
+            earlier.n_bytes + self.n_bytes,
+        )
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Files whose entries (rows) go into one. number: of the new file."""
+
+    sort: str
+    number: int
+    sources: Sequence[tuple[PartFile, Rows]]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is done at once. number: of the new files. remove: files that nobody has a use for any more."""
+
+    number: int
+    batch: Batch
+    merges: Sequence[Merge] = ()
+    remove: Sequence[Path] = ()
+
+
+@dataclass(frozen=True)
+class Written:
+    """New files by their sort, and those that others were merged into; these are missing where there was no room."""
+
+    new: Mapping[str, PartFile]
+    merged: Sequence[tuple[Merge, PartFile]]
+
+
+@dataclass(frozen=True)
+class PartWriter:
+    """Writes into a folder. run: a part of all names that no other run has."""
+
+    folder: Path
+    run: str
+
+    def write(self, job: Job) -> Written:
+        """Does a job. Raises StorageError where the batch cannot be written; nothing of it is then there."""
+        batch, new = job.batch, {}
+        sorts: list[tuple[str, list[str], Callable[[IO[bytes]], None]]] = [
+            # histories and progress are of no use without the start states before
+            (STARTS, list(batch.starts), lambda file: write_bundle(file, batch.starts)),
+            (RECORDS, list(batch.records), lambda file: write_records(file, list(batch.records.values()))),
+            (PROGRESS, list(batch.progress), lambda file: write_bundle(file, batch.progress)),
+        ]
+        try:
+            for sort, keys, write in sorts:
+                if keys:
+                    new[sort] = self._write(sort, job.number, keys, write)
+            if new:
+                files.sync_folder(self.folder)
+        except OSError as error:
+            self._remove(file.path for file in new.values())
+            raise StorageError(Path(error.filename or self.folder), error) from error
+        # a file that stays is no harm, nor is one whose merge has to wait for more room
+        with contextlib.suppress(OSError):
+            self._remove(job.remove)
+        with contextlib.suppress(OSError, ValueError):
+            merged = [(merge, self._merge(merge)) for merge in job.merges]
+            if merged:
+                files.sync_folder(self.folder)
+            return Written(new, merged)
+        return Written(new, ())
+
+    def _merge(self, merge: Merge) -> PartFile:
+        put_together = merge_records if merge.sort == RECORDS else merge_bundles
+        keys = [source.keys[row] for source, rows in merge.sources for row in rows]
+        sources = [(source.path, rows) for source, rows in merge.sources if rows]
+        return self._write(merge.sort, merge.number, keys, lambda file: put_together(file, sources))
+
+    def _write(self, sort: str, number: int, keys: Sequence[str], write: Callable[[IO[bytes]], None]) -> PartFile:
+        path = self.folder / f"{number:08d}-{self.run}{sort}"
+        partial = path.with_name(path.name + PARTIAL)
+        try:
+            with files.create(partial) as file:
+                write(file)
+                files.sync(file)
+                n_bytes = file.tell()
+            os.replace(partial, path)
+        except OSError as error:
+            partial.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        except ValueError:
+            partial.unlink(missing_ok=True)
+            raise
+        return PartFile(number, path, keys, n_bytes, ours=True)
+
+    def _remove(self, paths: Iterable[Path]) -> None:
+        for path in paths:
+            path.unlink(missing_ok=True)

@@ -1,0 +1,86 @@
+"""The record of a history: one element of an array of numpy that holds all that a result says."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
+from studyrunner.plan.results import MarchResult
+from studyrunner.plan.tasks import MarchTask, march_variables
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study import Study
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+
+
+def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
+    """Lengths of the dimensions after the axes."""
+    return {
+        "cycle": len(study.cycles_kept),
+        "contact": len(facts.area),
+        "response": len(facts.response_names),
+        **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),
+    }
+
+
+def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
+    """Type of the record of a history: its hash, then all that its result says."""
+    sizes = variable_sizes(study, facts)
+    fields: list[tuple[str, str, tuple[int, ...]]] = [(KEY, KEY_TYPE, ())]
+    fields.extend((name, entry.dtype, ()) for name, entry in KEPT.items())
+    for name in march_variables(study):
+        # of all pairs, only those asked for have a loop
+        lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
+        entry = LOOPS.get(name) or ASKED[name]
+        fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
+    return np.dtype(fields)
+
+
+def pack(kind: np.dtype[np.void], key: str, result: MarchResult) -> NDArray[np.void]:
+    """Record (1,) of a history that is known by `key`."""
+    records = empty_record(kind)
+    records[KEY] = key.encode("ascii")
+    for name in KEPT:
+        records[name] = getattr(result, name)
+    for name, values in result.values.items():
+        records[name] = values
+    return records
+
+
+def empty_record(kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """Record (1,) of a point without a result: NaN, or 0 where a variable is a whole number."""
+    # from bytes: numpy copies a record field by field, which takes ten times as long
+    return np.frombuffer(bytearray(_empty_bytes(kind)), kind)
+
+
+@functools.lru_cache(maxsize=1)
+def _empty_bytes(kind: np.dtype[np.void]) -> bytes:
+    records = np.zeros(1, dtype=kind)
+    for name in kind.names or ():
+        if kind[name].base.kind == "f":
+            records[name] = math.nan
+    return records.tobytes()
+
+
+def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> MarchResult:
+    """Result of a history that nobody computed to its end."""
+    return MarchResult(
+        points=task.shares[place].points,
+        outcome=outcome,
+        values={},
+        jump_cycle=math.nan,
+        error_estimate=math.nan,
+        newton_iterations=0,
+        run_time=math.nan,
+        branch=0,
+        fold_frequency=math.nan,
+        step_limit=math.nan,
+        oscillates=False,
+        last_cycle=math.nan,
+        largest_wear_depth=math.nan,
+        message=message,
+        share=place,
+    )

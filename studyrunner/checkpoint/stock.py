@@ -1,0 +1,84 @@
+"""What earlier runs have left in a run's folder."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studyrunner.checkpoint.part_files import load_keys, load_records, record_keys
+from studyrunner.checkpoint.part_writer import PARTIAL, PROGRESS, RECORDS, STARTS
+from studyrunner.checkpoint.shelf import PartFile, Shelf
+from studyrunner.system.files import NotPlainError
+
+_PART = re.compile(r"(\d{8})(-[0-9a-f]{12})?(\.npy|\.starts|\.progress)")
+_OF_ANOTHER_VERSION = re.compile(r"\d{8}\.starts\.npz|[0-9a-f]{32}\.progress\.npz")
+
+
+@dataclass(frozen=True)
+class Stock:
+    """What is in a folder.
+
+    shelves: of each sort of entry. others: records of studies with other variables or lengths. last_number: no file has
+    a larger one. damaged: names of files that do not hold what was written. left_over: files of no use to anybody.
+    """
+
+    shelves: dict[str, Shelf]
+    others: list[PartFile]
+    last_number: int
+    damaged: list[str]
+    left_over: list[Path]
+
+
+def take_stock(folder: Path, kind: np.dtype[np.void], *, alone: bool) -> Stock:
+    """Looks through a folder. kind: of a record. alone: whether no other run is at work there.
+
+    What is damaged is no more than time lost. A file that cannot be read for another reason is not: raises OSError.
+    """
+    known = sorted(folder.iterdir())
+    shelves = {STARTS: Shelf(), RECORDS: Shelf(), PROGRESS: Shelf()}
+    others: list[PartFile] = []
+    damaged: list[Path] = []
+    last = 0
+    for number, (path, match) in enumerate((path, match) for path in known if (match := _PART.fullmatch(path.name))):
+        last = max(last, number, int(match[1]))
+        try:
+            file, of_this_kind = _look_into(path, match[3], number, kind, alone)
+        except FileNotFoundError:
+            # of a run that is at work here, where there are no locks
+            continue
+        except NotPlainError:
+            damaged.append(path)
+        except (OSError, MemoryError):
+            # a disk that fails for now is no reason to throw anything away
+            raise
+        except Exception:
+            damaged.append(path)
+            if alone:
+                path.unlink(missing_ok=True)
+        else:
+            if of_this_kind:
+                shelves[match[3]].put(file)
+            else:
+                others.append(file)
+    left_over = [path for path in known if _is_left_over(path)] if alone else []
+    for shelf in shelves.values():
+        left_over += [file.path for file in shelf.take_dead()]
+    return Stock(shelves, others, last, [path.name for path in damaged], left_over)
+
+
+def _look_into(path: Path, sort: str, number: int, kind: np.dtype[np.void], alone: bool) -> tuple[PartFile, bool]:
+    """A file, and whether it holds what this study can use."""
+    n_bytes = path.lstat().st_size
+    if sort != RECORDS:
+        return PartFile(number, path, load_keys(path), n_bytes, alone), True
+    records = load_records(path)
+    return PartFile(number, path, record_keys(records), n_bytes, alone), records.dtype == kind
+
+
+def _is_left_over(path: Path) -> bool:
+    """Whether nobody has a use for a file: it was not finished, or is that of another version of this program."""
+    of_a_part = path.name.endswith(PARTIAL) and _PART.fullmatch(path.name.removesuffix(PARTIAL))
+    return bool(of_a_part or _OF_ANOTHER_VERSION.fullmatch(path.name)) and not path.is_dir()

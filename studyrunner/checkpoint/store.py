@@ -1,0 +1,314 @@
+"""The folder of a study: everything finished is on the disk a moment later, and a run goes on from it.
+
+It stands beside the result file. Rank 0 writes all of it, as no other rank need see the folder, on a thread of its own:
+what comes meanwhile waits and goes into the same files, so that a slow disk makes them fewer and larger. Files of about
+one size are put together while the run goes on. Their names are those of no other run, so that two runs in one folder,
+where the file system has no locks, do no harm to each other.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+import time
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.checkpoint.part_files import load_records, read_entry
+from studyrunner.checkpoint.part_writer import PROGRESS, RECORDS, STARTS, Batch, Job, Merge, PartWriter, Written
+from studyrunner.checkpoint.shelf import PartFile, Place, Shelf
+from studyrunner.checkpoint.stock import take_stock
+from studyrunner.checkpoint.writer import Writer
+from studyrunner.plan.results import Kept
+from studyrunner.system.files import NotPlainError, sync_folder
+from studyrunner.system.folder_lock import FolderLock
+from studyrunner.user_error import StorageError
+
+SECONDS_A_FILE = 0.25
+"""Results wait at most so long for others that go into the same file, where the disk is not slower."""
+
+SECONDS_A_PROGRESS = 1.0
+"""The progress of tasks waits so long for that of others."""
+
+MOST_BYTES_WAITING = 32e6
+"""What is handed over while more is waiting has to wait for the disk: results are not piled up in memory."""
+
+_BYTES_A_FILE = 8e6
+_SECONDS_TO_MORE_ROOM = 60.0
+_LOCK = "lock"
+
+
+class Store:
+    """The folder of a run, locked for it. Raises StoreInUseError and StorageError.
+
+    kind: of a record; its field `KEY` is the hash of the history.
+    notes: what a user has to know of what was found there, a line each.
+    """
+
+    def __init__(self, folder: Path, kind: np.dtype[np.void]) -> None:
+        self.folder = folder
+        self.kind = kind
+        self.notes: list[str] = []
+        self._waiting, self._handed_over = Batch(), Batch()
+        self._obsolete: list[Path] = []
+        self._merges: list[Merge] = []
+        self._next_merge = self._written = -math.inf
+        try:
+            if not folder.is_dir():
+                folder.mkdir(exist_ok=True)
+                sync_folder(folder.parent)
+            self._lock = FolderLock(folder / _LOCK)
+        except NotPlainError as error:
+            raise StorageError(folder / _LOCK, error, "remove it or give another result file with -o") from error
+        except OSError as error:
+            raise StorageError(folder, error) from error
+        try:
+            found = take_stock(folder, kind, alone=self._lock.holds)
+        except OSError as error:
+            self._lock.close()
+            raise StorageError(folder, error) from error
+        self._shelves, self._others, self._number = found.shelves, found.others, found.last_number
+        self._records, self._starts, self._progress = (self._shelves[sort] for sort in (RECORDS, STARTS, PROGRESS))
+        self._obsolete += found.left_over
+        self.notes += [f"{folder.name}: {name} is damaged, what it held is computed again" for name in found.damaged]
+        if not self._lock.holds:
+            self.notes.append(
+                f"{folder.name}: there are no locks on this file system, so nothing keeps a second run out: give each"
+                " run a result file of its own with -o"
+            )
+        self._writer = Writer(PartWriter(folder, secrets.token_hex(6)).write)
+
+    @property
+    def locked(self) -> bool:
+        """Whether no other run is at work here."""
+        return self._lock.holds
+
+    @property
+    def histories(self) -> dict[str, Place]:
+        """For each hash of a history on the disk, the number of its file and the place in it."""
+        return self._records.places
+
+    def path(self, number: int) -> Path:
+        """A file of records."""
+        return self._records.files[number].path
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of all files of records."""
+        return sorted(self._records.files)
+
+    def add_history(self, key: str, record: NDArray[np.void], task: str = "") -> None:
+        """A record (1,) to be written. task: what the progress of a task is known by that this history ends."""
+        self._waiting.records[key] = record
+        if task:
+            self._waiting.progress.pop(task, None)
+            self._waiting.finished.add(task)
+        self._count(self.kind.itemsize)
+
+    def add_start(self, key: str, start: Kept) -> None:
+        """A start state to be written."""
+        self._waiting.starts[key] = start
+        self._count(start.n_bytes)
+
+    def has_start(self, key: str) -> bool:
+        """Whether a start state is there."""
+        return key in self._starts.places or any(key in batch.starts for batch in self._unwritten())
+
+    def read_start(self, key: str) -> Kept:
+        """A start state that is there."""
+        for batch in self._unwritten():
+            if key in batch.starts:
+                return batch.starts[key]
+        return self._read(self._starts, key)
+
+    def keep_progress(self, key: str, progress: Kept) -> None:
+        """How far a task is, to be written in place of what was written of it before."""
+        self._waiting.progress[key] = progress
+        self._waiting.finished.discard(key)
+        self._count(progress.n_bytes)
+
+    def read_progress(self, key: str) -> Kept | None:
+        """How far a task was; None where that is not known."""
+        for batch in self._unwritten():
+            if key in batch.progress:
+                return batch.progress[key]
+        if key not in self._progress.places:
+            return None
+        try:
+            return self._read(self._progress, key)
+        except StorageError:
+            # whatever is wrong with it, it is no loss but of time
+            self.forget_progress(key)
+            return None
+
+    def forget_progress(self, key: str) -> None:
+        """The task is finished, or to be done again."""
+        for batch in self._unwritten():
+            batch.progress.pop(key, None)
+        self._progress.forget(key)
+
+    def tick(self) -> None:
+        """Called many times a second: hands over what waits, at once where nothing was written a moment ago.
+
+        Raises StorageError where what was handed over before could not be written.
+        """
+        self._take()
+        if self._waiting.empty or self._writer.busy:
+            return
+        small = not (self._waiting.records or self._waiting.starts)
+        if time.monotonic() > self._written + (SECONDS_A_PROGRESS if small else SECONDS_A_FILE):
+            self._write()
+
+    def flush(self) -> None:
+        """Waits until everything is on the disk. Raises StorageError."""
+        self._take(wait=True)
+        while not self._waiting.empty:
+            self._write()
+            self._take(wait=True)
+
+    def read(self, number: int) -> NDArray[np.void]:
+        """Records of a file; they stay on the disk until they are used."""
+        path = self.path(number)
+        try:
+            return load_records(path, check=False)
+        except (OSError, ValueError) as error:
+            raise StorageError(path, error) from error
+
+    def select(self, chosen: Callable[[NDArray[np.void]], NDArray[np.bool_]]) -> set[str]:
+        """Hashes of the histories for whose records `chosen` says so; it is given those of a file at once."""
+        found: set[str] = set()
+        for number, file in self._records.files.items():
+            for row in np.flatnonzero(chosen(self.read(number))).tolist():
+                if self.histories.get(file.keys[row]) == (number, row):
+                    found.add(file.keys[row])
+        return found
+
+    def forget_history(self, key: str) -> None:
+        """The history is to be computed again: its new record will stand for it."""
+        self._records.forget(key)
+
+    def forget_start(self, key: str) -> None:
+        """The start state is to be computed again."""
+        for batch in self._unwritten():
+            batch.starts.pop(key, None)
+        self._starts.forget(key)
+
+    def remove_forgotten(self) -> None:
+        """What was forgotten is on the disk no more when this returns, so that no later run finds it."""
+        self.flush()
+        for sort, shelf in self._shelves.items():
+            self._obsolete += [file.path for file in shelf.take_dead()]
+            for file in shelf.with_dead_entries():
+                self._merges.append(Merge(sort, self._next_number(), [(file, shelf.live_rows(file))]))
+        for _ in range(2):  # what takes their place comes first
+            self._write()
+            self._take(wait=True)
+
+    def prune(self, histories: Collection[str], starts: Collection[str], tasks: Collection[str], most: float) -> None:
+        """Removes the oldest files without anything of what is named until the others take `most` bytes together.
+
+        For 0 bytes nothing is left but what is named.
+        """
+        used = ((self._records, histories), (self._starts, starts), (self._progress, tasks))
+        idle: list[tuple[Shelf | None, PartFile]] = [(None, file) for file in self._others if file.ours]
+        for shelf, keys in used:
+            numbers = {shelf.places[key][0] for key in keys if key in shelf.places}
+            idle += [(shelf, file) for number, file in shelf.files.items() if file.ours and number not in numbers]
+        too_much = sum(file.n_bytes for _, file in idle) - most
+        for holder, file in sorted(idle, key=lambda entry: entry[1].number):
+            if too_much <= 0.0:
+                break
+            too_much -= file.n_bytes
+            self._obsolete.append(file.path)
+            if holder is None:
+                self._others.remove(file)
+            else:
+                holder.drop(file)
+        if most == 0.0:
+            for shelf, keys in used:
+                for key in set(shelf.places).difference(keys):
+                    shelf.forget(key)
+            self.remove_forgotten()
+
+    def close(self) -> None:
+        """Writes what waits, as far as there is room, and lets other runs into the folder."""
+        try:
+            self.flush()
+            if self._obsolete:
+                self._write()
+                self._take(wait=True)
+        except StorageError:
+            # said before, or there is nothing that waits for an answer
+            pass
+        finally:
+            self._writer.close()
+            self._lock.close()
+
+    def _unwritten(self) -> Iterator[Batch]:
+        """What is not, or may not be, on the disk yet, the latest first."""
+        yield self._waiting
+        yield self._handed_over
+
+    def _count(self, n_bytes: float) -> None:
+        self._waiting.n_bytes += n_bytes
+        if self._waiting.n_bytes > _BYTES_A_FILE:
+            self._take(wait=self._waiting.n_bytes > MOST_BYTES_WAITING)
+            if not self._writer.busy:
+                self._write()
+
+    def _write(self) -> None:
+        """Everything that waits becomes a job of the writer, which has none."""
+        # numbered before the batch: what comes now is later than what stands in a merged file
+        merges = self._merges or self._due_merges()
+        job = Job(self._next_number(), self._waiting, merges, self._obsolete)
+        self._handed_over = job.batch
+        self._writer.begin(job)
+        self._waiting, self._merges, self._obsolete = Batch(), [], []
+        self._written = time.monotonic()
+
+    def _take(self, *, wait: bool = False) -> None:
+        self._writer.take(self._accept, self._refuse, wait=wait)
+
+    def _accept(self, job: Job, written: Written) -> None:
+        """Takes note of what is on the disk now."""
+        for sort, file in written.new.items():
+            self._shelves[sort].put(file)
+        for merge, file in written.merged:
+            self._shelves[merge.sort].put_merged(file, merge.sources)
+        if len(written.merged) < len(job.merges):
+            self._next_merge = time.monotonic() + _SECONDS_TO_MORE_ROOM
+        for key in job.batch.finished:
+            self._progress.forget(key)
+        for shelf in self._shelves.values():
+            self._obsolete += [file.path for file in shelf.take_dead()]
+        self._handed_over = Batch()
+
+    def _refuse(self, job: Job) -> None:
+        """It waits again."""
+        self._waiting, self._handed_over = self._waiting.behind(job.batch), Batch()
+        self._obsolete += job.remove
+
+    def _due_merges(self) -> list[Merge]:
+        if time.monotonic() < self._next_merge:
+            return []
+        due = ((sort, shelf, shelf.to_merge()) for sort, shelf in self._shelves.items())
+        return [
+            Merge(sort, self._next_number(), [(file, shelf.live_rows(file)) for file in found])
+            for sort, shelf, found in due
+            if found
+        ]
+
+    def _next_number(self) -> int:
+        self._number += 1
+        return self._number
+
+    def _read(self, shelf: Shelf, key: str) -> Kept:
+        number, row = shelf.places[key]
+        path = shelf.files[number].path
+        try:
+            return read_entry(path, row)
+        except (OSError, ValueError) as error:
+            raise StorageError(path, error) from error

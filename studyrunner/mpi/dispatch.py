@@ -1,0 +1,276 @@
+"""Decides which rank gets which task; knows no messages and nothing of what a task is, and is given its clock.
+
+A server on real ranks and a simulation with thousands of them use the same decisions. No message makes it look at all
+ranks.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
+
+AHEAD_SECONDS = 0.2
+"""A rank holds a second task behind one that takes less: behind a longer one it would wait for no gain."""
+
+WATCH_SECONDS = 1.0
+"""Between two looks at the tasks that run, at least."""
+
+_WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
+_AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
+_WAITING = 1000
+_WAITING_A_RANK = 16
+_FEW_LESSONS = 16
+_LESSONS_SHARE = 8
+
+
+class Work(Protocol):
+    """What has to be known of a task."""
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds, positive."""
+
+    @property
+    def kin(self) -> Kin:
+        """Which tasks it is like, see LearnedCosts."""
+
+    @property
+    def n_results(self) -> int:
+        """Results that it gives, one after the other, at least 1."""
+
+    @property
+    def opens_others(self) -> bool:
+        """Whether its results make other tasks possible."""
+
+
+Task = TypeVar("Task", bound=Work)
+
+
+@dataclass(frozen=True)
+class Assignment(Generic[Task]):
+    """A task on its way to a rank."""
+
+    number: int
+    task: Task
+
+
+@dataclass
+class _Held(Generic[Task]):
+    """A task that a rank has. began: when its rank took it up, None as long as it waits there.
+
+    n_left: results that it has still to give. lesson: what its being overdue has taught.
+    """
+
+    task: Task
+    n_left: int
+    began: float | None
+    lesson: Lesson | None = None
+
+
+class WaitingTasks(Generic[Task]):
+    """Tasks that wait; the one that is expected to take longest comes first, of equal ones the earliest."""
+
+    def __init__(self, costs: LearnedCosts) -> None:
+        self._costs = costs
+        # with its kin, which takes a moment to tell
+        self._tasks: dict[int, tuple[Task, Kin]] = {}
+        self._order: list[tuple[float, int]] = []
+
+    def __len__(self) -> int:
+        return len(self._tasks)
+
+    def add(self, number: int, task: Task) -> None:
+        """One more."""
+        self._tasks[number] = task, task.kin
+        heapq.heappush(self._order, (-self._expected(*self._tasks[number]), number))
+
+    def pop(self) -> tuple[int, Task]:
+        """The next one and its number. Raises IndexError where none waits."""
+        _, number = heapq.heappop(self._order)
+        return number, self._tasks.pop(number)[0]
+
+    def reorder(self) -> None:
+        """Puts all of them in the order of what is expected now."""
+        self._order = [(-self._expected(task, kin), number) for number, (task, kin) in self._tasks.items()]
+        heapq.heapify(self._order)
+
+    def _expected(self, task: Task, kin: Kin) -> float:
+        return task.cost * self._costs.correction(kin)
+
+
+class Dispatcher(Generic[Task]):
+    """Who computes what.
+
+    Tasks that make others possible go first, unless so many wait already that all ranks have enough for long: what
+    waits, and what it holds, is then bounded. Of the others the longest go first, so that the ranks end together.
+    Tasks that may have ended a rank come first of all, but not on rank 0, which all need, while there is another.
+    """
+
+    def __init__(self, n_ranks: int, costs: LearnedCosts, clock: Callable[[], float]) -> None:
+        self._n_ranks = n_ranks
+        self._costs = costs
+        self._clock = clock
+        self._n_known = 0
+        self._n_lessons = 0
+        self._began = clock()
+        self._next_watch = self._began + WATCH_SECONDS
+        self._openers: WaitingTasks[Task] = WaitingTasks(costs)
+        self._others: WaitingTasks[Task] = WaitingTasks(costs)
+        self._suspects: WaitingTasks[Task] = WaitingTasks(costs)
+        self._held: dict[int, _Held[Task]] = {}
+        self._held_by: list[list[int]] = [[] for _ in range(n_ranks)]
+        # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
+        self._free = dict.fromkeys(reversed(range(n_ranks)))
+        self._ahead: dict[int, None] = {}
+        self._shunned: set[int] = set()
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing waits and nothing is computed."""
+        return not self._held and self._n_waiting == 0 and not self._suspects
+
+    @property
+    def wants_more(self) -> bool:
+        """Whether fewer tasks wait than all ranks have use for, for long."""
+        return not self._enough_waits
+
+    def add(self, tasks: Iterable[Task]) -> None:
+        """Tasks that have become possible."""
+        for task in tasks:
+            (self._openers if task.opens_others else self._others).add(self._n_known, task)
+            self._n_known += 1
+
+    def add_lost(self, tasks: Iterable[Task]) -> None:
+        """Tasks of a rank that is lost, maybe by one of them."""
+        for task in tasks:
+            self._suspects.add(self._n_known, task)
+            self._n_known += 1
+
+    def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
+        """The ranks that get a task now, and the tasks."""
+        if self._n_lessons >= max(_FEW_LESSONS, len(self._others) // _LESSONS_SHARE):
+            self._n_lessons = 0
+            self._others.reorder()
+        only_0 = self._n_ranks - len(self._shunned - {0}) == 1
+        while self._suspects and (rank := next((rank for rank in self._free if rank or only_0), None)) is not None:
+            del self._free[rank]
+            yield rank, self._hold(rank, *self._suspects.pop())
+        while self._free and self._n_waiting:
+            rank, _ = self._free.popitem()
+            assignment = self._hand_out(rank)
+            self._see_ahead(rank)
+            yield rank, assignment
+        while self._ahead and self._n_waiting > self._n_ranks:
+            rank, _ = self._ahead.popitem()
+            yield rank, self._hand_out(rank)
+
+    def deliver(self, rank: int, number: int, seconds: float, *, teaches: bool = True) -> Task:
+        """The task of which a rank has sent a result that took it so long.
+
+        teaches: whether others like it may take as long; not where it broke off.
+        """
+        held = self._held[number]
+        task = held.task
+        if held.lesson is not None:
+            self._costs.forget(held.lesson)
+            held.lesson = None
+        if teaches:
+            self._costs.learn(task.kin, task.cost / task.n_results, seconds)
+            self._n_lessons += 1
+        held.n_left -= 1
+        held.began = self._clock()
+        if held.n_left == 0:
+            del self._held[number]
+            self._held_by[rank].remove(number)
+            self._ahead.pop(rank, None)
+            if self._held_by[rank]:
+                self._held[self._held_by[rank][0]].began = self._clock()
+                self._see_ahead(rank)
+            elif rank not in self._shunned:
+                self._free[rank] = None
+        return task
+
+    def lose(self, rank: int) -> list[tuple[Task, int]]:
+        """A rank is there no more. The tasks that it had, and how many results each still had to give."""
+        lost = []
+        for number in self._held_by[rank]:
+            held = self._held.pop(number)
+            if held.lesson is not None:
+                self._costs.forget(held.lesson)
+            lost.append((held.task, held.n_left))
+        self._held_by[rank] = []
+        self._shunned.discard(rank)
+        self._free.pop(rank, None)
+        self._ahead.pop(rank, None)
+        self._n_ranks -= 1
+        if len(self._shunned) == self._n_ranks:
+            # sick ones alone are left
+            self._free |= dict.fromkeys(rank for rank in self._shunned if not self._held_by[rank])
+            self._shunned.clear()
+        return lost
+
+    def shun(self, rank: int) -> None:
+        """A rank is sick: it gets no more tasks, as long as another one does."""
+        if len(self._shunned) + 1 < self._n_ranks:
+            self._shunned.add(rank)
+            self._free.pop(rank, None)
+            self._ahead.pop(rank, None)
+
+    def task(self, number: int) -> Task:
+        """A task that is computed."""
+        return self._held[number].task
+
+    def running(self) -> list[tuple[Task, int, float]]:
+        """What is computed at the moment, longest first: the task, results still to come, seconds since the last."""
+        now = self._clock()
+        busy = [(held.task, held.n_left, now - held.began) for held in self._held.values() if held.began is not None]
+        return sorted(busy, key=lambda entry: -entry[2])
+
+    def watch(self) -> None:
+        """Called many times a second: now and then learns from tasks that take longer than expected.
+
+        A march that takes a hundred times as long as most teaches this long before it ends, in time for those like it.
+        """
+        now = self._clock()
+        if now < self._next_watch or not self._n_waiting:
+            return
+        self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
+        for held in self._held.values():
+            task = held.task
+            if held.began is None or task.opens_others:
+                continue
+            at_least = _AS_LONG_AGAIN * (now - held.began)
+            if at_least > task.cost * self._costs.correction(task.kin):
+                if held.lesson is not None:
+                    self._costs.forget(held.lesson)
+                held.lesson = self._costs.learn(task.kin, task.cost, at_least)
+        self._n_lessons = 0
+        self._others.reorder()
+
+    @property
+    def _enough_waits(self) -> bool:
+        return len(self._others) >= _WAITING + _WAITING_A_RANK * self._n_ranks
+
+    @property
+    def _n_waiting(self) -> int:
+        return len(self._openers) + len(self._others)
+
+    def _hand_out(self, rank: int) -> Assignment[Task]:
+        return self._hold(rank, *(self._openers if self._openers and not self._enough_waits else self._others).pop())
+
+    def _hold(self, rank: int, number: int, task: Task) -> Assignment[Task]:
+        self._held[number] = _Held(task, task.n_results, None if self._held_by[rank] else self._clock())
+        self._held_by[rank].append(number)
+        return Assignment(number, task)
+
+    def _see_ahead(self, rank: int) -> None:
+        """Whether a rank that holds one task may get a second one."""
+        task = self._held[self._held_by[rank][0]].task
+        if rank in self._shunned:
+            return
+        if task.n_results == 1 and task.cost * self._costs.correction(task.kin) < AHEAD_SECONDS:
+            self._ahead[rank] = None

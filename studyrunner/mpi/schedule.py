@@ -1,0 +1,253 @@
+"""Sends tasks to ranks while they run, and receives the results; knows nothing of what a task is.
+
+A task has one result or several; each is handed on at once, while its rank goes on with the task. A long one says now
+and then how far it is, so that another run can go on from there. Rank 0 computes as well: its main thread sends tasks
+and receives results, a second thread computes. Which rank gets which task is decided in `dispatch`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
+from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
+from studyrunner.plan.costs import LearnedCosts
+from studyrunner.system.endings import ignore_endings
+
+SECONDS_TO_PROGRESS = 5.0
+"""A task says how far it is at most so often, with many ranks less often."""
+
+_MANY_RANKS = 100
+"""More ranks say it less often, as rank 0 writes all of it to the disk."""
+
+_LOOKS_A_TICK = 100
+_AT_ONCE = 64
+
+Task = TypeVar("Task", bound=Work)
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class _Delivery(Generic[Result]):
+    """A result on its way back, and the time that it took, s."""
+
+    number: int
+    result: Result
+    seconds: float
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """How far a task is."""
+
+    number: int
+    progress: object
+
+
+@dataclass(frozen=True)
+class RankInterrupted:
+    """A rank was told from outside to end: so are all."""
+
+
+Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
+"""Does a task and gives its results one by one; it may hand its progress to the function that it is given."""
+
+
+def _work(
+    assignment: Assignment[Task],
+    run: Run[Task, Result],
+    send: Callable[[object], None],
+    seconds_to_progress: float,
+) -> None:
+    """Sends back what a task gives, as soon as it is there."""
+    task = assignment.task
+    wrong = ValueError(f"not {task.n_results} results from {task}")
+    n_given = 0
+    began = sent = time.perf_counter()
+
+    def keep(progress: object) -> None:
+        nonlocal sent
+        # a task that has given all its results has no progress
+        if n_given < task.n_results and time.perf_counter() > sent + seconds_to_progress:
+            send(_Progress(assignment.number, progress))
+            sent = time.perf_counter()
+
+    for result in run(task, keep):
+        n_given += 1
+        if n_given > task.n_results:
+            raise wrong
+        send(_Delivery(assignment.number, result, time.perf_counter() - began))
+        began = time.perf_counter()
+    if n_given < task.n_results:
+        raise wrong
+
+
+class _LocalWorker(Generic[Task, Result]):
+    """The computing thread of rank 0."""
+
+    def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
+        self._run = run
+        self._ended = False
+        self._seconds_to_progress = seconds_to_progress
+        self._waiting: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
+        self._sent: queue.SimpleQueue[object] = queue.SimpleQueue()
+        # A daemon: an exception in the main thread ends the process although a task still runs.
+        self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
+        self._thread.start()
+
+    def assign(self, assignment: Assignment[Task]) -> None:
+        """Puts a task behind those that it already has."""
+        self._waiting.put(assignment)
+
+    def receive(self, seconds: float) -> object:
+        """What it sends next, None where nothing comes within `seconds`. Raises what a task raised."""
+        try:
+            message = self._sent.get(timeout=seconds)
+        except queue.Empty:
+            return None
+        if isinstance(message, BaseException):
+            raise message
+        return message
+
+    def stop(self) -> None:
+        """Ends the thread; it has nothing left to do. Raises what its last task raised after the last result."""
+        self._waiting.put(None)
+        self._thread.join()
+        self.receive(0.0)
+
+    def give_up(self) -> None:
+        """Nobody wants any more results: leaves the time to the main thread as soon as it can."""
+        self._ended = True
+
+    def _compute(self) -> None:
+        try:
+            while (assignment := self._waiting.get()) is not None:
+                _work(assignment, self._run, self._send, self._seconds_to_progress)
+        except BaseException as error:  # handed to the main thread, which raises it
+            self._sent.put(error)
+
+    def _send(self, message: object) -> None:
+        if self._ended:
+            raise KeyboardInterrupt
+        self._sent.put(message)
+
+
+TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
+"""What is to be done in place of the tasks of a rank that is lost; the number is that of results still to be given."""
+
+
+def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
+    """Tasks that begin anew on another rank."""
+    return [task for task, _ in lost]
+
+
+def serve_tasks(
+    ranks: Ranks,
+    tasks: Iterable[Task],
+    run: Run[Task, Result],
+    take: Callable[[Task, Result], Iterable[Task]],
+    costs: LearnedCosts,
+    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None,
+    keep: Callable[[Task, object], None] = lambda *_: None,
+    take_back: TakeBack[Task] = give_again,
+    is_sick: Callable[[int, Result], bool] = lambda *_: False,
+) -> None:
+    """Rank 0: has all tasks done, its own share by `run`, and hands every result to `take`.
+
+    run: gives the results of a task one by one. take: called in the main thread, in the order in which results arrive;
+        returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
+        second, with what tells the tasks that run, as `Dispatcher.running`. keep: called with how far a task is; never
+        after its last result. tasks: are taken one by one, as there is use for them. take_back: called with a rank that
+        is lost and the tasks that it had. is_sick: whether a result of a rank tells that it should get no more tasks.
+    Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
+    another rank ends that rank's process.
+    """
+    dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
+    local = _LocalWorker(run, _seconds_to_progress(ranks))
+    known = iter(tasks)
+    lost: frozenset[int] = frozenset()
+
+    def hand_out() -> None:
+        while dispatcher.wants_more and (more := list(itertools.islice(known, _AT_ONCE))):
+            dispatcher.add(more)
+        for rank, assignment in dispatcher.assign():
+            if rank == 0:
+                local.assign(assignment)
+            else:
+                ranks.send(assignment, rank)
+
+    def do_without_the_lost() -> None:
+        nonlocal lost
+        new, lost = ranks.lost - lost, ranks.lost
+        for rank in sorted(new):
+            dispatcher.add_lost(take_back(rank, dispatcher.lose(rank)))
+
+    def accept(rank: int, message: object) -> None:
+        if rank in lost:
+            # sent before it was lost; its task is done again
+            return
+        if isinstance(message, _Progress):
+            keep(dispatcher.task(message.number), message.progress)
+            return
+        if isinstance(message, RankInterrupted):
+            ignore_endings()
+            raise KeyboardInterrupt
+        if not isinstance(message, _Delivery):
+            raise TypeError(f"rank {rank} sent {message!r} instead of a result")
+        sick = is_sick(rank, message.result)
+        if sick:
+            dispatcher.shun(rank)
+        task = dispatcher.deliver(rank, message.number, message.seconds, teaches=not sick)
+        dispatcher.add(take(task, message.result))
+        hand_out()
+
+    try:
+        do_without_the_lost()
+        hand_out()
+        while not dispatcher.done:
+            if ranks.lost != lost:
+                do_without_the_lost()
+                hand_out()
+            quiet = False
+            for _ in range(_LOOKS_A_TICK):
+                received, message = ranks.receive(), local.receive(0.0)
+                if received is not None:
+                    accept(*received)
+                if message is not None:
+                    accept(0, message)
+                quiet = received is None and message is None
+                if quiet:
+                    break
+            dispatcher.watch()
+            tick(dispatcher.running)
+            if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
+                accept(0, message)
+    except BaseException:
+        local.give_up()
+        raise
+    local.stop()
+    for rank in range(1, ranks.size):
+        ranks.send(None, rank)
+
+
+def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:
+    """Any other rank: computes what rank 0 sends, until it sends None."""
+
+    def send(reply: object) -> None:
+        ranks.send(reply, 0)
+        ranks.flush()
+
+    while (message := wait_for_message(ranks)) is not None:
+        if not isinstance(message, Assignment):
+            raise TypeError(f"rank 0 sent {message!r} instead of a task")
+        _work(message, run, send, _seconds_to_progress(ranks))
+
+
+def _seconds_to_progress(ranks: Ranks) -> float:
+    return SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)

@@ -1,0 +1,1 @@
+"""The result file: gathered from the folder of a run, with its provenance and its scene."""

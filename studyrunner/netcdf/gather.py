@@ -1,0 +1,347 @@
+"""Records of histories -> one labelled NetCDF file, written under a temporary name and renamed.
+
+The file is written slab by slab from the files of a run: only a slab is ever in memory, however many points there are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.checkpoint.completion_index import Ledger
+from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
+from studyrunner.checkpoint.records import empty_record, variable_sizes
+from studyrunner.checkpoint.store import Store
+from studyrunner.evaluate import NOT_COMPUTED, endings
+from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
+from studyrunner.netcdf.scene_group import write_scene_group
+from studyrunner.scene.scene import KeptScene, SceneFacts
+from studyrunner.scene.variables import SceneVariable
+from studyrunner.study.study import Study
+from studyrunner.summary.certificates import CertificateTable
+from studyrunner.summary.findings import Findings
+from studyrunner.system.files import replacing
+from studyrunner.user_error import StorageError
+from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
+
+_BYTES_A_SLAB = 16e6
+_BYTES_OF_CACHE = 2**16
+_ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
+
+Region = tuple[int | slice, ...]
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the end of a run tells.
+
+    outcomes: points by number of their outcome. certificates: the table. findings: lines that name the points that
+    failed or are less exact than was asked for.
+    """
+
+    outcomes: Mapping[int, int]
+    certificates: str
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Index:
+    """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,).
+
+    key (n_points,): what stands in that record. The file is -1 for points that are not computed.
+    """
+
+    file: NDArray[np.int32]
+    row: NDArray[np.int32]
+    key: NDArray[np.bytes_]
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A record in a file: its place there, its hash, and the points that have it."""
+
+    row: int
+    key: str
+    points: tuple[tuple[int, ...], ...]
+
+
+def gather(
+    study: Study,
+    facts: SceneFacts,
+    ledger: Ledger,
+    path: Path,
+    of_scene: Sequence[SceneVariable] = (),
+    scene: KeptScene | None = None,
+    keep_finished: bool = False,
+) -> Gathered:
+    """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
+
+    of_scene: what no task computes. scene: what goes into the group of the scene, None for none. Points that are not
+    computed yet say so in their outcome. keep_finished: `path` holds a finished result, and is left as it is where
+    points of this one are missing. Raises StorageError.
+    """
+    index, gathered = _read_through(study, facts, ledger)
+    left = gathered.outcomes[NOT_COMPUTED]
+    if left and keep_finished:
+        return gathered
+    try:
+        with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+            file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
+            file.setncattr(POINTS_LEFT, np.int32(left))
+            _write_values(file, study, facts, ledger.store, index)
+            _write_scene(file, study, ledger.store, of_scene)
+            _write_coordinates(file, study, facts)
+            if scene is not None:
+                write_scene_group(file, scene)
+    except (OSError, RuntimeError) as error:
+        # the library says the one or the other where the disk is full
+        raise StorageError(path, error) from error
+    return gathered
+
+
+def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Index, Gathered]:
+    """Reads every file once, piece by piece: where each point is, how it ended, and the table.
+
+    A record that is not the one that is asked for, as another run may have changed its file, leaves its points out.
+    """
+    shape = tuple(len(values) for values in study.dimensions.values())
+    n_points = math.prod(shape)
+    index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
+    found: dict[int, list[_Entry]] = {}
+    for march in itertools.chain.from_iterable(ledger.plan.marches):
+        for key, share, place in zip(ledger.histories(march), march.shares, ledger.places(march), strict=True):
+            if place is not None:
+                found.setdefault(place[0], []).append(_Entry(place[1], key, share.points))
+    table, findings = CertificateTable(study, facts), Findings(study, facts)
+    outcomes: Counter[int] = Counter()
+    changed: list[str] = []
+    at_once = max(1, int(_BYTES_A_SLAB // ledger.store.kind.itemsize))
+    for number, entries in found.items():
+        entries.sort(key=lambda entry: entry.row)
+        for first in range(0, len(entries), at_once):
+            there, records = _read_entries(ledger.store, number, entries[first : first + at_once])
+            if len(there) < len(entries[first : first + at_once]):
+                changed.append(ledger.store.path(number).name)
+            for outcome, entry in zip(records["outcome"].tolist(), there, strict=True):
+                outcomes[outcome] += len(entry.points)
+                at = np.ravel_multi_index(np.transpose(entry.points), shape)
+                index.file[at], index.row[at], index.key[at] = number, entry.row, entry.key.encode()
+            for collected in (table, findings):
+                collected.add([entry.points for entry in there], records)
+    outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
+    lost = [
+        f"{name} in {ledger.store.folder.name} does not hold any more what this run has written there: its points are"
+        " not computed, the same command goes on"
+        for name in dict.fromkeys(changed)
+    ]
+    return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))
+
+
+def _read_entries(store: Store, number: int, entries: Sequence[_Entry]) -> tuple[Sequence[_Entry], NDArray[np.void]]:
+    """Those entries of a file that are there, and their records. Raises StorageError where the disk fails."""
+    try:
+        kept = store.read(number)
+        if len(kept) <= entries[-1].row or kept.dtype != store.kind:
+            return [], np.zeros(0, store.kind)
+        records = np.array(kept[[entry.row for entry in entries]])
+    except StorageError as error:
+        if isinstance(error.__cause__, ValueError | FileNotFoundError):
+            return [], np.zeros(0, store.kind)
+        raise
+    same = records[KEY] == np.array([entry.key for entry in entries], KEY_TYPE)
+    return [entry for entry, right in zip(entries, same.tolist(), strict=True) if right], records[same]
+
+
+def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store: Store, index: _Index) -> None:
+    shape = tuple(len(values) for values in study.dimensions.values())
+    sizes = variable_sizes(study, facts)
+    asked = [name for name in ASKED if name in study.outputs.variables]
+    variables = {**{name: ASKED[name] for name in asked}, **(LOOPS if study.outputs.loops else {}), **KEPT}
+    for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
+        file.createDimension(name, size)
+    slab = _slab_shape(shape, store.kind.itemsize)
+    for name, entry in variables.items():
+        dimensions = (*study.dimensions, *entry.dimensions)
+        if entry.is_text:
+            # of any length, which cannot be compressed
+            file.createVariable(name, str, dimensions).setncatts(_attributes(name, entry))
+            continue
+        variable = file.createVariable(
+            name,
+            entry.dtype,
+            dimensions,
+            compression="zlib",
+            complevel=1,
+            shuffle=True,
+            chunksizes=(*slab, *(1 if _one_pair(name, of) else sizes[of] for of in entry.dimensions)),
+            fill_value=math.nan if entry.dtype.startswith("float") else None,
+        )
+        # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+        variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
+        variable.setncatts(_attributes(name, entry))
+        if "contact" in entry.dimensions:
+            variable.setncattr("coordinates", _ON_CONTACT)
+    if not any("contact" in entry.dimensions for entry in variables.values()):
+        file.setncattr("coordinates", _ON_CONTACT)
+    for region, first, last in _slabs(shape, slab):
+        records = _read_slab(store, index, first, last)
+        lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
+        for name, entry in variables.items():
+            values = records[name].reshape(*lengths, *records[name].shape[1:])
+            if entry.is_text:
+                values = values.astype(object)
+            if name not in LOOPS:
+                file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+                continue
+            for place, pair in enumerate(study.outputs.loops):
+                file[name][(*region, slice(None), pair)] = values[..., place, :, :]
+
+
+def _one_pair(name: str, dimension: str) -> bool:
+    """Whether a chunk holds a single pair: then those whose loops were not asked for take no room."""
+    return name in LOOPS and dimension == "contact"
+
+
+def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
+    """Points along each axis that are written at once, and make a compressed chunk: as many as fit into a slab."""
+    left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
+    lengths = []
+    for size in reversed(shape):
+        lengths.append(min(size, left))
+        # Points that are next to each other in the file: an axis that does not fit ends the slab.
+        left = left // size if left >= size else 1
+    return tuple(reversed(lengths))
+
+
+def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, int, int]]:
+    """Regions of the axes, and the first point of each and the one after the last, in the order of the file."""
+    first = 0
+    starts = (range(0, size, length) for size, length in zip(shape, slab, strict=True))
+    for corner in itertools.product(*starts):
+        region = tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
+        )
+        last = first + math.prod(at.stop - at.start for at in region)
+        yield region, first, last
+        first = last
+
+
+def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np.void]:
+    """Records of points that follow each other in the file."""
+    files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
+    missing = empty_record(store.kind)
+    missing["outcome"] = NOT_COMPUTED
+    records = np.repeat(missing, last - first)
+    order = np.argsort(files, kind="stable")
+    bounds = np.flatnonzero(np.diff(files[order], prepend=-2, append=-2))
+    for begin, end in itertools.pairwise(bounds):
+        places = order[begin:end]
+        number = int(files[places[0]])
+        if number >= 0:
+            records[places] = store.read(number)[rows[places]]
+            if (records[KEY][places] != keys[places]).any():
+                # between the two times that it was read
+                raise StorageError(
+                    store.path(number), ValueError("another run has changed it"), "give the command again"
+                )
+    return records
+
+
+def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Sequence[SceneVariable]) -> None:
+    shape = tuple(len(values) for values in study.dimensions.values())
+    slab = _slab_shape(shape, store.kind.itemsize)
+    for scene in of_scene:
+        dimensions = (scene.name,) if scene.coordinate else scene.entry.dimensions
+        for dimension, size in zip(dimensions, scene.values.shape[-len(dimensions) :], strict=True):
+            if dimension not in file.dimensions:
+                file.createDimension(dimension, size)
+        if not scene.axes:
+            _write_whole(file, scene.name, dimensions, scene.values, scene.entry)
+            continue
+        own = scene.values.shape[len(shape) :]
+        variable = file.createVariable(
+            scene.name,
+            scene.entry.dtype,
+            (*study.dimensions, *dimensions),
+            compression="zlib",
+            complevel=1,
+            shuffle=True,
+            chunksizes=(*slab, *own),
+            fill_value=math.nan,
+        )
+        variable.setncatts(_attributes(scene.name, scene.entry))
+        values = np.broadcast_to(scene.values, (*shape, *own))
+        for region, _, _ in _slabs(shape, slab):
+            variable[region] = values[region]
+
+
+def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -> None:
+    for name, (dimension, values) in coordinates(study, facts).items():
+        _write_whole(file, name, (dimension,), values, COORDINATES[name])
+
+
+def _write_whole(
+    file: netCDF4.Dataset, name: str, dimensions: tuple[str, ...], values: NDArray[np.generic], entry: Variable
+) -> None:
+    """A coordinate or another small array."""
+    texts = values.dtype.kind == "U"
+    kind: Any = str if texts else values.dtype
+    variable = file.createVariable(name, kind, dimensions)
+    variable.setncatts(_attributes(name, entry))
+    variable[:] = values.astype(object) if texts else values
+
+
+def _attributes(name: str, entry: Variable) -> dict[str, object]:
+    """Attributes of a variable of the file."""
+    content = "coordinate" if name in COORDINATES else entry.content
+    found: dict[str, object] = {
+        "units": entry.units,
+        "long_name": entry.long_name,
+        "coverage_content_type": content,
+    }
+    if entry.comment:
+        found["comment"] = entry.comment
+    if entry.flags:
+        found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
+        found["flag_meanings"] = " ".join(entry.flags)
+    if name == "outcome":
+        found["flag_values"] = np.array([flag.number for flag in endings()], dtype=entry.dtype)
+        found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
+        found["sentences"] = "\n".join(flag.sentence for flag in endings())
+    if name in ASKED and not entry.dtype.startswith("float"):
+        found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
+    return found
+
+
+def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
+    """Coordinates of the file: name, dimension, values."""
+    found: dict[str, tuple[str, NDArray[np.generic]]] = {
+        name: (name, _labels(values)) for name, values in study.dimensions.items()
+    }
+    found["cycle"] = ("cycle", np.array(study.cycles_kept))
+    found["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
+    found["response"] = ("response", _labels(facts.response_names))
+    if study.outputs.loops:
+        found["phase"] = ("phase", 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES)
+        found["component"] = ("component", _labels(LOOP_COMPONENTS))
+    for column, name in enumerate(("contact_x", "contact_y", "contact_z")):
+        found[name] = ("contact", np.array(facts.position[:, column]))
+    found["contact_area"] = ("contact", np.array(facts.area))
+    found["contact_surface"] = ("contact", _labels(facts.surface))
+    return found
+
+
+def _labels(values: Sequence[object]) -> NDArray[np.generic]:
+    """Values of an axis: whole numbers in 32 bits, which every reader of NetCDF knows; all text where one is."""
+    texts = any(isinstance(value, str) for value in values)
+    array = np.array([str(value) for value in values] if texts else values)
+    return array.astype(np.int32) if array.dtype.kind == "i" else array

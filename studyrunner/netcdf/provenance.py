@@ -1,0 +1,79 @@
+"""Where a result comes from: attributes of the file, and whether a result that it holds would be computed again."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from importlib import metadata
+from typing import TYPE_CHECKING
+
+from studyrunner.plan.identity import solver_digest
+from studyrunner.scene.scene import SceneFacts, describe_scene
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import format_study
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+
+PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
+
+POINTS_LEFT = "points_not_computed"
+"""Attribute of a result file: how many of its points a run that was ended has left, 0 where it is finished."""
+
+_REFERENCE = (
+    "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
+    " balance method coupled with explicit or implicit integration schemes"
+)
+_COMMENT = (
+    "SI units. A point is one combination of the axes (the dimensions before cycle); outcome says how its computation"
+    " ended, and where that is not 0 the point holds NaN. Relative displacement is that of blade minus disk in the"
+    " frame of the contact pair (normal, tangent 1, tangent 2), its normal component positive when the pair closes;"
+    " contact forces and pressures are positive in compression. A complex amplitude X stands for"
+    " x(t) = Re(X exp(i omega t)). Slow time is counted in vibration cycles. Give this file to run-study to compute its"
+    " study again."
+)
+
+
+def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
+    """Attributes of the file. None of them depends on when, where or on how many ranks the study ran.
+
+    So there is no date_created: equal runs have equal files, but for the run times that they measure. For the same
+    reason the id is a hash of what the result depends on: it names the result, whoever computes it.
+    """
+    text, solver = format_study(study), solver_digest()
+    own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
+    return {
+        "Conventions": "CF-1.11, ACDD-1.3",
+        "title": study.study.title or study.study.name,
+        "summary": "Fretting wear of a joint under vibration: wear histories over the axes of a parameter study.",
+        "keywords": "fretting wear, contact, dry friction, vibration, harmonic balance",
+        "id": hashlib.sha256("\n".join((text, facts.digest, solver)).encode()).hexdigest()[:32],
+        "naming_authority": PACKAGES[0],
+        "source": f"{own}: multiscale harmonic balance with wear on a slow time scale",
+        "history": f"computed by run-study of {own} from the study in the attribute study",
+        "references": _REFERENCE,
+        "comment": _COMMENT,
+        "processing_level": "model result, not processed further",
+        "product_version": metadata.version(PACKAGES[0]),
+        "study": text,
+        "versions": describe_versions(),
+        "solver_digest": solver,
+        "scene_sha256": facts.digest,
+    }
+
+
+def describe_versions() -> str:
+    """Python and the packages that have a part in the result."""
+    packages = [f"{name} {metadata.version(name)}" for name in PACKAGES]
+    return ", ".join([f"Python {platform.python_version()}", *packages])
+
+
+def compare_with_archived(study: Study, model: ReducedModel) -> tuple[str, ...]:
+    """Lines that say why a study that was read from a result file may have another result now; none of other studies.
+
+    Only the scene that the file names is compared: with other parameters it is another study.
+    """
+    archived = study.archived
+    if archived is None:
+        return ()
+    return archived.differences(describe_scene(model).digest, solver_digest(), describe_versions())

@@ -1,0 +1,103 @@
+"""What a finished task is known by: a hash of all that its result depends on, the solver included.
+
+A study that is changed keeps the results whose hash is still asked for. A start state depends on its own frequency and
+on how it is reached, not on the other frequencies of the study: a sweep has steps of its own; a march depends on its
+start state.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+
+from studyrunner.plan.sharing import Share
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.study.study import Study
+
+_COMPUTING = ("fretwear", "numba", "numpy", "scipy")
+
+
+class Identities:
+    """Hashes of the tasks of a study on one scene.
+
+    scene_digest: of the model, see SceneFacts. kind: describes the record of a result, so that results with other
+    variables or numbers of outputs are not taken for these.
+    """
+
+    def __init__(self, study: Study, scene_digest: str, kind: str) -> None:
+        self._kind = kind
+        self._scene = (scene_digest, study.friction_coefficient, solver_digest())
+        self._lines: dict[int, tuple[str, ...]] = {}
+        self._kept: dict[tuple[object, ...], str] = {}
+
+    def of_starts(self, branch: BranchTask) -> tuple[str, ...]:
+        """Of the start states at all frequencies of a branch, (n_frequencies,)."""
+        if branch.number not in self._lines:
+            # a time limit decides whether there is a result, not which
+            settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
+            line = (branch.excitation_amplitude, branch.sweep, settings)
+            key = _digest("line", self._scene, line)
+            self._lines[branch.number] = tuple(_digest("start", key, frequency) for frequency in branch.frequencies)
+        return self._lines[branch.number]
+
+    def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:
+        """Of the histories of a march, one for each of its shares."""
+        start = self.of_starts(branch)[march.position]
+        own = (*self._wear(march, march.shares[0]), march.scheme if not march.held else "", march.held)
+        kept = march.cycles, march.loops
+        if kept not in self._kept:
+            self._kept[kept] = _digest(self._kind, kept)
+        base = ("history", start, self._kept[kept], own, march.largest_depth)
+        return tuple(_digest(*base, place > 0, self._wear(march, share)) for place, share in enumerate(march.shares))
+
+    @staticmethod
+    def of_march(histories: tuple[str, ...]) -> str:
+        """Of the progress of a march with these histories, which depends on all counts that are read from it."""
+        return _digest("march", histories)
+
+    def of_branch(self, branch: BranchTask) -> str:
+        """Of the progress of a branch."""
+        return _digest("branch", self.of_starts(branch))
+
+    @staticmethod
+    def _wear(march: MarchTask, share: Share) -> tuple[float, float | None]:
+        """Wear coefficient and, where it matters, step."""
+        of_its_own = march.held or march.scheme == "adaptive"
+        of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
+        return share.wear_coefficient, None if of_its_own else share.step
+
+
+@cache
+def solver_digest() -> str:
+    """Of the solver: its source and the packages that it computes with. Numbers of another one may differ."""
+    specification = find_spec("solver")
+    if specification is None or not specification.submodule_search_locations:
+        raise ModuleNotFoundError("the package solver is not installed")
+    versions = [platform.python_version(), *(metadata.version(name) for name in _COMPUTING)]
+    return _digest(versions, source_hashes(Path(next(iter(specification.submodule_search_locations)))))
+
+
+def source_hashes(folder: Path) -> list[tuple[str, str]]:
+    """Place and hash of all source files of a package, those in its rooms included."""
+    return [
+        (path.relative_to(folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest())
+        for path in sorted(folder.rglob("*.py"))
+    ]
+
+
+def _digest(*values: object) -> str:
+    """Numbers are written so that they come back to the last bit."""
+    text = json.dumps(values, allow_nan=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def hash_of_kind(fields: Sequence[object]) -> str:
+    """Of the description of a record."""
+    return hashlib.sha256(repr(fields).encode()).hexdigest()[:32]

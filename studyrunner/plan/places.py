@@ -1,0 +1,54 @@
+"""Points, cycle counts and errors in words, for what is printed at the end of a run and in messages of points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from studyrunner.study.study import Study
+from studyrunner.variables import COORDINATES
+
+_SHORT = 1e4
+
+
+def show_percent(share: float) -> str:
+    """A relative number in percent: "2.6 %"; more than ten times the whole in short."""
+    if share < 1.0:
+        return f"{100.0 * share:.2g} %"
+    return f"{100.0 * share:.0f} %" if share < 10.0 else f"{100.0 * share:.0e} %"
+
+
+def known_to(error: float) -> str:
+    """What a relative error says of what it is the error of: "is known to 2.6 % only"."""
+    return f"is known to {show_percent(error)} only" if math.isfinite(error) else "is not known"
+
+
+def describe_reach(last: float, end: float, error: float) -> str:
+    """How far a history was computed that ends early, and the relative error of the worn volume there."""
+    reached = f"computed up to cycle {show_count(last)} of {show_count(end)}"
+    return f"{reached}, the worn volume there to {show_percent(error)}" if last > 0.0 and error < math.inf else reached
+
+
+def show_count(cycle: float) -> str:
+    """A cycle count: "31 000"; one that is no whole number, or very large, in short."""
+    if cycle < 1e12 and cycle == round(cycle):
+        text = f"{cycle:,.0f}".replace(",", " ")
+        return text if cycle >= _SHORT else text.replace(" ", "")
+    return f"{cycle:.6g}"
+
+
+def describe_point(study: Study, point: Sequence[int]) -> str:
+    """A point along those axes that have more than one value: "211.25 Hz, explicit"; empty where none has."""
+    texts = []
+    for (name, values), index in zip(study.dimensions.items(), point, strict=True):
+        if len(values) > 1:
+            texts.append(describe_value(name, values[index]))
+    return ", ".join(texts)
+
+
+def describe_value(name: str, value: float | str) -> str:
+    """A value of an axis: the scheme by its word and the frequency by its unit, all others with their name."""
+    shown = value if isinstance(value, str) else f"{value:.8g}"
+    units = COORDINATES[name].units
+    after = f" {units}" if units != "1" and not isinstance(value, str) else ""
+    return f"{shown}{after}" if name in ("frequency", "scheme") else f"{name} {shown}{after}"

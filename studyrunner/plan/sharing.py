@@ -1,0 +1,178 @@
+"""Which choices of wear coefficient, step and scheme have the same wear history, so that it is computed once, and why.
+
+The wear equation is dW/dt = k_w f(W): with s k_w and the step h / s the same states follow each other, each at the
+count t / s. A march computes the history of the largest k_w; the others are read from it at the counts s t.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from studyrunner.study.study import AUTO, Automatic, Study
+
+Index = tuple[int, ...]
+Choice = tuple[int, int, int]
+"""Places on the axes wear_coefficient, step and scheme."""
+
+_SAME = 1e-12  # relative: products of wear coefficient and step that differ by round-off, and numbers of steps
+
+_REASONS = {
+    "cycles": "only the unworn states are asked for, the same for every step and scheme",
+    "wear_coefficient": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
+    "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
+    "adaptive steps": "the adaptive scheme chooses its steps, whatever the step axis says",
+    "adaptive wear": "the adaptive scheme takes the same steps for every wear_coefficient, at other cycle counts",
+    "equal products": "wear_coefficient times step is that of another point: the same history at other cycle counts",
+    "rtol": "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
+}
+
+
+@dataclass(frozen=True)
+class Share:
+    """Points that have one history, at the same cycle counts.
+
+    wear_coefficient: 1/Pa. step: cycles. points: indices along the dimensions of the study. Where the step does not
+    matter it is that of the first point.
+    """
+
+    wear_coefficient: float
+    step: float
+    points: tuple[Index, ...]
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Choices whose histories one march computes.
+
+    shares: for each of its histories, the choices that have it; first those of the march itself, which goes farthest.
+    held: nothing wears, so the state at cycle 0 holds for all cycles.
+    """
+
+    shares: tuple[tuple[Choice, ...], ...]
+    held: bool = False
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Points that are not computed on their own, and why."""
+
+    n_points: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """What is computed from each start state of a study: every choice is in one share of one march."""
+
+    marches: tuple[Alike, ...]
+    causes: Counter[str]
+
+    def left_out(self, n_starts: int, n_points: int) -> tuple[LeftOut, ...]:
+        """Points of a study with so many start states that are not computed on their own, by reason."""
+        n_choices = len(self.marches) + self.causes.total()
+        counts = Counter({cause: n_starts * n for cause, n in self.causes.items()})
+        counts["rtol"] = n_points - n_starts * n_choices
+        return tuple(LeftOut(counts[cause], reason) for cause, reason in _REASONS.items() if counts[cause])
+
+
+def share_histories(study: Study) -> Sharing:
+    """The histories that are computed once, for a reason that the study itself shows.
+
+    With `shortcuts = false` every choice is a march of its own.
+    """
+    axes, slow_time = study.axes, study.slow_time
+    choices = itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme)))
+    if not study.solver.shortcuts:
+        return Sharing(tuple(Alike(((choice,),)) for choice in choices), Counter())
+    marches: list[Alike] = []
+    causes: Counter[str] = Counter()
+    idle: dict[tuple[str, int], list[Choice]] = {}
+    fixed: dict[int, list[Choice]] = {}
+    for choice in choices:
+        wear, _, place = choice
+        scheme = axes.scheme[place]
+        if study.cycles_kept[-1] == 0.0:
+            idle.setdefault(("cycles", wear), []).append(choice)
+        elif axes.wear_coefficient[wear] == 0.0:
+            idle.setdefault(("wear_coefficient", wear), []).append(choice)
+        elif scheme == "adaptive":
+            idle.setdefault(("adaptive steps", wear), []).append(choice)
+        elif scheme == "explicit" and slow_time.largest_depth is not None:
+            # The last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories.
+            idle.setdefault(("largest_depth", wear), []).append(choice)
+        else:
+            fixed.setdefault(place, []).append(choice)
+    adaptive: list[tuple[Choice, ...]] = []
+    for (cause, _), members in idle.items():
+        causes[cause] += len(members) - 1
+        if cause == "adaptive steps":
+            adaptive.append(tuple(members))
+        else:
+            marches.append(Alike((tuple(members),), held=cause != "largest_depth"))
+    if adaptive:
+        farthest_first = sorted(adaptive, key=lambda members: -axes.wear_coefficient[members[0][0]])
+        marches.append(Alike(tuple(farthest_first)))
+        causes["adaptive wear"] += len(adaptive) - 1
+    for of_scheme in fixed.values():
+        for same in _same_products(study, of_scheme):
+            marches.append(Alike(tuple((choice,) for choice in same)))
+            causes["equal products"] += len(same) - 1
+    marches.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.shares)))
+    return Sharing(tuple(marches), causes)
+
+
+def rtol_is_idle(study: Study, harmonics: int | Automatic, samples: int | Automatic) -> bool:
+    """Whether `rtol` changes nothing with such harmonics and samples, so that its values share branch and histories."""
+    return study.solver.shortcuts and AUTO not in (harmonics, samples) and "adaptive" not in study.axes.scheme
+
+
+def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Choice, ...]]:
+    """Choices of one scheme with steps of given length, those with the same history together, the farthest first.
+
+    The last step of a march is shortened to end with it. A history that ends earlier than another one, with a shortened
+    step, is not a part of it.
+    """
+    wears, steps = study.axes.wear_coefficient, study.axes.step
+
+    def product(choice: Choice) -> float:
+        return wears[choice[0]] * steps[choice[1]]
+
+    groups: list[list[Choice]] = []
+    for choice in sorted(choices, key=lambda choice: (product(choice), choice)):
+        if groups and math.isclose(product(choice), product(groups[-1][0]), rel_tol=_SAME):
+            groups[-1].append(choice)
+        else:
+            groups.append([choice])
+    for group in groups:
+        farthest, *others = sorted(group, key=lambda choice: -wears[choice[0]])
+        whole = [choice for choice in others if _whole_number(study.cycles_kept[-1] / steps[choice[1]]) is not None]
+        yield (farthest, *whole)
+        yield from ((choice,) for choice in others if choice not in whole)
+
+
+def march_counts(cycles: Sequence[float], share: Share, march: Share, steps_of_given_length: bool) -> tuple[float, ...]:
+    """Cycle counts of a march at which the states are those of a share of it at `cycles`, ascending.
+
+    A count at the end of a step lies a hair before it, so that it belongs to that step whatever the round-off.
+    """
+    if share == march:
+        return tuple(cycles)
+    if not steps_of_given_length:
+        ratio = share.wear_coefficient / march.wear_coefficient
+        return tuple(ratio * cycle for cycle in cycles)
+    counts = []
+    for cycle in cycles:
+        n_steps = cycle / share.step
+        whole = _whole_number(n_steps)
+        counts.append(march.step * (n_steps if whole is None else (1.0 - _SAME) * whole))
+    return tuple(counts)
+
+
+def _whole_number(value: float) -> int | None:
+    """The whole number, 1 or more, that a value is but for round-off; None where it is not."""
+    near = round(value)
+    return near if near >= 1 and abs(value - near) <= _SAME * near else None

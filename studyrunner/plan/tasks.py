@@ -1,0 +1,348 @@
+"""Study -> tasks: the branches to follow and the points to march from them, and what is left out and why."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from studyrunner.plan.costs import Kin
+from studyrunner.plan.estimate import (
+    AUTOMATIC_HARMONICS,
+    ITERATIONS_A_STATE,
+    ITERATIONS_AT_FIRST,
+    iterations_of_march,
+    seconds_an_iteration,
+)
+from studyrunner.plan.results import Kept
+from studyrunner.plan.sharing import (
+    Alike,
+    Choice,
+    Index,
+    LeftOut,
+    Share,
+    Sharing,
+    march_counts,
+    rtol_is_idle,
+    share_histories,
+)
+from studyrunner.study.study import AUTO, SOLVER_AXES, Automatic, Study
+from studyrunner.variables import ASKED, CERTIFICATE, LOOPS
+
+BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
+"""First keys of the kin of tasks, see LearnedCosts."""
+
+_NEIGHBOURS = 4  # frequencies whose marches take about as long
+_FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Solver keys of a task."""
+
+    harmonics: int | Automatic
+    samples: int | Automatic
+    tolerance: float
+    rtol: float
+    time_limit: float
+
+
+@dataclass(frozen=True)
+class BranchTask:
+    """One branch along frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
+
+    A sweep "up" or "down" passes all frequencies of a line. A "ramp" raises the excitation at a single one, so that it
+    is a task of its own. number: of the branch in the study. cost: estimated seconds. known: places of the frequencies
+    whose results are not asked for: an earlier run has left them, or all that starts from them. resume: how far that
+    run was; None to begin with the first one. key: what the branch is known by in the folder of the run.
+    """
+
+    number: int
+    excitation_amplitude: float
+    sweep: str
+    settings: Settings
+    frequencies: tuple[float, ...]
+    cost: float
+    known: frozenset[int] = frozenset()
+    resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Places of the frequencies in the order of the sweep."""
+        places = range(len(self.frequencies))
+        return tuple(reversed(places) if self.sweep == "down" else places)
+
+    @property
+    def order_left(self) -> tuple[int, ...]:
+        """Those whose results are asked for."""
+        return tuple(place for place in self.order if place not in self.known)
+
+    @property
+    def n_results(self) -> int:
+        """Start states that it gives."""
+        return len(self.frequencies) - len(self.known)
+
+    @property
+    def opens_others(self) -> bool:
+        """Marches."""
+        return True
+
+    @property
+    def kind(self) -> str:
+        """First key of its kin."""
+        return BRANCHES
+
+    @property
+    def kin(self) -> Kin:
+        """What its states cost, in general and on this branch."""
+        return ((self.kind, (self.kind, self.number)),)
+
+
+@dataclass(frozen=True)
+class MarchTask:
+    """One wear history from a start state on a branch, and those of other points that are read from it.
+
+    branch, position: number of the branch and place of the frequency in it. shares: its histories, the one that goes
+    farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
+    cycle 0 holds for all cycles; step and scheme are then those of the first point.
+    cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
+    cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
+        those planned for and something moves.
+    start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
+    number: of the march in the study. key: what it is known by in the folder of the run.
+    """
+
+    number: int
+    branch: int
+    position: int
+    settings: Settings
+    scheme: str
+    largest_depth: float | None
+    shares: tuple[Share, ...]
+    held: bool
+    cycles: tuple[float, ...]
+    variables: tuple[str, ...]
+    loops: tuple[int, ...]
+    cost: float
+    n_unknowns: int
+    moves: bool = True
+    start: Kept | None = field(default=None, compare=False, repr=False)
+    resume: Kept | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
+
+    @property
+    def wear_coefficient(self) -> float:
+        """Of the march itself, 1/Pa."""
+        return self.shares[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Of the march itself, cycles."""
+        return self.shares[0].step
+
+    @property
+    def points(self) -> tuple[Index, ...]:
+        """All points that it gives a history for."""
+        return tuple(itertools.chain.from_iterable(share.points for share in self.shares))
+
+    @property
+    def n_results(self) -> int:
+        """Histories that it gives."""
+        return len(self.shares)
+
+    def counts(self, share: Share) -> tuple[float, ...]:
+        """Cycle counts of the march that a history is read at, one for each of `cycles`."""
+        if self.held:
+            return (0.0,) * len(self.cycles)
+        return march_counts(self.cycles, share, self.shares[0], self.scheme != "adaptive")
+
+    @property
+    def opens_others(self) -> bool:
+        """Nothing."""
+        return False
+
+    @property
+    def kind(self) -> str:
+        """First key of its kin."""
+        return MARCHES if self.moves else RESTING
+
+    @property
+    def kin(self) -> Kin:
+        """Marches from states that move or rest, with as many unknowns, near this state and from it; with such wear."""
+        kind = self.kind
+        near, here = (kind, self.branch, "near", self.position // _NEIGHBOURS), (kind, self.branch, self.position)
+        wear = (kind, self.wear_coefficient, self.step, self.scheme)
+        return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """All tasks of a study.
+
+    marches: for each branch, the tasks that start from it, by frequency. n_unknowns: in the largest task; an estimate
+    where the number of harmonics is automatic.
+    """
+
+    branches: tuple[BranchTask, ...]
+    marches: tuple[tuple[MarchTask, ...], ...]
+    left_out: tuple[LeftOut, ...]
+    n_points: int
+    n_unknowns: int
+
+    @property
+    def cost(self) -> float:
+        """Estimated seconds on one rank."""
+        marches = itertools.chain.from_iterable(self.marches)
+        return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
+
+    def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
+        """The marches from one start state."""
+        line = self.marches[branch]
+        first, last = (side(line, position, key=lambda march: march.position) for side in (bisect_left, bisect_right))
+        return line[first:last]
+
+
+def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
+    """Tasks of a study whose scene has `n_displacements` relative displacements.
+
+    Points whose history is the same for a reason that the study itself shows share a task, see `sharing`. Points with a
+    solution of their own never do. The order and the numbers of the tasks depend on the study alone.
+    """
+    sizes = [len(values) for values in study.dimensions.values()]
+    ascending = sorted(range(sizes[0]), key=lambda place: study.axes.frequency[place])
+    branches: list[BranchTask] = []
+    marches: list[tuple[MarchTask, ...]] = []
+    sharing = share_histories(study)
+    numbers = itertools.count()
+    for lines in _lines(study):
+        line = lines[0]
+        settings = _settings(study, line)
+        n_unknowns = _unknowns(n_displacements, settings.harmonics)
+        seconds = seconds_an_iteration(n_unknowns)
+        sweep = study.axes.sweep[line[1]]
+        for places in _stretches(sweep, ascending):
+            number = len(branches)
+            branches.append(
+                BranchTask(
+                    number=number,
+                    excitation_amplitude=study.axes.excitation_amplitude[line[0]],
+                    sweep=sweep,
+                    settings=settings,
+                    frequencies=tuple(study.axes.frequency[place] for place in places),
+                    cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(places)),
+                )
+            )
+            marches.append(
+                tuple(
+                    task
+                    for position, place in enumerate(places)
+                    for task in _marches(study, sharing, (number, position), place, lines, n_unknowns, numbers)
+                )
+            )
+    return TaskPlan(
+        branches=tuple(branches),
+        marches=tuple(marches),
+        left_out=sharing.left_out(sum(len(branch.frequencies) for branch in branches), math.prod(sizes)),
+        n_points=math.prod(sizes),
+        n_unknowns=max(_unknowns(n_displacements, harmonics) for harmonics in study.harmonics),
+    )
+
+
+def _stretches(sweep: str, ascending: list[int]) -> Iterator[list[int]]:
+    """Places of the frequencies that one task reaches: each for itself where the excitation is raised at it."""
+    if sweep == "ramp":
+        yield from ([place] for place in ascending)
+    else:
+        yield ascending
+
+
+def march_variables(study: Study) -> tuple[str, ...]:
+    """Variables that a march hands back: those asked for and those that the table at the end is made of."""
+    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    return (*asked, *(LOOPS if study.outputs.loops else ()))
+
+
+def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
+    """Indices of excitation amplitude, sweep and solver keys: what a branch along the frequency is followed for.
+
+    The indices of one branch differ in `rtol` only, where nothing uses that.
+    """
+    solver = [len(values) for values in (study.harmonics, study.samples, study.tolerance)]
+    sizes = (len(study.axes.excitation_amplitude), len(study.axes.sweep), *solver)
+    for line in itertools.product(*(range(size) for size in sizes)):
+        lines = [(*line, rtol) for rtol in range(len(study.rtol))]
+        if rtol_is_idle(study, study.harmonics[line[2]], study.samples[line[3]]):
+            yield tuple(lines)
+        else:
+            yield from ((one,) for one in lines)
+
+
+def _settings(study: Study, line: Index) -> Settings:
+    harmonics, samples, tolerance, rtol = line[2:]
+    return Settings(
+        harmonics=study.harmonics[harmonics],
+        samples=study.samples[samples],
+        tolerance=study.tolerance[tolerance],
+        rtol=study.rtol[rtol],
+        time_limit=math.inf if study.solver.time_limit is None else study.solver.time_limit,
+    )
+
+
+def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
+    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
+    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
+
+
+def _marches(
+    study: Study,
+    sharing: Sharing,
+    branch: tuple[int, int],
+    frequency: int,
+    lines: tuple[Index, ...],
+    n_unknowns: int,
+    numbers: Iterator[int],
+) -> Iterator[MarchTask]:
+    """Tasks of all points at one frequency of one branch."""
+    axes = study.axes
+    for alike in sharing.marches:
+        shares = _shares(study, alike, frequency, lines)
+        scheme = axes.scheme[alike.shares[0][0][2]]
+        cycles = 0.0 if alike.held else study.cycles_kept[-1]
+        yield MarchTask(
+            number=next(numbers),
+            branch=branch[0],
+            position=branch[1],
+            settings=_settings(study, lines[0]),
+            scheme=scheme,
+            largest_depth=study.slow_time.largest_depth if scheme == "explicit" else None,
+            shares=shares,
+            held=alike.held,
+            cycles=study.cycles_kept,
+            variables=march_variables(study),
+            loops=study.outputs.loops,
+            cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, shares[0].step),
+            n_unknowns=n_unknowns,
+        )
+
+
+def _shares(study: Study, alike: Alike, frequency: int, lines: tuple[Index, ...]) -> tuple[Share, ...]:
+    """The shares of a march with their points."""
+    return tuple(
+        Share(
+            study.axes.wear_coefficient[choices[0][0]],
+            study.axes.step[choices[0][1]],
+            tuple(_point(study, frequency, line, choice) for line in lines for choice in choices),
+        )
+        for choices in alike.shares
+    )
+
+
+def _point(study: Study, frequency: int, line: Index, choice: Choice) -> Index:
+    """Index of a point along the dimensions of the study."""
+    places = dict(zip(("excitation_amplitude", "sweep", *SOLVER_AXES), line, strict=True))
+    places.update(zip(("wear_coefficient", "step", "scheme"), choice, strict=True))
+    places["frequency"] = frequency
+    return tuple(places[name] for name in study.dimensions)

@@ -1,0 +1,216 @@
+"""Fretting loops, normal load and motion of chosen pairs through a period (Figs. 13, 14, 15 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
+from studyrunner.report.drawing import Drawing, Missing, line_style, new_panels
+from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.units import scale_for
+
+_MOST_PAIRS = 3
+_TITLE = "Fretting loops"
+_NO_MOTION = 1e-15
+"""m. A range below this is round-off."""
+_TANGENTS = ("tangent_1", "tangent_2")
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """A pair through a period, closed, at the first and at the last cycle count.
+
+    displacement, force: by component (n_ends, n_phases), m and N; components that the pair does not have are left out.
+    phase (n_phases,): rad.
+    """
+
+    pair: int
+    phase: NDArray[np.float64]
+    displacement: dict[str, NDArray[np.float64]]
+    force: dict[str, NDArray[np.float64]]
+
+
+def draw_loops(result: Result) -> Iterator[Drawing | Missing]:
+    """Figures of the pairs whose loops the file holds; a sentence where it holds none."""
+    if not result.has("loop_displacement", "loop_force"):
+        sentence = f"Add the contact pairs to see to [outputs] loops, for instance loops = [{_deepest(result)}]."
+        yield Missing("fretting_loops", _TITLE, sentence)
+        return
+    point = result.shown_point()
+    pairs = kept_loops(result, point)
+    if not pairs:
+        sentence = "The file holds no loops of the point shown: add contact pairs to [outputs] loops."
+        yield Missing("fretting_loops", _TITLE, sentence)
+        return
+    order = sorted(pairs, key=lambda pair: -_wear(result, point, pair))
+    loops = [_read_loop(result, point, pair) for pair in sorted(order[:_MOST_PAIRS])]
+    others = sorted(order[_MOST_PAIRS:])
+    left_out = f"The file also holds the loops of {_tell_pairs(others)}" if others else ""
+    tail = as_sentences(f"Pairs shown at {result.describe(point)}", left_out)
+    ends = [result.cycle_label(0), result.cycle_label(-1)][: len(result.cycles)]
+    for draw in (_draw_fretting, _draw_normal, _draw_motion):
+        drawing = draw(loops, ends, tail)
+        if drawing is not None:
+            yield drawing
+
+
+def _deepest(result: Result) -> int:
+    """The pair that is worn most at the shown point; the first where the file does not say."""
+    pairs = result.dataset["contact"].values
+    if not result.has("wear_depth"):
+        return int(pairs[0])
+    return int(pairs[np.argmax(np.nan_to_num(result.at("wear_depth", result.shown_point(), -1).values))])
+
+
+def kept_loops(result: Result, point: dict[str, int]) -> list[int]:
+    """Contact pairs whose loops the file holds at a point: those that the study asked for, without those of NaN."""
+    listed = result.study.get("outputs", {}).get("loops")
+    pairs = [int(pair) for pair in result.dataset["contact"].values]
+    wanted = [pair for pair in pairs if pair in listed] if isinstance(listed, list) and listed else pairs
+    force = result.at("loop_force", point, 0).sel(contact=wanted)
+    held = np.isfinite(force.values).any(axis=tuple(force.get_axis_num(name) for name in ("phase", "component")))
+    return [pair for pair, kept in zip(wanted, held, strict=True) if kept]
+
+
+def _tell_pairs(pairs: Sequence[int]) -> str:
+    shown = ", ".join(str(pair) for pair in pairs[:8])
+    return f"{'pair' if len(pairs) == 1 else 'pairs'} {shown}" + (", ..." if len(pairs) > 8 else "")
+
+
+def _wear(result: Result, point: dict[str, int], pair: int) -> float:
+    """What pairs are chosen by: wear depth at the end, m; all the same where the file holds none."""
+    if not result.has("wear_depth"):
+        return 0.0
+    return float(np.nan_to_num(result.at("wear_depth", point, -1).sel(contact=pair).values))
+
+
+def _read_loop(result: Result, point: dict[str, int], pair: int) -> _Loop:
+    ends = [0, -1] if len(result.cycles) > 1 else [0]
+    names = ["loop_displacement", "loop_force"]
+    loop: xr.Dataset = result.dataset[names].isel({**point, "cycle": ends}).fretwear.loop(pair)
+    components = [str(name) for name in loop["component"].values]
+
+    def split(name: str) -> dict[str, NDArray[np.float64]]:
+        values = loop[name].transpose("component", "cycle", "phase").values
+        # A component that the pair does not have is NaN, or zero throughout.
+        return {
+            component: array
+            for component, array in zip(components, values, strict=True)
+            if np.isfinite(array).all() and array.any()
+        }
+
+    return _Loop(pair, np.asarray(loop["phase"].values, dtype=float), split("displacement"), split("force"))
+
+
+def _draw_fretting(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:
+    """Tangential force over tangential displacement, one row a direction (Fig. 13)."""
+    rows = [name for name in _TANGENTS if any(name in loop.displacement and name in loop.force for loop in loops)]
+    if not rows:
+        return None
+    length = scale_for("m", *(loop.displacement[name] for loop in loops for name in rows if name in loop.displacement))
+    load = scale_for("N", *(loop.force[name] for loop in loops for name in rows if name in loop.force))
+
+    def draw(panel: Axes, loop: _Loop, row: int) -> None:
+        name = rows[row]
+        if name in loop.displacement and name in loop.force:
+            _draw_ends(panel, length(loop.displacement[name]), load(loop.force[name]), ends)
+        panel.set_xlabel(length.label(f"displacement {name[-1]}"))
+        panel.set_ylabel(load.label(f"force {name[-1]}"))
+
+    figure = _grid(loops, len(rows), draw, ends)
+    text = as_sentences(
+        "Tangential force over relative displacement through a period: the area inside is the energy of friction",
+        "1 and 2 are the tangents of the file",
+        tail,
+        "Fig. 13 of the paper",
+    )
+    return Drawing("fretting_loops", _TITLE, text, figure)
+
+
+def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:
+    """Normal force through a period (Fig. 14)."""
+    loops = [loop for loop in loops if "normal" in loop.force]
+    if not loops:
+        return None
+    load = scale_for("N", *(loop.force["normal"] for loop in loops))
+
+    def draw(panel: Axes, loop: _Loop, _row: int) -> None:
+        phase = np.broadcast_to(np.degrees(loop.phase), loop.force["normal"].shape)
+        _draw_ends(panel, phase, load(loop.force["normal"]), ends)
+        panel.set_xticks([0, 90, 180, 270, 360])
+        panel.set_xlim(0, 360)
+        panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]) if loop.force["normal"].min() < 0.0 else 0.0)
+        panel.set_xlabel("phase (°)")
+        panel.set_ylabel(load.label("normal force"))
+
+    figure = _grid(loops, 1, draw, ends)
+    open_part = [f"pair {loop.pair} {_open_share(loop)}" for loop in loops]
+    text = as_sentences(
+        f"Normal force through a period; where it is zero the pair is open: {', '.join(open_part)}",
+        tail,
+        "Fig. 14 of the paper",
+    )
+    return Drawing("normal_load", "Normal load through a period", text, figure)
+
+
+def _open_share(loop: _Loop) -> str:
+    """Share of the period without load at the first and the last cycle count, of the samples in the file."""
+    shares = np.mean(loop.force["normal"][:, :-1] <= 0.0, axis=1)
+    return ", then ".join(f"{100.0 * share:.0f} %" for share in shares)
+
+
+def _draw_motion(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:
+    """Path of the relative displacement in the contact plane (Fig. 15), or through the period with one tangent only."""
+    loops = [loop for loop in loops if all(name in loop.displacement for name in _TANGENTS)]
+    if not loops:
+        return None
+    length = scale_for("m", *(loop.displacement[name] for loop in loops for name in _TANGENTS))
+
+    def draw(panel: Axes, loop: _Loop, _row: int) -> None:
+        _draw_ends(panel, length(loop.displacement["tangent_1"]), length(loop.displacement["tangent_2"]), ends)
+        panel.set_xlabel(length.label("displacement 1"))
+        panel.set_ylabel(length.label("displacement 2"))
+
+    figure = _grid(loops, 1, draw, ends)
+    text = as_sentences(
+        "Path of the relative displacement along the tangents 1 and 2; a pair that sticks is a dot",
+        f"Largest extent: {', '.join(_tell_extent(loop) for loop in loops)}",
+        tail,
+        "Fig. 15 of the paper",
+    )
+    return Drawing("pair_motion", "Motion of the pairs in the contact plane", text, figure)
+
+
+def _tell_extent(loop: _Loop) -> str:
+    """Larger of the two tangential ranges of a pair, at the first and the last cycle count."""
+    extent = np.max([np.ptp(loop.displacement[name], axis=1) for name in _TANGENTS], axis=0)
+    told = ["sticks" if value < _NO_MOTION else scale_for("m", value).show(float(value)) for value in extent]
+    return f"pair {loop.pair} {', then '.join(told)}"
+
+
+def _draw_ends(panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], ends: Sequence[str]) -> None:
+    """Lines (n_ends, n) of the first and the last cycle count; a marker where the period begins."""
+    for number, label in enumerate(ends):
+        look = line_style(number)
+        panel.plot(x[number], y[number], label=label, **{**look, "markevery": [0]})
+
+
+def _grid(loops: Sequence[_Loop], n_rows: int, draw: Callable[[Axes, _Loop, int], None], ends: Sequence[str]) -> Figure:
+    """One column a pair; the legend above all."""
+    figure, panels = new_panels(n_rows, len(loops), 0.5 + 2.7 * n_rows)
+    for column, loop in enumerate(loops):
+        panels[0, column].set_title(f"pair {loop.pair}")
+        for row in range(n_rows):
+            draw(panels[row, column], loop, row)
+            panels[row, column].locator_params(nbins=5)
+    if len(ends) > 1:
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    return figure

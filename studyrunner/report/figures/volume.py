@@ -1,0 +1,273 @@
+"""Worn volume over cycles, and worn volume and wear rate over the frequency (Figs. 4, 6, 7, 8 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from numpy.typing import NDArray
+
+from studyrunner.progress import count
+from studyrunner.report.drawing import (
+    Drawing,
+    Missing,
+    hatch_empty,
+    line_style,
+    mark_failed,
+    new_figure,
+    new_panels,
+    set_from_zero,
+)
+from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
+from studyrunner.report.reading.frequency_course import Course, cell_edges, find_course
+from studyrunner.report.reading.result import Choice, Result, as_sentences
+from studyrunner.report.reading.units import Scale, scale_for
+
+_MOST_LINES = 6
+_MOST_MAPS = 4
+_MANY_CELLS = 300
+_SEEN = 1e-3
+
+NO_VOLUME = 1e-24
+"""m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
+
+
+def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
+    """Figures of the worn volume; one sentence in their place where the file holds no worn volume or nothing wears."""
+    title = "Worn volume"
+    if not result.has("worn_volume"):
+        yield Missing("worn_volume", title, result.lacks("worn_volume"))
+        return
+    if len(result.cycles) == 1:
+        sentence = (
+            f"The file holds {result.cycle_label(0)} only: set cycles and outputs under [slow_time] for a wear history."
+        )
+        yield Missing("worn_volume", title, sentence)
+        return
+    volume = result.read("worn_volume").values
+    largest = float(np.nanmax(volume))
+    scale = scale_for("m3", largest if largest > NO_VOLUME else 0.0)
+    yield draw_history(result, scale, largest)
+    course = find_course(result)
+    if course is None:
+        sentence = "The study has one frequency: give several under [axes] frequency."
+        yield Missing("worn_volume_map", "Worn volume and wear rate over frequency", sentence)
+        return
+    if largest <= NO_VOLUME:
+        return
+    yield draw_map(result, course, "worn_volume", scale)
+    if result.has("wear_rate"):
+        rate = result.read("wear_rate").values
+        yield draw_map(result, course, "wear_rate", scale_for("m3 per cycle", np.nanmax(rate)))
+    else:
+        yield Missing("wear_rate_map", "Wear rate over frequency and cycles", result.lacks("wear_rate"))
+    yield draw_final(result, course, scale)
+
+
+def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
+    """Worn volume over cycles at the shown point, one line a scheme (Fig. 4)."""
+    course = result.course_axis
+    shown = result.shown_point()
+    choice = result.choose([course] if course else [], _MOST_LINES)
+    cycles = scale_for("cycles", result.cycles)
+    figure = new_figure(3.4)
+    panel = figure.subplots()
+    ends: list[str] = []
+    early: list[str] = []
+    exact_drawn: list[NDArray[np.float64]] = []
+    highest = 0.0
+    for number, (point, label) in enumerate(choice):
+        full = {**shown, **point}
+        worn = result.at("worn_volume", full).values
+        if np.isnan(worn).all():
+            continue
+        highest = max(highest, float(np.nanmax(worn)))
+        style = line_style(number, worn.size)
+        panel.plot(cycles(result.cycles), scale(worn), label=label or "computed", **style)
+        highest = max(highest, draw_band(result, panel, full, cycles, scale, style["color"]))
+        early.append(mark_end(result, panel, full, cycles, scale, style["color"]))
+        amount = f"{scale.show(float(worn[-1]), 4)}{tell_error(result, full)}"
+        ends += [f"{amount} ({label})" if label else amount] if np.isfinite(worn[-1]) else []
+        jump = float(result.at("jump_cycle", full).values) if result.has("jump_cycle") else np.nan
+        if np.isfinite(jump):
+            height = np.interp(jump, result.cycles, worn)
+            label_once = (
+                "branch lost, jump" if not any("jump" in end for end in panel.get_legend_handles_labels()[1]) else None
+            )
+            panel.plot(cycles(jump), scale(height), "*", color=style["color"], markersize=12, label=label_once)
+        if result.has("exact_worn_volume"):
+            exact = result.at("exact_worn_volume", full).values
+            if np.isfinite(exact).any() and not any(np.array_equal(exact, old, equal_nan=True) for old in exact_drawn):
+                panel.plot(
+                    cycles(result.cycles),
+                    scale(exact),
+                    color="0.5",
+                    linewidth=4,
+                    alpha=0.5,
+                    zorder=1,
+                    label=None if exact_drawn else "exact",
+                )
+                exact_drawn.append(exact)
+                highest = max(highest, float(np.nanmax(exact)))
+    panel.set_xlabel(cycles.label("vibration cycles"))
+    panel.set_ylabel(scale.label("worn volume"))
+    panel.set_xlim(0.0, cycles(result.cycles[-1]).item())
+    set_from_zero(panel, scale(highest).item() if highest > NO_VOLUME else 0.0)
+    if len(panel.get_lines()) > 1:
+        panel.legend()
+    where = result.describe(shown, [course]) if course else ""
+    amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if ends else ""
+    amount = amount if largest > NO_VOLUME else "Nothing wears."
+    bands = "Bands: estimated error" if any(found.get_gid() == "error" for found in panel.collections) else ""
+    schemes = "" if "scheme" in result.varying else _tell_scheme(result)
+    text = as_sentences(
+        f"Worn volume over cycles{f' at {where}' if where else ''}", amount, bands, *early, schemes, choice.sentence
+    )
+    return Drawing("worn_volume", "Worn volume over cycles", f"{text} Fig. 4 of the paper.", figure)
+
+
+def _tell_scheme(result: Result) -> str:
+    """Why explicit and implicit are not compared."""
+    if "scheme" not in result.dataset.coords:
+        return ""
+    scheme = str(np.atleast_1d(result.dataset["scheme"].values)[0])
+    return f"The study has the {scheme} scheme only; with more under [axes] scheme they stand side by side here"
+
+
+def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing:
+    """Worn volume or wear rate over the course and the cycles, one panel a combination (Figs. 6, 7)."""
+    cycles = scale_for("cycles", result.cycles)
+    choice, fields = _read_known(result, course, name, _MOST_MAPS)
+    largest = max(float(np.nanmax(field, initial=0.0)) for field in fields)
+    n_columns = 2 if len(fields) == _MOST_MAPS else len(fields)
+    n_rows = len(fields) // n_columns
+    figure, panels = new_panels(n_rows, n_columns, 0.6 + 2.7 * n_rows, sharex=True, sharey=True)
+    norm = Normalize(0.0, scale(largest).item() or 1.0)
+    # Half a cell at both ends: nothing is known beyond.
+    rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
+    for panel, field, label in zip(panels.flat, fields, choice.labels, strict=True):
+        panel.pcolormesh(
+            course.edges,
+            rows,
+            scale(field.T),
+            norm=norm,
+            rasterized=field.size > _MANY_CELLS,
+        )
+        hatch_empty(panel, bool(np.isnan(field).any()))
+        panel.grid(visible=False)
+        panel.set_title(label)
+    _label_map(panels, course, cycles)
+    text = {"worn_volume": "worn volume", "wear_rate": "wear rate"}[name]
+    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(text))
+    caption = as_sentences(
+        f"{text.capitalize()} over {course.name} and cycles",
+        f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
+        "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
+        choice.sentence,
+        f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
+    )
+    return Drawing(f"{name}_map", f"{text.capitalize()} over {course.name} and cycles", caption, figure)
+
+
+def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[NDArray[np.float64]]]:
+    """Combinations with a result anywhere along the course, and their values (course, cycle)."""
+    choice = result.choose([course.axis], limit)
+    found = [(point, label, course.read(result, name, point)) for point, label in choice]
+    # The shown point has a result: there is at least one.
+    points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
+    return Choice(points, labels, choice.sentence), list(fields)
+
+
+def _read_reached(result: Result, course: Course) -> list[NDArray[np.float64]]:
+    """First worn volumes along the course, of combinations without a result as well: NaN where there is no state."""
+    choice = result.choose([course.axis], _MOST_LINES)
+    return [course.read(result, "worn_volume", point)[:, 0] for point in choice.points]
+
+
+def _label_map(panels: NDArray[Any], course: Course, cycles: Scale) -> None:
+    """Labels at the outer panels of a grid with shared axes."""
+    for row in panels:
+        row[0].set_ylabel(cycles.label("vibration cycles"))
+    for panel in panels[-1]:
+        course.set_axis(panel)
+
+
+def _where_largest(result: Result, course: Course, choice: Choice, fields: list[NDArray[np.float64]]) -> str:
+    """The place of the largest value of all fields (course, cycle), in words."""
+    number = int(np.argmax([np.nanmax(field, initial=-1.0) for field in fields]))
+    place, cycle = np.unravel_index(int(np.nanargmax(fields[number])), fields[number].shape)
+    at = result.describe({course.axis: int(course.index[place])}, [course.axis])
+    label = f" ({choice.labels[number]})" if choice.labels[number] else ""
+    return f", at {at}, {result.cycle_label(int(cycle))}{label}"
+
+
+def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
+    """Worn volume at the last cycle count over the course, one line a combination (Fig. 8)."""
+    choice, fields = _read_known(result, course, "worn_volume", _MOST_LINES)
+    failed = np.array([np.isnan(one) for one in _read_reached(result, course)])
+    # of a point that ended early, what was worn by then
+    reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
+    fields = [field[:, -1:] for field in fields]
+    figure = new_figure(3.4)
+    panel: Axes = figure.subplots()
+    for number, (field, label) in enumerate(zip(fields, choice.labels, strict=True)):
+        panel.plot(course.values, scale(field[:, 0]), label=label or "computed", **course.line_style(number))
+    largest = max(float(np.nanmax(field, initial=0.0)) for field in reached)
+    colours = [course.line_style(number)["color"] for number in range(len(fields))]
+    bars = draw_bars(result, panel, course, choice, reached, scale, colours)
+    care = mark_care(result, panel, course, choice, reached, scale)
+    # bars that leave the points too little room are cut
+    set_from_zero(panel, scale(max(largest, min(bars, 2.0 * largest))).item())
+    n_oscillating = _mark_oscillating(result, course, choice, panel, fields, scale, _SEEN * largest)
+    n_failed = mark_failed(panel, course.values, failed)
+    course.set_axis(panel)
+    panel.set_ylabel(scale.label(f"worn volume at {result.cycle_label(-1)}"))
+    if len(panel.get_lines()) > 1:
+        panel.legend()
+    caption = as_sentences(
+        f"Worn volume after {result.cycle_label(-1)} over {course.name}",
+        f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",
+        f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
+        f"Rings: {count(n_oscillating, 'point')} whose wear rate oscillates from step to step" if n_oscillating else "",
+        "Bars: estimated error" if bars > 0.0 else "",
+        *care,
+        choice.sentence,
+        "Fig. 8 of the paper",
+    )
+    return Drawing("final_worn_volume", f"Final worn volume over {course.name}", caption, figure)
+
+
+def _mark_oscillating(
+    result: Result,
+    course: Course,
+    choice: Choice,
+    panel: Axes,
+    fields: list[NDArray[np.float64]],
+    scale: Scale,
+    least: float,
+) -> int:
+    """Rings around points whose wear rate oscillates and that have worn more than `least`; how many these are."""
+    if not result.has("oscillates"):
+        return 0
+    x, y = [], []
+    for point, field in zip(choice.points, fields, strict=True):
+        ringed = (course.read(result, "oscillates", point) != 0) & (field[:, 0] > least)
+        x.extend(course.values[ringed].tolist())
+        y.extend(scale(field[ringed, 0]).tolist())
+    if x:
+        panel.plot(
+            x, y, linestyle="none", marker="o", markersize=10, markerfacecolor="none", color="black", label="oscillates"
+        )
+    return len(x)
+
+
+def _where_last(result: Result, course: Course, choice: Choice, fields: list[NDArray[np.float64]]) -> str:
+    """As `_where_largest`, for fields (course,) without cycles."""
+    number = int(np.argmax([np.nanmax(field, initial=-1.0) for field in fields]))
+    place = int(np.nanargmax(fields[number]))
+    label = f" ({choice.labels[number]})" if choice.labels[number] else ""
+    return f", at {result.describe({course.axis: int(course.index[place])}, [course.axis])}{label}"

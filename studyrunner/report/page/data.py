@@ -1,0 +1,311 @@
+"""What the interactive part of the page holds of a result file: the numbers as 32 bit floats, within a limit of size.
+
+A point is numbered as in the file, the last axis fastest. Values stay in the units of the file; the script on the page
+multiplies them by `factor` where it shows them.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from studyrunner.report.drawing import COLOURS
+from studyrunner.report.page.panels import build_panels
+from studyrunner.report.reading.result import CONVERGED, Result, units_of
+from studyrunner.report.reading.units import scale_for
+from studyrunner.variables import CERTIFICATE
+
+COURSES = (
+    "response_amplitude",
+    "response_phase",
+    "response_peak",
+    "worn_volume",
+    "worn_volume_error",
+    "wear_rate",
+    "exact_worn_volume",
+    "exact_response_amplitude",
+)
+"""Variables that the page holds for every point at every cycle."""
+
+MAPS = ("mean_pressure", "wear_depth", "open_fraction")
+"""Variables of the contact pairs that the page draws as maps."""
+
+LOOPS = ("loop_displacement", "loop_force")
+
+POINT_NUMBERS = (
+    "jump_cycle",
+    "error_estimate",
+    "last_cycle",
+    "largest_wear_depth",
+    "newton_iterations",
+    "run_time",
+    "branch",
+    "step_limit",
+)
+"""Numbers of a point that stand in the list beside the plots."""
+
+_LARGEST = {"harmonics_used": "harmonics", "samples_used": "samples in a period"}
+
+MOST_POINTS = 20_000
+"""A larger study has no interactive part: not even its numbers without cycles would fit."""
+
+_LINES = ("scheme", "sweep")
+_FEWEST_MAP_CYCLES = 11
+_FEWEST_LOOP_CYCLES = 2
+_SHARE_OF_COURSES = 0.5
+_SHARE_OF_LOOPS = 0.25
+_CHARACTERS_A_FLOAT = 16.0 / 3.0
+_BYTES_A_BLOCK = 32e6
+
+Encoded = dict[str, str | float]
+"""`data`: see `encode_floats`; values times `factor` are in `unit`; `label`: what they are."""
+
+
+@dataclass(frozen=True)
+class PageData:
+    """What the script on the page gets. content: None without an interactive part. notes: what is not in it."""
+
+    content: Mapping[str, object] | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """Points and cycles that are kept: numbers of points, ascending; places of cycles, first and last among them."""
+
+    points: NDArray[np.int64]
+    cycles: NDArray[np.int64]
+
+
+def build_page_data(result: Result, limit: float) -> PageData:
+    """The numbers of the interactive part in about `limit` characters of text.
+
+    Cycles are thinned out evenly where there are too many numbers, those of the contact pairs before those of the
+    point, then points lose their maps and loops; each of these is said in a note.
+    """
+    n_points = result.held.size
+    if n_points > MOST_POINTS:
+        note = f"The study has {n_points} points, more than the {MOST_POINTS} that can be picked here."
+        return PageData(None, (note,))
+    notes: list[str] = []
+    floats = limit / _CHARACTERS_A_FLOAT
+    points, last = _point_numbers(result), result.last_cycle
+    remarks = {str(place): text for place, text in _remarks(result)}
+    floats -= len(json.dumps(remarks)) / _CHARACTERS_A_FLOAT
+    floats -= sum(len(str(entry["data"])) for entry in points.values()) / _CHARACTERS_A_FLOAT
+    kept = _fit_courses(result, _SHARE_OF_COURSES * floats, notes)
+    if kept is None:
+        return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
+    courses = {name: _variable(result, name, kept) for name in COURSES if result.has(name)}
+    floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
+    loops, used = _loops(result, kept.cycles, _SHARE_OF_LOOPS * floats, notes)
+    maps = _maps(result, kept.cycles, floats - used, notes)
+    shown = [result.shown_point()[name] for name in result.axes]
+    content = {
+        "axes": [_axis(result.dataset[name]) for name in result.axes],
+        "horizontal": result.axes.index(result.course_axis or result.axes[0]),
+        "lines": [result.axes.index(name) for name in _LINES if name in result.varying],
+        "colours": COLOURS,
+        "cycles": result.cycles[kept.cycles].tolist(),
+        "responses": result.responses,
+        "shown": int(np.ravel_multi_index(shown, result.held.shape)),
+        "outcome": result.dataset["outcome"].values.ravel().tolist(),
+        "without": np.flatnonzero(~result.held).tolist(),
+        "ends": {
+            str(place): float(last.flat[place]) for place in np.flatnonzero(result.held & ~result.computed).tolist()
+        },
+        "remarks": remarks,
+        "endings": {str(number): ending.sentence for number, ending in result.endings.items()},
+        "points": points,
+        "courses": courses,
+        "maps": maps,
+        "loops": loops,
+    }
+    return PageData(content, tuple(notes))
+
+
+def _remarks(result: Result) -> Iterator[tuple[int, str]]:
+    """What there is to say of points beside their outcome, by number: messages, and errors above rtol."""
+    messages = result.dataset["message"].values.ravel() if result.has("message") else None
+    for place in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
+        message = "" if messages is None else str(messages[place])
+        error = float(result.errors.ravel()[place])
+        above = result.above.ravel()[place] and math.isfinite(error)
+        texts = (message, f"Its worn volume is known to {100.0 * error:.2g} %" if above else "")
+        if any(texts):
+            yield place, ". ".join(filter(None, texts))
+
+
+def encode_floats(values: ArrayLike) -> str:
+    """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def thin_out(count: int, keep: int) -> NDArray[np.int64]:
+    """`keep` of the places 0 to `count` - 1, evenly, first and last among them; all where `keep` is no less."""
+    if keep >= count:
+        return np.arange(count)
+    return np.unique(np.round(np.linspace(0, count - 1, max(keep, min(count, 2)))).astype(np.int64))
+
+
+def _fit_courses(result: Result, floats: float, notes: list[str]) -> _Kept | None:
+    """Cycles at which the numbers of all points fit; None where not even two of them do."""
+    n_cycles, n_points = result.dataset.sizes.get("cycle", 1), result.held.size
+    names = [name for name in COURSES if result.has(name)]
+    per_cycle = sum(math.prod(_inner_shape(result.dataset[name])[1:]) for name in names) * n_points
+    keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
+    if keep < min(2, n_cycles):
+        return None
+    cycles = thin_out(n_cycles, keep)
+    if len(cycles) < n_cycles:
+        notes.append(f"The slider runs through {len(cycles)} of the {n_cycles} cycle counts of the file.")
+    return _Kept(np.arange(n_points), cycles)
+
+
+def _fit_points(
+    result: Result, cycles: NDArray[np.int64], floats_each: int, floats: float, fewest_cycles: int
+) -> _Kept:
+    """Points and cycles at which `floats_each` numbers fit: first the cycles are thinned out, then points go.
+
+    The points that stay are those worn most at the end; those without a state have nothing to keep.
+    """
+    points = np.flatnonzero(result.held)
+    fewest = min(len(cycles), fewest_cycles)
+    room = int(floats // max(floats_each, 1))
+    keep = min(len(cycles), room // max(len(points), 1))
+    if keep < fewest:
+        keep = fewest
+        points = np.sort(_most_worn_first(result, points)[: room // fewest])
+    return _Kept(points, cycles[thin_out(len(cycles), keep)])
+
+
+def _most_worn_first(result: Result, points: NDArray[np.int64]) -> NDArray[np.int64]:
+    if not result.has("worn_volume"):
+        return points
+    return points[np.argsort(-np.nan_to_num(result.worn.ravel()[points]), kind="stable")]
+
+
+def _maps(result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]) -> dict[str, object] | None:
+    """Values of the contact pairs; None where the file or the page holds none."""
+    names = [name for name in MAPS if result.has(name)]
+    if not names or not result.held.any():
+        return None
+    kept = _fit_points(result, cycles, len(names) * result.dataset.sizes["contact"], floats, _FEWEST_MAP_CYCLES)
+    _say_what_is_kept("Maps", kept, cycles, result, notes)
+    if not len(kept.points):
+        return None
+    return {
+        "points": kept.points.tolist(),
+        "cycles": np.searchsorted(cycles, kept.cycles).tolist(),
+        "panels": build_panels(result),
+        "variables": {name: _variable(result, name, kept) for name in names},
+    }
+
+
+def _loops(
+    result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]
+) -> tuple[dict[str, object] | None, float]:
+    """Loops of the pairs that the file holds, and the floats that they take; None where there are none."""
+    if not result.has(*LOOPS) or not result.held.any():
+        return None, 0.0
+    first = int(np.flatnonzero(result.held)[0])
+    held = np.flatnonzero(
+        np.isfinite(_read(result.dataset["loop_force"], _Kept(np.array([first]), cycles[:1]))).any(axis=(0, 1, 3, 4))
+    )
+    if not len(held):
+        return None, 0.0
+    sizes = result.dataset.sizes
+    each = len(LOOPS) * len(held) * sizes["phase"] * sizes["component"]
+    kept = _fit_points(result, cycles, each, floats, _FEWEST_LOOP_CYCLES)
+    _say_what_is_kept("Loops", kept, cycles, result, notes)
+    if not len(kept.points):
+        return None, 0.0
+    content = {
+        "points": kept.points.tolist(),
+        "cycles": np.searchsorted(cycles, kept.cycles).tolist(),
+        "contacts": result.dataset["contact"].values[held].tolist(),
+        "phases": int(sizes["phase"]),
+        "components": [str(name) for name in result.dataset["component"].values],
+        "variables": {name: _variable(result, name, kept, held) for name in LOOPS},
+    }
+    return content, float(each * len(kept.points) * len(kept.cycles))
+
+
+def _say_what_is_kept(what: str, kept: _Kept, cycles: NDArray[np.int64], result: Result, notes: list[str]) -> None:
+    n_points = int(np.count_nonzero(result.held))
+    if not len(kept.points):
+        notes.append(f"{what} are not on this page: those of a single point would not fit.")
+        return
+    if len(kept.points) < n_points:
+        notes.append(f"{what} are on this page for the {len(kept.points)} most worn of {n_points} points.")
+    if len(kept.cycles) < len(cycles):
+        notes.append(
+            f"{what} are on this page at {len(kept.cycles)} of the {len(cycles)} cycle counts of the slider: the"
+            " nearest one is shown and named."
+        )
+
+
+def _variable(result: Result, name: str, kept: _Kept, contacts: NDArray[np.int64] | None = None) -> Encoded:
+    """A variable at the points and cycles that are kept, (point, cycle, others)."""
+    values = _read(result.dataset[name], kept)
+    return _encode(result.dataset[name], values if contacts is None else values[:, :, contacts])
+
+
+def _read(variable: xr.DataArray, kept: _Kept) -> NDArray[np.float64]:
+    """Values (point, cycle, others) at what is kept; never much more in memory than that and a block of the file."""
+    inner = _inner_shape(variable)
+    shape = variable.shape[: variable.ndim - len(inner)]
+    leading = 0
+    while leading < len(shape) and math.prod(shape[leading:]) * math.prod(inner) * 8 > _BYTES_A_BLOCK:
+        leading += 1
+    found = np.empty((len(kept.points), len(kept.cycles), *inner[1:]))
+    trailing = math.prod(shape[leading:])
+    blocks = kept.points // trailing
+    for block in np.unique(blocks).tolist():
+        # A variable that fits is read as a whole and stays in memory for all others who ask.
+        at = tuple(int(place) for place in np.unravel_index(block, shape[:leading])) if leading else ()
+        part = variable[at] if leading else variable
+        here = blocks == block
+        found[here] = part.values.reshape(trailing, *inner)[kept.points[here] % trailing][:, kept.cycles]
+    return found
+
+
+def _inner_shape(variable: xr.DataArray) -> tuple[int, ...]:
+    """Sizes after the axes: cycle and what follows it."""
+    return variable.shape[variable.dims.index("cycle") :]
+
+
+def _point_numbers(result: Result) -> dict[str, Encoded]:
+    """Numbers of the points without cycles: those of the file, and the worst of the certificates over the cycles."""
+    dataset = result.dataset
+    found = {name: _encode(dataset[name], dataset[name].values) for name in POINT_NUMBERS if result.has(name)}
+    for name, label in {**CERTIFICATE, **_LARGEST}.items():
+        if result.has(name):
+            worst = result.read(name).max("cycle").values
+            found[name] = {**_encode(dataset[name], worst), "label": f"{label}, largest over the cycles"}
+    return found
+
+
+def _encode(variable: xr.DataArray, values: NDArray[np.generic]) -> Encoded:
+    """Values of a variable, with what it is called and how they are shown."""
+    scale = scale_for(str(variable.attrs.get("units", "")), values)
+    label = str(variable.attrs.get("long_name", variable.name))
+    return {"label": label, "unit": scale.unit, "factor": scale.factor, "data": encode_floats(values)}
+
+
+def _axis(axis: xr.DataArray) -> dict[str, object]:
+    """Name, label, unit and values of an axis. `words`: whether the values are texts."""
+    words = axis.dtype.kind not in "fiu"
+    return {
+        "label": str(axis.name).replace("_", " "),
+        "unit": units_of(str(axis.name)),
+        "words": words,
+        "values": [str(value) for value in axis.values] if words else axis.values.tolist(),
+    }

@@ -1,0 +1,85 @@
+"""The horizontal axis of figures over frequency, and the values of the file along it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from studyrunner.report.drawing import line_style
+from studyrunner.report.reading.result import Result, units_of
+from studyrunner.report.reading.units import scale_for, show_power
+
+_DECADES = 30.0
+_MANY = 60
+
+
+@dataclass(frozen=True)
+class Course:
+    """Numbers of one axis of the study, in rising order.
+
+    axis: its name. index (n,): where each of them stands in the file. values (n,): as shown. label: with the unit.
+    name: of the axis in words. logarithmic: whether to draw it so, as what spans decades is.
+    """
+
+    axis: str
+    index: NDArray[np.intp]
+    values: NDArray[np.float64]
+    label: str
+    name: str
+    logarithmic: bool
+
+    def read(self, result: Result, name: str, point: Mapping[str, int]) -> NDArray[np.float64]:
+        """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
+        where = {axis: place for axis, place in point.items() if axis != self.axis}
+        values = result.read(name).isel(where).transpose(self.axis, ...).values
+        return np.asarray(values, dtype=float)[self.index]
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Edges (n + 1,) of cells around the values, as shown."""
+        if self.logarithmic:
+            found: NDArray[np.float64] = np.exp(cell_edges(np.log(self.values)))
+            return found
+        return cell_edges(self.values)
+
+    def line_style(self, number: int) -> dict[str, Any]:
+        """Style of a line over the course: a marker at each point, small where there are many."""
+        found = line_style(number)
+        return found | {"markersize": 0.5 * found["markersize"]} if self.values.size > _MANY else found
+
+    def set_axis(self, panel: Axes) -> None:
+        """Label and scale of a horizontal axis."""
+        panel.set_xlabel(self.label)
+        if self.logarithmic:
+            panel.set_xscale("log")
+            panel.xaxis.set_major_formatter(show_power)
+            panel.xaxis.set_minor_formatter("")
+
+
+def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np.float64]:
+    """Edges (n + 1,) of cells around rising positions (n,): halfway between them; of this width around a single one."""
+    if positions.size == 1:
+        return np.array([positions[0] - 0.5 * width, positions[0] + 0.5 * width])
+    middle = 0.5 * (positions[1:] + positions[:-1])
+    first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
+
+
+def find_course(result: Result, axis: str | None = None) -> Course | None:
+    """The course of a study, along `axis` or along that of `Result.course_axis`; None where it has a single value."""
+    axis = axis or result.course_axis
+    if axis is None or axis not in result.varying:
+        return None
+    values = np.asarray(result.dataset[axis].values, dtype=float)
+    scale = scale_for(units_of(axis), values)
+    index = np.argsort(values, kind="stable")
+    shown = scale(values[index])
+    name = axis.replace("_", " ")
+    text = "excitation frequency" if axis == "frequency" else name
+    decades = axis != "frequency" and bool(shown[0] > 0.0) and shown[-1] / shown[0] > _DECADES
+    return Course(axis, index, shown, scale.label(text), name, decades)

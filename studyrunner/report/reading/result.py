@@ -1,0 +1,350 @@
+"""A result file as the report reads it: which axes vary, which points hold results, which of them is shown."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from studyrunner.progress import count
+from studyrunner.report.reading.door import check_dataset, read_study, reading_errors
+from studyrunner.report.reading.units import show_cycles, show_number
+from studyrunner.user_error import UserError, show_text
+from studyrunner.variables import ASKED, COORDINATES, KEPT
+
+CONVERGED = 0
+"""The `outcome` of a point of which nothing else is to be said."""
+
+_COMPLETE = ("converged", "inaccurate", "sensitive")
+"""Words of the outcomes of points that were computed to the last cycle."""
+
+Point = Mapping[str, int]
+"""Index along each axis. Where axes are left out, all values along them are meant."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """One way for the computation of a point to end: number and word of the file, sentence for the reader."""
+
+    number: int
+    word: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Combinations of the axes that a figure shows, each with its label, and a sentence about those it leaves out.
+
+    sentence: empty where nothing is left out.
+    """
+
+    points: tuple[dict[str, int], ...]
+    labels: tuple[str, ...]
+    sentence: str
+
+    def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
+        """Combinations with their labels."""
+        return iter(zip(self.points, self.labels, strict=True))
+
+
+@dataclass(frozen=True)
+class Result:
+    """A result file; a point is one combination of its axes.
+
+    dataset: read lazily. A variable that was read whole stays in memory, so that it is read once only.
+    """
+
+    path: Path
+    dataset: xr.Dataset
+
+    @cached_property
+    def axes(self) -> tuple[str, ...]:
+        """Dimensions of a point, in the order of the file."""
+        return tuple(str(name) for name in self.dataset["outcome"].dims)
+
+    @cached_property
+    def varying(self) -> tuple[str, ...]:
+        """Axes of more than one value."""
+        return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
+
+    @cached_property
+    def computed(self) -> NDArray[np.bool_]:
+        """Which points were computed to the last cycle, each with its error; in the shape of the axes."""
+        outcome = self.dataset["outcome"].values
+        if not self.has("last_cycle"):
+            # an older file holds nothing of any other point
+            return np.asarray(outcome == CONVERGED)
+        complete = [number for number, ending in self.endings.items() if ending.word in _COMPLETE]
+        return np.asarray(np.isin(outcome, complete))
+
+    @cached_property
+    def last_cycle(self) -> NDArray[np.float64]:
+        """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
+        last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
+        # points of an older file, or of one that was joined to this
+        return np.where(self.computed & np.isnan(last), self.cycles[-1], last)
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which points hold values, be it of the first cycles only; in the shape of the axes."""
+        return np.asarray(self.computed | (self.last_cycle >= self.cycles[0]))
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64]:
+        """Estimated relative errors of the last worn volumes; NaN where the file has none; in the shape of the axes."""
+        known = self.dataset["error_estimate"].values if self.has("error_estimate") else np.nan
+        return np.broadcast_to(np.asarray(known, dtype=float), self.computed.shape)
+
+    @cached_property
+    def rtol(self) -> NDArray[np.float64]:
+        """Relative error that each point was to keep below; NaN where the file does not say."""
+        outcome = self.dataset["outcome"]
+        if "rtol" in outcome.dims:
+            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
+        return np.full(outcome.shape, self.study_number("solver", "rtol"))
+
+    @cached_property
+    def above(self) -> NDArray[np.bool_]:
+        """Which points were computed with an error of the worn volume, or of their states, above `rtol`."""
+        inexact = self.dataset["outcome"].values != CONVERGED
+        return np.asarray(self.computed & (inexact | (self.errors > self.rtol)))
+
+    @cached_property
+    def worn(self) -> NDArray[np.float64]:
+        """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
+        worn = self.read("worn_volume").isel(cycle=-1).fillna(self.read("worn_volume").max("cycle"))
+        return np.asarray(worn.transpose(*self.axes).values, dtype=float)
+
+    def ended(self, word: str) -> NDArray[np.bool_]:
+        """Which points have the outcome of this word; in the shape of the axes."""
+        numbers = [number for number, ending in self.endings.items() if ending.word == word]
+        return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
+
+    @cached_property
+    def cycles(self) -> NDArray[np.float64]:
+        """Cycle counts that the file holds."""
+        return np.asarray(self.dataset["cycle"].values, dtype=float)
+
+    @cached_property
+    def title(self) -> str:
+        """Title of the study, or the name of the file."""
+        return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
+
+    @cached_property
+    def study(self) -> dict[str, dict[str, object]]:
+        """The effective study that the file carries, by table; empty where it has none that can be read."""
+        try:
+            return read_study(self.dataset.attrs)
+        except UserError:
+            return {}
+
+    def study_number(self, table: str, key: str) -> float:
+        """A number of the study; NaN where the file does not say."""
+        value = self.study.get(table, {}).get(key)
+        return float(value) if isinstance(value, int | float) else math.nan
+
+    @cached_property
+    def endings(self) -> dict[int, Ending]:
+        """All ways for a point to end that the file names, by number."""
+        attributes = self.dataset["outcome"].attrs
+        numbers = np.atleast_1d(attributes.get("flag_values", ())).tolist()
+        words = str(attributes.get("flag_meanings", "")).split()
+        sentences = str(attributes.get("sentences", "")).splitlines()
+        sentences += [""] * (len(words) - len(sentences))
+        named = {
+            int(number): Ending(int(number), word, sentence or word.replace("_", " "))
+            for number, word, sentence in zip(numbers, words, sentences, strict=False)
+        }
+        # A number without a name is told as it is rather than left out.
+        for number in np.unique(self.dataset["outcome"].values).tolist():
+            named.setdefault(int(number), Ending(int(number), f"outcome_{number}", f"outcome {number}"))
+        return named
+
+    @cached_property
+    def responses(self) -> tuple[str, ...]:
+        """Names of the responses; empty where the file has none."""
+        if "response" not in self.dataset.coords:
+            return ()
+        return tuple(str(name) for name in self.dataset["response"].values)
+
+    def has(self, *names: str) -> bool:
+        """Whether the file holds all of these variables."""
+        return all(name in self.dataset.variables for name in names)
+
+    def lacks(self, *names: str) -> str:
+        """Sentence that says which of these variables to ask for; empty where the file holds all of them."""
+        missing = [name for name in names if not self.has(name)]
+        return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
+
+    def read(self, name: str) -> xr.DataArray:
+        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
+        values = self.dataset[name]
+        if values.dtype.kind in "iu" and "cycle" in values.dims:
+            last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
+            return values.where(self.dataset["cycle"] <= last)
+        return values
+
+    def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
+        """A variable of one point, read from the file for this point only unless all of it was read before.
+
+        cycle: index, or indices, along `cycle`, where the variable has it.
+        """
+        values = self.dataset[name]
+        where: dict[str, int | slice | list[int]] = {
+            axis: index for axis, index in point.items() if axis in values.dims
+        }
+        if "cycle" in values.dims:
+            where["cycle"] = cycle
+        return values.isel(where)
+
+    def shown_point(self) -> dict[str, int]:
+        """The point that figures of a single point show.
+
+        Among the points computed to the last cycle the one of the largest final worn volume; where nothing is worn, or
+        the file does not hold it, the one of the largest response at the first cycle count kept; else the first point
+        that was computed; else the first. Explicit, oscillating and sensitive histories, which wear too much, only
+        count where there is no other; those that ended early only where none was computed to the end.
+        """
+        return dict(self._shown)
+
+    @cached_property
+    def _shown(self) -> dict[str, int]:
+        candidates = []
+        if self.has("worn_volume"):
+            candidates.append(self.worn)
+        if self.has("response_amplitude"):
+            amplitude = self.read("response_amplitude").isel(cycle=0)
+            candidates.append(amplitude.max("response", skipna=False).values)
+        candidates.append(np.ones(self.computed.shape))
+        usable = self.computed if self.computed.any() else self.held
+        trusted = usable & self._trusted
+        for measure in candidates:
+            known = np.where((trusted if trusted.any() else usable) & np.isfinite(measure), measure, 0.0)
+            if known.max() > 0.0:
+                place = np.unravel_index(int(np.argmax(known)), known.shape)
+                return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
+        return dict.fromkeys(self.axes, 0)
+
+    @property
+    def _trusted(self) -> NDArray[np.bool_]:
+        """Histories that are neither explicit nor sensitive and do not oscillate; in the shape of the axes."""
+        outcome = self.dataset["outcome"]
+        trusted = xr.ones_like(outcome, dtype=bool)
+        if "scheme" in outcome.dims:
+            trusted = trusted & (self.dataset["scheme"] != "explicit")
+        if self.has("oscillates"):
+            trusted = trusted & (self.dataset["oscillates"] == 0)
+        found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
+        return found
+
+    @cached_property
+    def course_axis(self) -> str | None:
+        """The axis that figures over frequency are drawn over: the frequency, or the first other axis of several
+        numbers where the file has one frequency only; None where nothing but words varies.
+        """
+        numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf"]
+        if "frequency" in numbers:
+            return "frequency"
+        return numbers[0] if numbers else None
+
+    def choose(self, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
+        """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
+
+        Where there are more, the axes `first` are split first, then the others in the order of the file, each whole or
+        not at all; the rest stays at the shown point.
+        """
+        order = [name for name in (*first, *self.axes) if name in self.varying and name not in free]
+        order = list(dict.fromkeys(order))
+        shown = {name: index for name, index in self._shown.items() if name not in free}
+        split: list[str] = []
+        number = 1
+        for name in order:
+            size = self.dataset.sizes[name]
+            if number * size <= limit:
+                split.append(name)
+                number *= size
+        split.sort(key=self.axes.index)
+        ranges = [range(self.dataset.sizes[name]) for name in split]
+        points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in itertools.product(*ranges))
+        labels = tuple(self.describe(point, split) for point in points)
+        fixed = [name for name in order if name not in split]
+        if not fixed:
+            return Choice(points, labels, "")
+        others = " and ".join(
+            f"{count(self.dataset.sizes[name] - 1, 'other value')} of {name.replace('_', ' ')}" for name in fixed
+        )
+        sentence = f"Shown for {self.describe(shown, fixed)}; the file also holds {others}."
+        return Choice(points, labels, sentence)
+
+    def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
+        """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
+        kept = axes if axes is not None else (self.varying or self.axes)
+        return ", ".join(
+            show_value(name, self.dataset[name].values[point[name]])
+            for name in self.axes
+            if name in kept and name in point
+        )
+
+    def cycle_label(self, index: int) -> str:
+        """A kept cycle count in words."""
+        return show_cycles(float(self.cycles[index]))
+
+    def close(self) -> None:
+        """Close the file."""
+        self.dataset.close()
+
+
+def units_of(name: str) -> str:
+    """Unit of a variable or a coordinate of a result file; `cycles` where it counts them, empty where there is none."""
+    if name in ("step", "step_limit", "cycle", "jump_cycle"):
+        return "cycles"
+    for table in (ASKED, KEPT, COORDINATES):
+        if name in table:
+            units = table[name].units
+            return "" if units == "1" else units
+    return ""
+
+
+def show_value(name: str, value: object) -> str:
+    """A value of an axis in words."""
+    if isinstance(value, str):
+        return f"{value} scheme" if name == "scheme" else f"{name.replace('_', ' ')} {value}"
+    units = units_of(name)
+    number = show_number(float(str(value)))
+    return (
+        f"{number} Hz" if name == "frequency" else f"{name.replace('_', ' ')} {number}" + (f" {units}" if units else "")
+    )
+
+
+def as_sentences(*parts: str) -> str:
+    """Text of those parts that are not empty, each ended with a full stop."""
+    return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
+
+
+def open_result(path: Path | str) -> Result:
+    """Open a result file, once a process of its own has read it without harm; variables are read when they are needed.
+
+    Raises
+    ------
+    UserError
+        Where there is no such file or it is no result of `run-study`.
+    """
+    # the report itself knows nothing of studies and scenes
+    from studyrunner.study.archive import check_result_file
+
+    path, source = Path(path), str(path)
+    if not path.is_file():
+        raise UserError(source, "OUT.nc", None, "there is no such file; give a result file of run-study")
+    check_result_file(path, source)
+    with reading_errors(source, every=True), warnings.catch_warnings(action="ignore"):
+        # the same file as before, whatever its name looks like
+        opened = xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
+        return Result(path, check_dataset(opened, source))

@@ -1,0 +1,161 @@
+"""The scene of a study: builds or reads the reduced model, and tells what the runner has to know of it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.scene_error import SceneError
+from studies.scenes import build_scene
+from studyrunner.scene.variables import build_mesh, check_outputs
+from studyrunner.study.scene_errors import scene_errors
+from studyrunner.study.study import AUTO, Study
+from studyrunner.user_error import UserError
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+
+
+AUTOMATIC_HARMONICS_OF_A_WAVE = 13
+"""Harmonics whose nodal diameters a bundled cyclic scene is built with where their number is automatic."""
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What the plan and the result file say of a scene with n_contact pairs.
+
+    n_displacements: relative displacements of all pairs, the unknowns of one harmonic coefficient.
+    position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
+    digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
+    largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
+    """
+
+    n_displacements: int
+    position: NDArray[np.float64]
+    area: NDArray[np.float64]
+    surface: tuple[str, ...]
+    response_names: tuple[str, ...]
+    digest: str
+    largest_harmonics: int | None = None
+
+
+def build_study_scene(study: Study) -> ReducedModel:
+    """Reduced model of the study's scene, for the largest number of harmonics that the study gives.
+
+    Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
+    may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
+    Raises UserError where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
+    """
+    model = _build(study)
+    check_outputs(study, model)
+    return model
+
+
+def _build(study: Study) -> ReducedModel:
+    given = max(study.given_harmonics, default=1)
+    built = max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
+    scene = study.scene
+    # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
+    with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
+        if scene.path is None:
+            return _build_bundled(study, built)
+        # h5py is loaded for scene files only: the bundled scenes do without it.
+        from studies.scene_file import read_scene
+
+        return read_scene(scene.path, given, scene.group)
+
+
+def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:
+    try:
+        return build_scene(study.scene.model, study.scene.parameters, n_harmonics)
+    except SceneError:
+        raise
+    except (ArithmeticError, ValueError, MemoryError) as error:
+        # what a parameter alone does not show: LinAlgError is a ValueError, too
+        raise SceneError(
+            "model", f"{study.scene.model} cannot be built: {error}", "give parameters of a possible structure"
+        ) from None
+
+
+def write_study_scene(study: Study, path: Path) -> None:
+    """Writes the scene of a study as a scene file, whole or not at all. Raises UserError where the scene is wrong."""
+    from studies.scene_file import write_scene
+
+    model = build_study_scene(study)
+    with scene_errors(study.source, study.scene.path):
+        mesh = build_mesh(study)
+    try:
+        write_scene(model, path, mesh)
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror or error}"
+        raise UserError("command line", "--write-scene", str(path), remedy) from None
+
+
+@dataclass(frozen=True)
+class KeptScene:
+    """What a result file keeps of a scene file: its attributes, and its datasets by name with groups."""
+
+    attributes: Mapping[str, int]
+    datasets: tuple[tuple[str, NDArray[np.generic]], ...]
+
+
+def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
+    """The whole content of a scene file; None of a bundled scene, which its parameters give again."""
+    if study.scene.path is None:
+        return None
+    from studies.scene_layout import scene_attributes, scene_datasets
+
+    with scene_errors(study.source, study.scene.path):
+        return KeptScene(scene_attributes(model), tuple(scene_datasets(model, build_mesh(study))))
+
+
+def describe_scene(model: ReducedModel) -> SceneFacts:
+    """Facts of a reduced model."""
+    contact = model.contact
+    return SceneFacts(
+        n_displacements=int(np.count_nonzero(np.asarray(contact.dofs) >= 0)),
+        position=contact.position,
+        area=contact.area,
+        surface=contact.surface,
+        response_names=model.response_names,
+        digest=_digest(model),
+        largest_harmonics=largest_harmonics(model),
+    )
+
+
+def largest_harmonics(model: ReducedModel) -> int | None:
+    """Most harmonics for which the model holds all nodal diameters; None where any number can be used."""
+    # After n_sectors harmonics the nodal diameters come again.
+    for harmonic in range(1, model.n_sectors):
+        try:
+            model.harmonic_structure(harmonic)
+        except KeyError:
+            return harmonic - 1
+    return None
+
+
+def _digest(model: ReducedModel) -> str:
+    digest = hashlib.sha256()
+    for name, value in _parts(model):
+        array = np.ascontiguousarray(value)
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
+    """Everything that a reduced model holds, in an order that does not depend on how it was made."""
+    for nodal_diameter, linear in sorted(model.linear.items()):
+        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
+            yield f"{nodal_diameter} {name}", getattr(linear, name)
+    for name in ("dofs", "area", "gap", "normal_load", "position"):
+        yield name, getattr(model.contact, name)
+    texts = "\n".join((*model.contact.surface, "", *model.response_names))
+    yield "texts", np.frombuffer(texts.encode(), dtype=np.uint8)
+    yield "sectors", np.array([model.n_sectors, model.nodal_diameter], dtype=np.int64)

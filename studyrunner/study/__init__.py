@@ -1,0 +1,1 @@
+"""The study: what a study file says, read, checked, frozen, and written again."""

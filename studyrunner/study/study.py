@@ -1,0 +1,333 @@
+"""The study: what a study file says, checked, frozen and with every default filled in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
+
+from studyrunner.study.archive import Archived
+from studyrunner.study.values import (
+    axis_of,
+    number_or,
+    one_of,
+    read_fraction,
+    read_not_negative,
+    read_number,
+    read_positive,
+    read_switch,
+    whole_number,
+)
+from studyrunner.user_error import WrongValueError
+from studyrunner.variables import ASKED, KEPT, SCENE
+
+Automatic = Literal["auto"]
+AUTO: Final = "auto"
+"""In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
+
+SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
+AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
+
+_MOST_HARMONICS, _MOST_SAMPLES = 1000, 100_000
+_MOST_OUTPUTS = 1_000_000
+_MOST_POINTS = 1_000_000
+_MOST_PAIRS = 1_000_000
+
+_read_harmonics = number_or(AUTO, whole_number(1, _MOST_HARMONICS))
+_read_samples = number_or(AUTO, whole_number(4, _MOST_SAMPLES))
+_read_scheme = one_of("implicit", "explicit", "adaptive")
+
+DEFAULT: Final = "default"
+"""In a list of variables: those that cost little, which is what a study without such a list asks for."""
+
+PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
+NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
+HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_harmonics))]
+SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
+FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
+Scheme = Literal["implicit", "explicit", "adaptive"]
+Sweep = Literal["up", "down", "ramp"]
+
+
+def _read_name(value: object) -> str:
+    if not isinstance(value, str) or not value.strip() or value.startswith(".") or not value.isprintable():
+        raise WrongValueError(value, "give a name that can be a file name")
+    if "/" in value or "\\" in value or len(value) > 100:
+        raise WrongValueError(value, "give a name of at most 100 characters without a slash")
+    return value
+
+
+def _read_text(value: object) -> str:
+    if not isinstance(value, str):
+        raise WrongValueError(value, "give a text in quotes")
+    return value
+
+
+def _read_outputs(value: object) -> int | tuple[float, ...]:
+    if not isinstance(value, list | tuple):
+        return whole_number(1, _MOST_OUTPUTS)(value)
+    counts = tuple(read_not_negative(item) for item in value)
+    if not counts or any(later <= earlier for earlier, later in pairwise(counts)):
+        raise WrongValueError(value, "give a number of outputs or an ascending list of cycle counts")
+    return counts
+
+
+def _read_variables(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise WrongValueError(value, "give a list of names of result variables")
+    known = (*ASKED, *SCENE, *KEPT)
+    seen: list[str] = []
+    for name in value:
+        if name in seen or (name == DEFAULT and list(value).count(DEFAULT) > 1):
+            raise WrongValueError(name, "give every name once")
+        if name not in known:
+            raise WrongValueError(name, f'give "{DEFAULT}" or names out of {", ".join(known)}')
+        seen.append(name)
+    return tuple(name for name in (*ASKED, *SCENE) if name in value)
+
+
+def _read_loops(value: object) -> tuple[int, ...]:
+    if not isinstance(value, list | tuple):
+        raise WrongValueError(value, "give a list of contact indices")
+    pairs = sorted(whole_number(0, _MOST_PAIRS)(item) for item in value)
+    for pair, other in pairwise(pairs):
+        if pair == other:
+            raise WrongValueError(pair, "give every contact index once")
+    return tuple(pairs)
+
+
+class Section(BaseModel):
+    """A table of the study file: frozen, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class StudySection(Section):
+    """[study]: how the study is called."""
+
+    name: Annotated[str, BeforeValidator(_read_name)] = Field(description="name of the study and of its result file")
+    title: Annotated[str, BeforeValidator(_read_text)] = Field("", description="goes into the result")
+
+
+class AxesSection(Section):
+    """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
+
+    frequency: PositiveAxis = Field(description="Hz; a number, a list or {start, stop, num}")
+    wear_coefficient: NotNegativeAxis = Field((1.1e-11,), description="1/Pa")
+    excitation_amplitude: PositiveAxis = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
+    step: PositiveAxis = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
+    scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
+        ("adaptive",), description="of the wear steps"
+    )
+    sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down", "ramp")))] = Field(
+        ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"
+    )
+    harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
+    samples: SamplesAxis | None = Field(None, description="time samples in a period")
+    tolerance: FractionAxis | None = Field(None, description="of the scaled residual")
+    rtol: FractionAxis | None = Field(
+        None, description="relative error that automatic settings and adaptive steps aim at"
+    )
+
+
+class SlowTimeSection(Section):
+    """[slow_time]: how far, and which cycle counts are kept."""
+
+    cycles: Annotated[float, BeforeValidator(read_not_negative)] = Field(
+        100_000.0, description="cycles; 0 for the unworn states only"
+    )
+    outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
+        101, description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts"
+    )
+    largest_depth: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+        None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
+    )
+
+
+class SolverSection(Section):
+    """[solver]: how finely and how exactly. A key that stands under [axes] is not used from here."""
+
+    harmonics: Annotated[int | Automatic, BeforeValidator(_read_harmonics)] = Field(
+        AUTO, description="harmonics above the static one"
+    )
+    samples: Annotated[int | Automatic, BeforeValidator(_read_samples)] = Field(
+        AUTO, description="time samples in a period"
+    )
+    tolerance: Annotated[float, BeforeValidator(read_fraction)] = Field(1e-8, description="of the scaled residual")
+    rtol: Annotated[float, BeforeValidator(read_fraction)] = Field(
+        1e-2, description="relative error that automatic settings and adaptive steps aim at"
+    )
+    shortcuts: Annotated[bool, BeforeValidator(read_switch)] = Field(
+        True, description="whether points with the same history share one; false: every point is computed on its own"
+    )
+    time_limit: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+        None, description="s, CPU time that a start state or a wear history may take; none unless it is given"
+    )
+
+
+class OutputsSection(Section):
+    """[outputs]: which variables the result holds; `outcome` and the totals of a point are always there."""
+
+    variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
+        tuple(ASKED), description="names of result variables"
+    )
+    loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field(
+        (), description="indices of the contact pairs whose fretting loops are kept"
+    )
+
+
+class SceneFileParameters(Section):
+    """[scene] of a scene file: the file says all the rest."""
+
+    friction_coefficient: Annotated[float, BeforeValidator(read_not_negative)] = Field(
+        description="a number, 0 or more"
+    )
+
+
+class SceneSection(Section):
+    """[scene]: which model, and the parameters that this model knows.
+
+    parameters: checked object of the class that the scene names, with at least `friction_coefficient`.
+    path: the file that the scene stands in, None where it is a bundled one. group: where in that file, empty where it
+    is a scene file. offers: names in `outputs.variables` of what this scene can tell and not all can.
+    """
+
+    model: Annotated[str, BeforeValidator(_read_text)]
+    parameters: SerializeAsAny[BaseModel]
+    path: Path | None = Field(None, exclude=True)
+    group: str = Field("", exclude=True)
+    offers: tuple[str, ...] = Field((), exclude=True)
+
+
+class Study(Section):
+    """A whole study.
+
+    source: the file that it was read from, as the user named it. folder: the one that this file stands in.
+    archived: what the file says of the result that it holds, None where it is a study file.
+    """
+
+    study: StudySection
+    scene: SceneSection
+    axes: AxesSection
+    slow_time: SlowTimeSection = SlowTimeSection()
+    solver: SolverSection = SolverSection()
+    outputs: OutputsSection = OutputsSection()
+    source: str = Field(exclude=True)
+    folder: Path = Field(exclude=True)
+    archived: Archived | None = Field(None, exclude=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_variables(cls, table: object) -> object:
+        """All that cost little, unless the study names others: those of every point, and the mesh if there is one."""
+        if not isinstance(table, dict) or not isinstance(scene := table.get("scene"), SceneSection):
+            return table
+        outputs = table.get("outputs", {})
+        if not isinstance(outputs, dict):
+            return table
+        names = outputs.get("variables", [DEFAULT])
+        if not isinstance(names, list) or names.count(DEFAULT) != 1:
+            return table
+        cheap = [*ASKED, *(name for name in scene.offers if name == "mesh")]
+        filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
+        return {**table, "outputs": {**outputs, "variables": filled}}
+
+    @model_validator(mode="after")
+    def _check_variables(self) -> Study:
+        for name in ("mesh", "exact"):
+            if name in self.outputs.variables and name not in self.scene.offers:
+                remedy = f"leave it out: the scene {self.scene.model} has none"
+                raise WrongValueError(name, remedy, "outputs.variables")
+        return self
+
+    @model_validator(mode="after")
+    def _check_points(self) -> Study:
+        n_points = math.prod(len(values) for values in self.dimensions.values())
+        if n_points > _MOST_POINTS:
+            longest = max(self.dimensions, key=lambda name: len(self.dimensions[name]))
+            remedy = f"give fewer values: there are {n_points:.3g} points, and a study has at most {_MOST_POINTS}"
+            raise WrongValueError(len(self.dimensions[longest]), remedy, f"axes.{longest}")
+        return self
+
+    @model_validator(mode="after")
+    def _check_samples(self) -> Study:
+        most, given = max(self.given_harmonics, default=0), [n for n in self.samples if n != AUTO]
+        fewest = min(given, default=None)
+        if fewest is not None and fewest <= 2 * most:
+            table = "solver" if self.axes.samples is None else "axes"
+            remedy = f"give more than twice the {most} harmonics, at least {2 * most + 1}"
+            raise WrongValueError(fewest, remedy, f"{table}.samples")
+        return self
+
+    @model_validator(mode="after")
+    def _check_outputs(self) -> Study:
+        cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
+        if isinstance(outputs, tuple):
+            if outputs[-1] > cycles:
+                remedy = f"give cycle counts of at most slow_time.cycles = {cycles:g}"
+                raise WrongValueError(outputs[-1], remedy, "slow_time.outputs")
+        elif outputs < 2 and cycles > 0.0:
+            raise WrongValueError(outputs, "give at least 2: cycle 0 and the last one", "slow_time.outputs")
+        return self
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files that a run of the study reads."""
+        study_file = self.folder / Path(self.source).name
+        return (study_file,) if self.scene.path is None else (study_file, self.scene.path)
+
+    @property
+    def friction_coefficient(self) -> float:
+        """Coulomb's coefficient of the scene."""
+        return read_number(dict(self.scene.parameters)["friction_coefficient"])
+
+    @cached_property
+    def cycles_kept(self) -> tuple[float, ...]:
+        """Cycle counts of the result, ascending."""
+        cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
+        if isinstance(outputs, tuple):
+            return outputs
+        if cycles == 0.0:
+            return (0.0,)
+        return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
+
+    @property
+    def harmonics(self) -> tuple[int | Automatic, ...]:
+        """Values of `harmonics`, from its axis or the one under [solver]; so for the other solver keys."""
+        return (self.solver.harmonics,) if self.axes.harmonics is None else self.axes.harmonics
+
+    @property
+    def samples(self) -> tuple[int | Automatic, ...]:
+        """Values of `samples`."""
+        return (self.solver.samples,) if self.axes.samples is None else self.axes.samples
+
+    @property
+    def tolerance(self) -> tuple[float, ...]:
+        """Values of `tolerance`."""
+        return (self.solver.tolerance,) if self.axes.tolerance is None else self.axes.tolerance
+
+    @property
+    def rtol(self) -> tuple[float, ...]:
+        """Values of `rtol`."""
+        return (self.solver.rtol,) if self.axes.rtol is None else self.axes.rtol
+
+    @property
+    def given_harmonics(self) -> tuple[int, ...]:
+        """The values of `harmonics` that are numbers."""
+        return tuple(number for number in self.harmonics if number != AUTO)
+
+    @property
+    def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
+        """Name and values of the axes of the result, in its order; solver keys only where they are axes."""
+        names = (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        return {name: getattr(self.axes, name) for name in names}
+
+
+def names_file(model: str) -> bool:
+    """Whether the text under `scene.model` names a scene file: a path, or a name with an HDF5 ending."""
+    return "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")

@@ -1,0 +1,1 @@
+"""What a run says of its results: worn volumes within rtol, certificates, outcomes, findings."""

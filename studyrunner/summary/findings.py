@@ -1,0 +1,89 @@
+"""Points that failed, or that are less exact than was asked for, by name: where, up to which cycle, how well known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.evaluate import COMPLETE, CONVERGED, INACCURATE, NOT_COMPUTED, endings
+from studyrunner.plan.places import describe_point, describe_reach
+from studyrunner.plan.sharing import Index
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study import AUTO, Study
+
+MOST_NAMED = 10
+"""Points that are named, of all outcomes together but for one each."""
+
+
+@dataclass
+class _Ended:
+    """Points of one outcome: how many, and the first of them in the order of the file with what there is to say."""
+
+    n: int = 0
+    first: list[tuple[Index, str]] = field(default_factory=list)
+
+    def add(self, points: Sequence[Index], said: str) -> None:
+        """Some that have the same to say."""
+        self.n += len(points)
+        named = [*self.first, *((point, said) for point in sorted(points)[:MOST_NAMED])]
+        self.first = sorted(named)[:MOST_NAMED]
+
+
+class Findings:
+    """Collects them from records of histories, some at a time; their order does not matter."""
+
+    def __init__(self, study: Study, facts: SceneFacts) -> None:
+        self._study = study
+        self._largest_harmonics = facts.largest_harmonics if AUTO in study.harmonics else None
+        self._ended: dict[int, _Ended] = {}
+
+    def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
+        """Records (n,) as in `records`, and the points that each of them is of."""
+        for row in np.flatnonzero(records["outcome"] != CONVERGED).tolist():
+            outcome = int(records["outcome"][row])
+            self._ended.setdefault(outcome, _Ended()).add(points[row], self._say(records[row]))
+
+    def format(self, outcomes: Mapping[int, int]) -> tuple[str, ...]:
+        """For each way to end but to tolerance a line with its number of points, then a line for each of the first.
+
+        outcomes: points by number; those that are not computed are in no record.
+        """
+        lines: list[str] = []
+        present = [ending for ending in endings() if ending.number != CONVERGED and outcomes.get(ending.number, 0)]
+        most = max(1, MOST_NAMED // max(1, len(present)))
+        for ending in present:
+            lines.append(
+                f"{outcomes[ending.number]} x {ending.meaning}: {ending.sentence}{self._remark(ending.number)}"
+            )
+            ended = self._ended.get(ending.number)
+            if ended is None or ending.number == NOT_COMPUTED:
+                continue
+            for point, said in ended.first[:most]:
+                text = ": ".join(filter(None, (describe_point(self._study, point), said)))
+                lines += [f"  {text}"] if text else []
+            if ended.n > most:
+                lines.append(f"  and {ended.n - most} more")
+        return tuple(lines)
+
+    def _say(self, record: np.void) -> str:
+        """What is known of a history: what its message says, and how far it came where that is not in it."""
+        message, last = str(record["message"]), float(record["last_cycle"])
+        if int(record["outcome"]) in COMPLETE or "cycle" in message:
+            return message
+        if math.isnan(last):
+            return message or "no state was found"
+        end = self._study.cycles_kept[-1]
+        return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
+
+    def _remark(self, number: int) -> str:
+        """Where a travelling wave has no nodal diameters for more harmonics, more of them are no use of the solver."""
+        if number != INACCURATE or self._largest_harmonics is None:
+            return ""
+        return (
+            f" The scene holds the nodal diameters of {self._largest_harmonics} harmonics: one that holds more allows"
+            " for more."
+        )

@@ -1,0 +1,1 @@
+"""What the operating system does: files and their locks, streams, signals, faults of the machine."""
