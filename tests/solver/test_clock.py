@@ -9,9 +9,9 @@ import pytest
 from numba import njit
 
 from solver.clock import computing_time
-from solver.continuation import first_state as response
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
+from solver.results import state_report
 from solver.settings import SolverSettings
 from solver.wear.march import march_wear
 from tests.solver.models import scene
@@ -61,7 +61,7 @@ def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
     march()
     compiled, says = march()
     assert 0.5 * compiled < says <= compiled
-    monkeypatch.setattr(response, "largest_distance", njit(response.largest_distance.py_func))
+    monkeypatch.setattr(state_report, "largest_distance", njit(state_report.largest_distance.py_func))
     fresh, says = march()
     assert fresh > 0.1 + compiled
     assert says < 0.3 * fresh

@@ -291,7 +291,7 @@ def test_a_time_limit_is_one_bad_point() -> None:
 
 def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself: to the numbers of a march that had the time at once."""
-    from solver.continuation import natural as path
+    from solver.newton import solve_balance as newton
     from studyrunner import evaluate
 
     study = [
@@ -301,7 +301,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     ]
     assert main([*study, "-o", "whole.nc"]) == 0
     own, begun = evaluate._solve, []
-    own_clock, n_looks = path.computing_time, 0
+    own_clock, n_looks = newton.computing_time, 0
 
     def solve(model: object, friction: float, task: MarchTask, *rest: object) -> object:
         begun.append(task.resume)
@@ -316,7 +316,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     monkeypatch.setattr(evaluate, "_solve", solve)
     study += ["-o", "out.nc"]
     with monkeypatch.context() as slow:
-        slow.setattr(path, "computing_time", clock)
+        slow.setattr(newton, "computing_time", clock)
         assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
         reached = load().last_cycle.item()
         assert 0.0 < reached < 100_000.0
