@@ -18,7 +18,7 @@ from solver.accuracy.harmonic_levels import LADDER, MOST_HARMONICS, fewer, n_unk
 from solver.accuracy.level import DEAR, NEAR_SAFETY, SAMPLES_SAFETY, Level
 from solver.accuracy.period_events import nothing_happens
 from solver.harmonic_balance.converged import PathPoint
-from solver.newton.preconditioner import FEW_ROWS
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Effort
 from solver.settings import Resolution
 from solver.structure.joint import Case, Joint
@@ -142,7 +142,7 @@ def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint)
 def _allowed(here: Level, resolution: Resolution) -> bool:
     if not here.case.model.holds(resolution.highest):
         return False
-    most = MOST_OF_FEW if here.joint.slots.size <= FEW_ROWS else MOST_UNKNOWNS
+    most = MOST_OF_FEW if here.joint.slots.size <= NEWTON.few_displacements else MOST_UNKNOWNS
     if resolution.highest > MOST_HARMONICS:
         # friction alone: motions that hit something take their time in vain
         if not all(order % 2 for order in resolution.orders):

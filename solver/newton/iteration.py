@@ -1,4 +1,4 @@
-"""Globalised semismooth Newton. Knows nothing of contact."""
+"""Globalised semismooth Newton's method. Knows nothing of contact."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.model import FloatArray
-
-PATIENCE = 6  # full steps that may go by without a new lowest residual
-SHORTEST = 1.0 / 128.0
+from solver.newton.options import NEWTON
 
 
 class HasResidual(Protocol):
@@ -43,18 +41,38 @@ def solve_newton(
     direction: Callable[[EvaluationT], FloatArray],
     start: FloatArray,
     tolerance: float,
-    most_iterations: int = 30,
+    most_iterations: int | None = None,
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` until the scaled residual is below the tolerance.
 
-    The residual is piecewise smooth: a full step that raises it often lands in the right piece, and a step that is cut
-    back at every kink crawls. So full steps come first, as long as the lowest norm so far is improved once in
-    `PATIENCE` iterations; then the iteration goes back to the best point and cuts its steps until the norm falls.
+    The residual is piecewise smooth: a full step that raises it often ends in the piece that holds the solution, and a
+    line search at every kink takes very short steps. So full steps come first, as long as the lowest norm so far is
+    improved once in `NEWTON.full_steps` iterations; then the iteration returns to the best point and halves its steps
+    until the norm decreases.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Evaluation at an unknown (any shape).
+    direction : callable
+        Newton step, of the shape of the unknown, from an evaluation.
+    start : array
+        Unknown to begin with.
+    tolerance : float
+        Of the scaled residual, dimensionless.
+    most_iterations : int, optional
+        `NEWTON.iterations` by default.
+
+    Returns
+    -------
+    NewtonResult
+        Where the tolerance is not met, the point of the lowest norm.
     """
+    most = NEWTON.iterations if most_iterations is None else most_iterations
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
-    cutting = False
-    for iteration in range(most_iterations + 1):
+    cutting, shortest = False, NEWTON.shortest_step
+    for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
             return NewtonResult(True, unknown, current, iteration)
@@ -62,20 +80,20 @@ def solve_newton(
             best, best_norm, since_best = (unknown, current), norm, 0
         else:
             since_best += 1
-        if iteration == most_iterations:
+        if iteration == most:
             break
-        lost = not np.isfinite(norm) or norm > 1e6 * best_norm
-        if not cutting and (lost or since_best > PATIENCE):
+        lost = not np.isfinite(norm) or norm > NEWTON.divergence * best_norm
+        if not cutting and (lost or since_best > NEWTON.full_steps):
             cutting = True
             unknown, current = best
         step = direction(current)
         if not np.all(np.isfinite(step)):
             break
         length, trial = 1.0, evaluate(unknown + step)
-        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual() and length > SHORTEST:
+        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual() and length > shortest:
             length *= 0.5
             trial = evaluate(unknown + length * step)
-        if cutting and length <= SHORTEST:
+        if cutting and length <= shortest:
             break
         unknown, current = unknown + length * step, trial
-    return NewtonResult(False, *best, most_iterations)
+    return NewtonResult(False, *best, most)

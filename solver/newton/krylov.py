@@ -1,8 +1,8 @@
 """Krylov methods for operators that are only known by their products: GMRES, and eigenvalues by Arnoldi's method.
 
-Bases are orthogonalised twice: an operator may be singular, as that of a joint that slips as a whole, and then one
-pass leaves a basis that is none. There a right-hand side may also lie out of reach: `solve_gmres` ends where it gets
-no farther, with the solution that comes nearest and does not run away along what the operator does not act on.
+Bases are orthogonalised twice: the operator may be singular, as that of a joint that slips as a whole, and one pass
+of Gram-Schmidt then leaves a basis that is not orthogonal. A right-hand side may also lie outside the range of such an
+operator: `solve_gmres` ends where it stagnates, with the least-squares solution that has no part along the null space.
 """
 
 from __future__ import annotations
@@ -12,18 +12,30 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray
-
-PATIENCE = 20  # products
-NEUTRAL = 1e-5  # singular value over the largest: a direction that the operator does not act on
-GAIN = 0.75  # of the residual: where it has not come below that within the patience it will not
+from solver.newton.options import NEWTON
 
 Product = Callable[[FloatArray], FloatArray]
 
 
 def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, cycles: int) -> tuple[FloatArray, bool]:
-    """Solution (n,) of `product(x) = right` by GMRES from zero, and whether its relative residual is below rtol.
+    """Solve `product(x) = right` by restarted GMRES from zero.
 
-    Begins again after `restart` products, `cycles` times at most.
+    Parameters
+    ----------
+    product : callable
+        The operator applied to a vector (n,).
+    right : array (n,)
+        Right-hand side.
+    rtol : float
+        Relative residual that is wanted.
+    restart, cycles : int
+        Products of one cycle, and the number of cycles.
+
+    Returns
+    -------
+    solution : array (n,)
+    converged : bool
+        Whether the relative residual is below rtol.
     """
     solution, residual = np.zeros_like(right), right
     size = float(np.linalg.norm(right))
@@ -60,8 +72,8 @@ def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, 
                 break
         if n_columns == 0:
             break
-        # where the residual is not met, a direction that is next to none would only let the solution run away
-        least = 0.0 if norms[-1] <= rtol * size else NEUTRAL
+        # where the residual is not met, a direction of the null space would only make the solution large
+        least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
         weights = np.linalg.lstsq(triangle[:n_columns, :n_columns], projected[:n_columns], rcond=least)[0]
         solution = solution + weights @ basis[:n_columns]
         residual = right - product(solution)
@@ -72,7 +84,7 @@ def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, 
 
 
 def ritz_values(product: Product, start: FloatArray, most: int) -> ComplexArray:
-    """Eigenvalues of a real operator as Arnoldi's method knows them after at most `most` products."""
+    """Ritz values (k,), k <= `most`, of a real operator after k products of Arnoldi's method from `start` (n,)."""
     size = min(most, start.size)
     basis = np.zeros((size + 1, start.size))
     projected = np.zeros((size + 1, size))
@@ -95,15 +107,17 @@ def _extend(basis: FloatArray, k: int, image: FloatArray) -> tuple[FloatArray, b
     column = np.zeros(k + 2)
     length = float(np.linalg.norm(image))
     for _ in range(2):
-        share = basis[: k + 1] @ image
-        column[: k + 1] += share
-        image = image - share @ basis[: k + 1]
+        components = basis[: k + 1] @ image
+        column[: k + 1] += components
+        image = image - components @ basis[: k + 1]
     column[k + 1] = np.linalg.norm(image)
-    if not column[k + 1] > 1e-12 * length:
+    if not column[k + 1] > NEWTON.round_off * length:
         return column, True
     basis[k + 1] = image / column[k + 1]
     return column, False
 
 
 def _stagnates(norms: list[float]) -> bool:
-    return len(norms) > PATIENCE and norms[-1] > GAIN * norms[-1 - PATIENCE]
+    """Whether the residual norm has hardly decreased over the last products."""
+    products = NEWTON.stagnation_products
+    return len(norms) > products and norms[-1] > NEWTON.stagnation_ratio * norms[-1 - products]

@@ -1,4 +1,7 @@
-"""Newton directions: the exact Jacobian, solved directly where it is small and with a kept factorisation where not."""
+"""Newton directions: solves with the exact Jacobian, Eqs. (16)-(19).
+
+Directly where it is small; otherwise by GMRES, preconditioned with a factorisation that is kept from solve to solve.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +13,15 @@ import numpy as np
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import ritz_values, solve_gmres
+from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import PeriodFactor
 from solver.newton.preconditioner import Factor, SignedFactor, build_factor, build_signed_factor
 from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
 
-SMALL = 250  # unknowns up to which a fresh factorisation is cheaper than an iteration
-AGED = 12  # products after which a kept factorisation has aged too much: a new one takes as long
-KRYLOV = 30  # the same where a new one would not be exact either
-WIDE = 80  # the same where the march through the period preconditions: resonances are found one by one
-RESTARTS = 6  # of so many products each, where the factorisation is a new one and yet not the Jacobian itself
-FORCING = 1e-3  # relative residual of an iterative solve
-ARNOLDI = 24  # products from which the sign of a determinant is taken where a kept factorisation serves
-WHOLE = 4000  # directions of the slip space up to which all of them are factorised where it does not
-CERTAIN = 0.15  # a real part of an eigenvalue, 1 where the factorisation is exact, that is taken as far from zero
-
 
 @dataclass
 class JacobianSolver:
-    """Solves with `Linearisation`; keeps one factorisation between calls, with which GMRES on the exact Jacobian is
-    preconditioned.
-    """
+    """Solver of systems with a `Linearisation` that keeps one factorisation between its calls."""
 
     _factor: Factor | None = field(default=None, repr=False)
 
@@ -40,7 +32,7 @@ class JacobianSolver:
         rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
         step = np.zeros_like(right)
         if rows.size:
-            if rows.size * m <= SMALL:
+            if rows.size * m <= NEWTON.dense_unknowns:
                 step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
                 step[rows] = self._solve_kept(tangent, pairs, rows, right[rows])
@@ -54,7 +46,7 @@ class JacobianSolver:
         """Steps (n_rel, m) for two right sides; a small system is factorised once."""
         pairs = tangent.active()
         rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
-        if not rows.size or rows.size * first.shape[1] > SMALL:
+        if not rows.size or rows.size * first.shape[1] > NEWTON.dense_unknowns:
             return self.solve(tangent, first), self.solve(tangent, second)
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
         solved = _solve_dense(tangent.dense(pairs), both)
@@ -71,10 +63,10 @@ class JacobianSolver:
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        Where the slip space is large it is that of the kept factorisation P times (-1)^k, k the number of real negative
-        eigenvalues of J P^-1. All but few of its eigenvalues are near 1, and Arnoldi's method finds those that stand
-        apart first: where none is near or below zero k = 0, else the whole slip space is factorised. Where it is too
-        large for that, k is counted among the eigenvalues found.
+        Where the slip space is large it is the sign of the kept factorisation P times (-1)^k, k the number of real
+        negative eigenvalues of J P^-1. Most of these are near 1, and Arnoldi's method finds the outliers first: where
+        none is near or below zero k = 0, else the whole slip space is factorised. Where that is too large, k is counted
+        among the eigenvalues found.
         """
         factor = self._factor
         if (
@@ -84,21 +76,21 @@ class JacobianSolver:
             or not np.isin(tangent.active(), factor.pairs).all()
         ):
             kept, factor = factor, build_signed_factor(tangent, tangent.active())
-            # the march knows no sign, but solves better
+            # the march has no determinant, but is the better preconditioner
             self._factor = kept if isinstance(kept, PeriodFactor) else factor
             if factor.exact:
                 return factor.sign
         values = self._eigenvalues(factor, tangent, tangent.joint.basis.synthesis.shape[0])
-        if np.all(np.isfinite(values)) and values.real.min() > CERTAIN:
+        if np.all(np.isfinite(values)) and values.real.min() > NEWTON.certain_real_part:
             return factor.sign
-        whole = find_slip_space(tangent, WHOLE, 0, 0.0)
+        whole = find_slip_space(tangent, NEWTON.sign_directions, 0, 0.0)
         if whole is not None:
             return build_slip_factor(tangent, whole).sign
-        below = np.count_nonzero((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real)))
-        return factor.sign * float((-1) ** below)
+        # complex ones come in pairs of one real part and do not change the sign
+        return factor.sign * float((-1) ** np.count_nonzero(values.real < 0.0))
 
     def _eigenvalues(self, factor: SignedFactor, tangent: Linearisation, m: int) -> ComplexArray:
-        """Eigenvalues of J P^-1 that stand apart from the others."""
+        """Outlying eigenvalues of J P^-1."""
         full = np.zeros((tangent.joint.slots.size, m))
 
         def product(vector: FloatArray) -> FloatArray:
@@ -107,22 +99,22 @@ class JacobianSolver:
 
         # a fixed start: the answer must not depend on what was computed before
         start = np.random.default_rng(0).normal(size=factor.rows.size * m)
-        return ritz_values(product, start, ARNOLDI)
+        return ritz_values(product, start, NEWTON.arnoldi_products)
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
-            products = AGED if self._factor.exact else _most_products(self._factor)
+            products = NEWTON.exact_products if self._factor.exact else _most_products(self._factor)
             solution, found = self._iterate(self._factor, tangent, rows, right, products, 1)
             if found:
                 return solution
         self._factor = build_factor(tangent, pairs)
         if self._factor.exact:
             return self._solve_exactly(self._factor, tangent, rows, right)
-        # as far as it gets: Newton judges by the true residual
-        return self._iterate(self._factor, tangent, rows, right, _most_products(self._factor), RESTARTS)[0]
+        # not to the end perhaps: Newton's method judges by the true residual
+        return self._iterate(self._factor, tangent, rows, right, _most_products(self._factor), NEWTON.restarts)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
-        """Solution by a factorisation of this Jacobian; a second solve takes away what `NEUTRAL` has put in."""
+        """Solution by a factorisation of this Jacobian; a second solve removes the effect of `NEWTON.neutral_shift`."""
         padded = np.zeros((tangent.joint.slots.size, right.shape[1]))
         padded[rows] = right
         first = factor.solve(padded)
@@ -155,13 +147,13 @@ class JacobianSolver:
             return tangent.apply(full)[rows].ravel()
 
         # preconditioned from the right, so that the residual that GMRES watches is the true one
-        solution, found = solve_gmres(product, right.ravel(), FORCING, products, restarts)
+        solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts)
         return precondition(solution), found
 
 
 def _most_products(factor: Factor) -> int:
     """Products after which a factorisation that is not exact is given up, or GMRES begins again."""
-    return WIDE if isinstance(factor, PeriodFactor) else KRYLOV
+    return NEWTON.period_products if isinstance(factor, PeriodFactor) else NEWTON.kept_products
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

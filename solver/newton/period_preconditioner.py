@@ -1,8 +1,8 @@
-"""An approximate inverse of the balance's Jacobian that marches through the period, for joints that slip and open.
+"""An approximate inverse of the balance's Jacobian by a march through the period, for joints that slip and open.
 
-With the state `x` of a pair (normal: what of the predicted force it does not take up; tangents: Eqs. (11)-(15)), which
-moves it by `x / eps`, the Jacobian takes a step `dp` to `dp + (Z_r / eps - 1) dx`. Were Z_r one real stiffness Z in all
-harmonics, this would hold sample by sample,
+With the state `x` of a pair (normal: the part of the predicted force that is no contact force; tangents: lambda_x of
+Eqs. (11)-(15)), which moves the pair by `x / eps`, the Jacobian maps a step `dp` to `dp + (Z_r / eps - 1) dx`. If Z_r
+were one real stiffness Z in all harmonics, this would hold sample by sample,
 
     dp(t) + (Z / eps - 1) dx(t) = r(t),      dx(t) = A(t) dp(t) + B(t) dx(t - 1),
 
@@ -11,13 +11,13 @@ with A and B the derivatives of the contact law at a sample, blocks of the pairs
     [1 + (Z / eps - 1) A(t)] dp(t) = r(t) - (Z / eps - 1) B(t) dx(t - 1)
 
 is solved by a march with one small system a sample, whatever the number of harmonics that the pairs couple, and costs
-less than one factorisation in harmonics. The stiffness of an elastic joint does hardly change with the harmonic, but
-for resonances of what lies behind it, each of which adds next to nothing but a rank of two, `U V^T`, in the harmonics
-that it is near. With T the march to `dp` and T_x that to `dx`,
+less than one factorisation in harmonics. The stiffness of an elastic joint hardly changes with the harmonic, except for
+resonances of the structure behind it: each adds a term of rank two, `U V^T`, to the harmonics that are near it. With T
+the march to `dp` and T_x that to `dx`, the Woodbury identity
 
     J^-1 r = T r - T U (1 + V^T T_x U)^-1 V^T T_x r
 
-takes them in. What cutting off the series changes is less than that.
+accounts for them. The truncation of the series is neglected: its effect is smaller.
 """
 
 from __future__ import annotations
@@ -31,18 +31,14 @@ from solver.contact.alternating_frequency_time import Marched
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
+from solver.newton.options import NEWTON
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
-
-PASSES = 2  # through the period: slip forgets what was before it
-RESONANT = 0.2  # of the penalty: a difference of stiffness that is taken in
-RANK = 6  # the most of them in a harmonic
-POWERS = 2
 
 
 @dataclass(frozen=True)
 class SampleMarch:
-    """What the march through N samples needs; n = 3 n_contact, with identity rows where a pair has no displacement.
+    """Matrices of the march through N samples; n = 3 n_contact, with identity rows where a pair has no displacement.
 
     inverse (N, n, n): of `1 + (Z / eps - 1) A`. coupling (n, n): `Z / eps - 1`. own (N, n_contact, 3, 3): A. carried
     (N, n_contact, 2, 2): B.
@@ -59,7 +55,7 @@ class SampleMarch:
         """Step `T r` and change of the state `T_x r` (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
         spread = self.joint.to_pairs(right).reshape(-1, right.shape[1])
         right_t = np.ascontiguousarray((spread @ self.basis.synthesis).T)
-        both_t = march_samples(self.inverse, self.coupling, self.own, self.carried, right_t, PASSES)
+        both_t = march_samples(self.inverse, self.coupling, self.own, self.carried, right_t, NEWTON.march_periods)
         step, state = (
             self.joint.to_relative((part_t.T @ self.basis.analysis).reshape(-1, 3, right.shape[1])) for part_t in both_t
         )
@@ -124,22 +120,27 @@ def build_march(tangent: Linearisation) -> SampleMarch:
 
 
 def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
-    """Directions in which the stiffness over the penalty differs from that of most harmonics: their sum `U V^T`.
+    """Low-rank difference `U V^T` of the stiffness over the penalty from that of most harmonics.
 
-    Rows (k, n_rel (2H+1)) of U and V, for each harmonic those of the singular values above `RESONANT`, of which no more
-    than `RANK` are looked for: by a few powers of the difference on fixed vectors, which finds large ones well enough.
+    For each harmonic it has the singular values above `NEWTON.resonant_difference`, at most `NEWTON.resonances` of
+    them, found by a few powers of the difference on fixed vectors, which is accurate enough for large ones.
+
+    Returns
+    -------
+    added, seen : array (k, n_rel (2H+1))
+        Rows of `U^T` and `V^T`, dimensionless.
     """
     structure, n_rel, m = joint.structure, joint.slots.size, joint.basis.synthesis.shape[0]
     most, penalty = stiffness_of_most(joint), _penalty(joint)
     added, seen = [], []
     for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
         change = (stiffness - most) / penalty
-        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(RANK, n_rel)))
-        for _ in range(POWERS):
+        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(NEWTON.resonances, n_rel)))
+        for _ in range(NEWTON.power_iterations):
             image = change @ (change.conj().T @ np.linalg.qr(image)[0])
         basis = np.linalg.qr(image)[0]
         left, size, right = np.linalg.svd(basis.conj().T @ change, full_matrices=False)
-        for direction in np.flatnonzero(size > RESONANT):
+        for direction in np.flatnonzero(size > NEWTON.resonant_difference):
             force, motion = size[direction] * (basis @ left[:, direction]), right[direction]
             both = np.zeros((2, 2, n_rel, m))
             if place == 0:
@@ -162,7 +163,7 @@ def _penalty(joint: Joint) -> FloatArray:
 
 
 def stiffness_of_most(joint: Joint) -> FloatArray:
-    """Real stiffness (n_rel, n_rel), N/m, that most harmonics have: the median leaves out those near a resonance."""
+    """Real stiffness (n_rel, n_rel), N/m, of most harmonics: the median ignores those near a resonance."""
     structure = joint.structure
     return np.asarray(
         np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
@@ -170,10 +171,16 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
 
 
 def sample_tangents(joint: Joint, at: Marched, stride: int) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample.
+    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, Eqs. (13)-(15).
 
-    With respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state before it
-    (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
+    The normal force is that of the sample alone.
+
+    Returns
+    -------
+    own : array (n, n_contact, 3, 3)
+        With respect to the predicted force of the sample, dimensionless.
+    carried : array (n, n_contact, 2, 2)
+        With respect to the tangential state before the sample, dimensionless.
     """
     status = at.status_t[:, ::stride].T
     normal = at.predicted_t[:, 0, ::stride].T
@@ -195,16 +202,29 @@ def sample_tangents(joint: Joint, at: Marched, stride: int) -> tuple[FloatArray,
 
 @njit(cache=True)
 def march_samples(
-    inverse: FloatArray, coupling: FloatArray, own: FloatArray, carried: FloatArray, right_t: FloatArray, passes: int
+    inverse: FloatArray, coupling: FloatArray, own: FloatArray, carried: FloatArray, right_t: FloatArray, periods: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Steps of the predicted force and changes of the state (N, n) for right-hand sides (N, n), from no change of the
-    state before the first pass; the other arrays as in `SampleMarch`.
+    """March through the samples of some periods, without any change of the state before the first one.
+
+    Parameters
+    ----------
+    inverse, coupling, own, carried : array
+        As in `SampleMarch`.
+    right_t : array (N, n)
+        Right-hand sides.
+    periods : int
+        Times that the period is marched through; the last one counts.
+
+    Returns
+    -------
+    step_t, state_t : array (N, n)
+        Steps of the predicted force and changes of the state.
     """
     n_samples, size = right_t.shape
     n_contact = size // 3
     step_t, state_t = np.zeros((n_samples, size)), np.zeros((n_samples, size))
     state, before = np.zeros((n_contact, 2)), np.zeros(size)
-    for _ in range(passes):
+    for _ in range(periods):
         for n in range(n_samples):
             for pair in range(n_contact):
                 for i in range(2):

@@ -1,11 +1,10 @@
-"""A factorisation of the balance's Jacobian that GMRES on the exact one is preconditioned with.
+"""The factorisation of the balance's Jacobian that preconditions GMRES, chosen by the state.
 
 In the space in which the pairs slip or open where that is small (`slip_preconditioner`), else by a march through the
-period (`period_preconditioner`). That one knows no determinant and no masses on sliders: there it is by groups of
-harmonics. The harmonics of a balance are coupled by the pairs that slip or open. That coupling is strong among the
-lowest ones, which are factorised together as far as `DENSE` unknowns go; above, each harmonic is factorised on its own
-with the part of the pairs' tangents that keeps it to itself, a complex matrix of as many rows as there are relative
-displacements.
+period (`period_preconditioner`). The march has no determinant and does not apply to masses on sliders; there the
+factorisation is by groups of harmonics (`HarmonicFactor`). Pairs that slip or open couple the harmonics of a balance,
+strongly the lowest ones: these are factorised together, up to `NEWTON.low_unknowns`. Each higher harmonic is factorised
+alone, with the part of the pairs' tangents that does not leave the harmonic: a complex matrix (n_rel, n_rel).
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
+from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
 from solver.newton.slip_preconditioner import (
-    NEUTRAL,
     SlipFactor,
     SlipSpace,
     build_slip_factor,
@@ -29,20 +28,14 @@ from solver.newton.slip_preconditioner import (
     sign_of,
 )
 
-EXACT = 600  # directions of the slip space that are all kept: 48 pairs with five harmonics near a resonance
-FEW_ROWS = 40  # relative displacements up to which impacts couple most harmonics and directions
-EXACT_FEW = 2500  # directions that are all kept then
-MOST = 1000  # directions of the slip space beyond which it is not factorised
-CUTOFF = 0.05  # of a pair that slips: directions that are left out where there are more than are all kept
-DENSE = 800  # unknowns of the lowest harmonics that are factorised together
-
 RealFactor = tuple[FloatArray, IntArray]
 
 
 @dataclass(frozen=True)
 class HarmonicFactor:
-    """pairs: those whose rows (n_rows,) it holds, all harmonics of them, 2H+1.
+    """Block factorisation by groups of harmonics.
 
+    pairs: those whose rows (n_rows,) it holds, with all their harmonics, 2H+1.
     low: factorisation of the lowest harmonics up to `n_low`. high (H - n_low, n_rows, n_rows): inverses of the others.
     """
 
@@ -84,14 +77,15 @@ def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
 
 
 def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor:
-    """The same, one that knows the sign of its determinant."""
+    """The same, by a factorisation that has the sign of its determinant."""
     space = _slip_space(tangent)
     return build_harmonic_factor(tangent, pairs) if space is None else build_slip_factor(tangent, space)
 
 
 def _slip_space(tangent: Linearisation) -> SlipSpace | None:
-    few = tangent.joint.slots.size <= FEW_ROWS
-    return find_slip_space(tangent, EXACT_FEW if few else EXACT, MOST, CUTOFF)
+    few = tangent.joint.slots.size <= NEWTON.few_displacements
+    exact = NEWTON.exact_directions_of_few if few else NEWTON.exact_directions
+    return find_slip_space(tangent, exact, NEWTON.partial_directions, NEWTON.partial_cutoff)
 
 
 def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:
@@ -99,10 +93,10 @@ def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFa
     rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
     n_harmonics = tangent.joint.basis.n_harmonics
     n_low = n_harmonics
-    while n_low > 0 and rows.size * (2 * n_low + 1) > DENSE:
+    while n_low > 0 and rows.size * (2 * n_low + 1) > NEWTON.low_unknowns:
         n_low -= 1
     matrix = tangent.dense(pairs, n_low)
-    matrix[np.diag_indices_from(matrix)] += NEUTRAL
+    matrix[np.diag_indices_from(matrix)] += NEWTON.neutral_shift
     with warnings.catch_warnings():
         # an exactly singular matrix: Newton's method goes on and judges by the residual
         warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
@@ -114,7 +108,7 @@ def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFa
 
 
 def _inverse(matrix: ComplexArray) -> ComplexArray:
-    """Inverse of a matrix, the identity where it has none: it only steers an iteration."""
+    """Inverse of a matrix, the identity where it is singular: it is only a preconditioner."""
     try:
         return cast("ComplexArray", np.linalg.inv(matrix))
     except np.linalg.LinAlgError:

@@ -1,17 +1,18 @@
 """A factorisation of the balance's Jacobian in the space in which its pairs slip or open.
 
-The Jacobian is the identity but for what the pairs do not pass on, `S = I - d lambda/dp` (`Linearisation`):
+The Jacobian, Eqs. (16)-(17) in the unknown p, differs from the identity by the part of the predicted force that the
+pairs do not transmit, `S = I - d lambda/dp`, and by their motion (`Linearisation`):
 
     J = I - S + Z_r D,      D = d u/dp
 
-S and D are zero where a pair sticks all period long, and where it slips or opens for a part of the period they have
-a low rank: its slip is the same throughout a phase of sticking. With an orthonormal basis V of the rows of S and D of
+S and D are zero where a pair sticks all period long. Where it slips or opens for a part of the period their rank is
+low: the slip does not change throughout a phase of sticking. With an orthonormal basis V of the rows of S and D of
 each pair, `S = S V V^T` and `D = D V V^T`, so that with y = V^T x
 
     (I + V^T (Z_r D V - S V)) y = V^T b,      x = b - (Z_r D V - S V) y
 
-solves `J x = b` by a matrix whose size is the sum of the ranks, and has the determinant of J. Directions that matter
-little may be left out where the factorisation only steers an iteration.
+solves `J x = b` by a matrix whose size is the sum of the ranks and whose determinant is that of J. Directions of small
+singular values may be left out where the factorisation is only a preconditioner.
 """
 
 from __future__ import annotations
@@ -25,19 +26,15 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import BoolArray, FloatArray, IntArray
+from solver.newton.options import NEWTON
 from solver.structure.joint import Joint
-
-EXACT = 1e-11  # of what a pair does not pass on: directions below it are round-off
-# A joint that slips as a whole may lie anywhere along its slip: an eigenvalue that is zero but for round-off would give
-# the determinant any sign. All are shifted by so much; the Jacobian is dimensionless, 1 for a pair that sticks.
-NEUTRAL = 1e-8
 
 
 @dataclass(frozen=True)
 class SlipSpace:
-    """Orthonormal bases of what the pairs do not pass on.
+    """Orthonormal bases of the part of the predicted force that the pairs do not transmit.
 
-    pairs (n,): those with any. bases: for each the basis (3m, r), with zeros where a pair has no such displacement.
+    pairs (n,): those with such a part. bases: for each the basis (3m, r), zero where a pair has no such displacement.
     exact: whether nothing is left out.
     """
 
@@ -52,39 +49,52 @@ class SlipSpace:
 
 
 def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: float) -> SlipSpace | None:
-    """Slip space of up to `most_exact` directions with nothing left out; where there are more, of up to `most` with
-    those below `cutoff` (relative to a pair that slips) left out; None where there are too many.
+    """Slip space of a Jacobian.
+
+    Parameters
+    ----------
+    tangent : Linearisation
+        The Jacobian.
+    most_exact : int
+        Directions up to which nothing is left out.
+    most, cutoff : int, float
+        Otherwise directions below `cutoff`, relative to a pair that slips, are left out; up to `most` remain.
+
+    Returns
+    -------
+    SlipSpace or None
+        None where there are more directions than that.
     """
     joint = tangent.joint
     m = joint.basis.synthesis.shape[0]
     present = np.zeros(3 * joint.contact.n_contact, bool)
     present[joint.slots] = True
     columns = np.repeat(present.reshape(-1, 3), m, axis=1)
-    surplus = np.eye(3 * m) - tangent.force_tangent
+    held_back = np.eye(3 * m) - tangent.force_tangent
     # the static normal motion carries the wear, which is one more row
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
-    rows = np.concatenate([surplus, worn], axis=1) * columns[:, None, :]
-    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > 1e-14)
+    rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
+    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NEWTON.round_off)
     found = [
         scipy.linalg.qr(rows[pair].T, mode="economic", pivoting=True, check_finite=False)[:2]
         if np.all(np.isfinite(rows[pair]))
         else (np.empty((3 * m, 0)), np.empty((0, 3 * m)))
         for pair in pairs
     ]
-    for least, limit in ((EXACT, most_exact), (cutoff, most)):
+    for least, limit in ((NEWTON.round_off, most_exact), (cutoff, most)):
         ranks = [int(np.count_nonzero(np.abs(np.diag(right)) > least)) for _, right in found]
         if sum(ranks) <= limit:
             bases = tuple(np.ascontiguousarray(q[:, :rank]) for (q, _), rank in zip(found, ranks, strict=True))
-            return SlipSpace(pairs, bases, least == EXACT)
+            return SlipSpace(pairs, bases, least == NEWTON.round_off)
     return None
 
 
 @dataclass(frozen=True)
 class SlipFactor:
-    """Factorisation of `I + V^T (Z_r D V - S V)`, and what leads there and back.
+    """Factorisation of `I + V^T (Z_r D V - S V)` with the maps to the slip space and back.
 
     there (n, r_most, 3m): `V^T` of each pair of the space, filled up with zeros to the largest rank. kept
-    (n, r_most): which of these rows there are. back (n, 6m, r_most): `D V` and `S V`. pairs, rows: all of the joint.
+    (n, r_most): which of these rows exist. back (n, 6m, r_most): `D V` and `S V`. pairs, rows: all of the joint.
     """
 
     joint: Joint
@@ -132,7 +142,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
     )
     pushed = _pushed(joint, space, moved)
     matrix = np.eye(space.size)
-    matrix[np.diag_indices_from(matrix)] += NEUTRAL
+    matrix[np.diag_indices_from(matrix)] += NEWTON.neutral_shift
     place = 0
     present = np.zeros((3 * joint.contact.n_contact, m), bool)
     present[joint.slots] = True

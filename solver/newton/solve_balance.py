@@ -18,8 +18,10 @@ from solver.structure.joint import Case, Joint
 
 @dataclass
 class Effort:
-    """Newton iterations spent; shared by the parts of one computation. limit: after which a branch is given up.
-    deadline: CPU time of the thread, s, after which the whole computation is.
+    """Newton iterations of one computation, counted over all its parts.
+
+    limit: iterations after which a branch is given up. deadline: CPU time of the thread, s, after which the whole
+    computation is.
     """
 
     iterations: int = 0
@@ -38,25 +40,45 @@ class Effort:
 
 
 class OutOfTimeError(Exception):
-    """A computation has taken the CPU time that it may take; those who began it say so in an outcome."""
+    """A computation has used up its CPU time; its caller reports that as an outcome."""
 
 
 def solve_balance(
-    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, effort: Effort, most: int = 30
+    balance: Balance,
+    start: FloatArray,
+    solver: JacobianSolver,
+    tolerance: float,
+    effort: Effort,
+    most: int | None = None,
 ) -> NewtonResult[Evaluation]:
-    """Newton on one balance from a predicted force (n_rel, 2H+1), N. Raises OutOfTimeError."""
+    """Solve Eq. (8) of one balance, with an implicit step Eq. (26), by Newton's method on the exact Jacobian, Eq. (16).
+
+    Parameters
+    ----------
+    balance : Balance
+        The problem.
+    start : array (n_rel, 2H+1)
+        Predicted force to begin with, N.
+    solver : JacobianSolver
+        Keeps its factorisation from one solve to the next.
+    tolerance : float
+        Of the scaled residual, dimensionless.
+    effort : Effort
+        Where the iterations are counted.
+    most : int, optional
+        Iterations, `NEWTON.iterations` by default.
+
+    Raises
+    ------
+    OutOfTimeError
+        Behind the deadline of the effort.
+    """
 
     def direction(at: Evaluation) -> FloatArray:
         effort.check_time()
         return solver.solve(balance.linearise(at), -at.residual)
 
-    result = solve_newton(
-        balance.evaluate,
-        direction,
-        start,
-        tolerance,
-        most,
-    )
+    result = solve_newton(balance.evaluate, direction, start, tolerance, most)
     effort.iterations += result.iterations
     return result
 

@@ -1,1 +1,1 @@
-"""Whether a periodic state is one that the vibration stays at: Hill's determinant, period doubling."""
+"""Stability of periodic states: Hill's determinant, period doubling."""

@@ -1,4 +1,4 @@
-"""Whether a periodic state is one that the structure stays at: the sign of the determinant of its Jacobian.
+"""Stability of a periodic state by Hill's method: the sign of the determinant of its Jacobian, Eq. (16).
 
 Let the harmonic amplitudes vary slowly as exp(sigma t). A disturbance of a state then obeys
 
@@ -6,13 +6,13 @@ Let the harmonic amplitudes vary slowly as exp(sigma t). A disturbance of a stat
 
 Hill's equation in the unknown p of the balance. Its determinant is real for real sigma and is that of the Jacobian at
 sigma = 0. For sigma towards infinity the structure is so stiff that the determinant has the sign of that of du/dp,
-which is not negative: a pair takes away a share between nothing (stuck: its columns are those of the identity) and all
-(open) of what is predicted. The same sign belongs to the joint that is stuck all over (identity) and to the one that is
+which is not negative: a pair takes between none (stuck: its columns are those of the identity) and all (open) of the
+predicted force away. The same sign belongs to the joint that is stuck all over (identity) and to the one that is
 open all over (Z_n / eps: the square of a modulus for each complex harmonic, a positive definite static stiffness).
 So a negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the
 real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
 
-What this does not see: an even number of such multipliers, a period doubling (see `doubling`), a Neimark-Sacker
+Not detected: an even number of such multipliers, a period doubling (see `period_doubling`), a Neimark-Sacker
 bifurcation (complex pair). Disturbances of friction are taken as slow, with the closure over one period.
 """
 

@@ -1,10 +1,10 @@
 """Whether a periodic state doubles its period: a real Floquet multiplier beyond -1, as bouncing joints have them.
 
 Over two periods T = 2 pi / w of the excitation a state is the same series with the fundamental w / 2, its harmonics the
-even ones. What grows by a multiplier beyond -1 changes its sign from one period to the next: it is a series of the odd
-ones. A shift by T leaves the state as it is, so the Jacobian of the balance over two periods couples no even harmonic
-with an odd one, and the determinant of its odd part is that of Hill's equation at the multiplier -1. As in `stability`
-its sign is that of the joint that is open all over where no multiplier lies beyond -1; each one that does changes it.
+even ones. A disturbance with a multiplier beyond -1 changes its sign from one period to the next: it is a series of
+the odd ones. A shift by T leaves the state as it is, so the Jacobian of the balance over two periods couples no even harmonic
+with an odd one, and the determinant of its odd part is that of Hill's equation at the multiplier -1. As in `hill` its
+sign is that of the joint that is open all over where no multiplier lies beyond -1; each one that does changes it.
 """
 
 from __future__ import annotations
@@ -20,33 +20,50 @@ from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
 from solver.settings import Resolution, all_orders
+from solver.stability.options import STABILITY
 from solver.structure.condensation import build_structure
 from solver.structure.fourier import build_basis, change_orders
 from solver.structure.joint import Case, Joint
 
-SHARP = Resolution(all_orders(19), 256)  # a contact is judged with at least so many: its sharpness decides
-MOST_UNKNOWNS = 1500  # of the balance over two periods; its Jacobian is factorised as it is
-
 
 def doubles_period(case: Case, joint: Joint, evaluation: Evaluation, effort: Effort) -> bool:
-    """True where the state has an odd number of real multipliers beyond -1.
+    """Whether a state has an odd number of real multipliers beyond -1.
 
-    joint, evaluation: of the state, its wear held. False as well where that is not looked for: where no pair comes and
-    goes (a friction contact alone damps), in a travelling wave (no nodal diameter belongs to half an order) and where
-    the unknowns are many. Raises OutOfTimeError.
+    Parameters
+    ----------
+    case : Case
+        Of the state.
+    joint, evaluation : Joint, Evaluation
+        The state, its wear held.
+    effort : Effort
+        Where Newton iterations are counted.
+
+    Returns
+    -------
+    bool
+        False, too, where it is not looked for: where no pair opens and closes (friction alone damps), in a travelling
+        wave (no nodal diameter belongs to half an order) and where there are too many unknowns.
+
+    Raises
+    ------
+    OutOfTimeError
+        Behind the deadline of the effort.
     """
     opens = evaluation.status_t == SEPARATED
     travels = case.model.n_sectors > 0 and case.model.nodal_diameter > 0
     if travels or not (opens.any(axis=1) & ~opens.all(axis=1)).any():
         return False
-    if case.resolution.highest < SHARP.highest and _unknowns(joint, SHARP.orders) <= MOST_UNKNOWNS:
-        sharp = case.at(replace(SHARP, samples=max(SHARP.samples, case.resolution.samples)))
+    fine = Resolution(
+        all_orders(STABILITY.doubling_harmonics), max(STABILITY.doubling_samples, case.resolution.samples)
+    )
+    if case.resolution.highest < fine.highest and _unknowns(joint, fine.orders) <= STABILITY.doubling_unknowns:
+        sharp = case.at(fine)
         finer = sharp.joint(joint.omega, joint.excitation_amplitude)
         balance, start = transfer(sharp, finer, evaluation, joint.basis.orders, joint.penalty.inertial)
         result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
         if result.converged:
             joint, evaluation = finer, result.evaluation
-    if _unknowns(joint, joint.basis.orders) > MOST_UNKNOWNS:
+    if _unknowns(joint, joint.basis.orders) > STABILITY.doubling_unknowns:
         return False
     sign, _ = np.linalg.slogdet(odd_part(linearise_over_two(case.model, joint, evaluation)))
     return bool(sign < 0.0)
@@ -59,7 +76,7 @@ def _unknowns(joint: Joint, orders: tuple[int, ...]) -> int:
 def two_periods(orders: tuple[int, ...]) -> tuple[int, ...]:
     """Harmonics of half the frequency: the even ones are those of one period, and all odd ones below the highest.
 
-    More of these would see a stiffness of the contact that the state, with its few harmonics, does not have.
+    Higher odd ones would be judged with a stiffness of the contact that the truncated state does not have.
     """
     return tuple(sorted({2 * order for order in orders} | set(range(1, 2 * max(orders), 2))))
 
@@ -80,7 +97,7 @@ def linearise_over_two(model: ReducedModel, joint: Joint, evaluation: Evaluation
 
 
 def odd_part(tangent: Linearisation) -> FloatArray:
-    """Rows and columns of the odd harmonics; those of pairs that do not depend on them are an identity, left out."""
+    """Rows and columns of the odd harmonics, without those of pairs that do not depend on them (an identity)."""
     basis = tangent.joint.basis
     odd = np.concatenate([[False], np.repeat(np.array(basis.orders) % 2 == 1, 2)])
     matrix = tangent.dense(tangent.active())

@@ -14,7 +14,7 @@ from solver.structure.fourier import from_complex, to_complex
 
 @dataclass(frozen=True)
 class CondensedStructure:
-    """`Z_r u + lambda = F_r` per harmonic, Eq. (8), and how responses follow from u.
+    """`Z_r u + lambda = F_r` per harmonic, Eq. (8), and the responses as functions of u.
 
     `n_rel` relative displacements, in the order pair by pair: closing, tangent 1, tangent 2, those that exist.
 
@@ -38,14 +38,14 @@ class CondensedStructure:
     drive_offset: complex
 
     def force_h(self) -> FloatArray:
-        """Reduced force F_r (n_rel, 2H+1), N."""
+        """Reduced force F_r of Eq. (8), (n_rel, 2H+1), N."""
         amplitudes = np.zeros((self.static_force.size, self.dynamic_stiffness.shape[0]), complex)
         if amplitudes.shape[1]:
             amplitudes[:, 0] = self.harmonic_force
         return from_complex(self.static_force, amplitudes)
 
     def apply(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u`, N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
+        """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         force = np.matmul(self.dynamic_stiffness, moving)[:, :, 0].T
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
@@ -66,19 +66,31 @@ class CondensedStructure:
 
 
 def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
-    """Indices of the relative displacements in the linear model, (n_rel,), and their slots `3 pair + component`."""
-    slots = np.flatnonzero(contact.dofs.ravel() >= 0)
-    return contact.dofs.ravel()[slots], slots
+    """Indices (n_rel,) of the relative displacements in the linear model and component indices `3 pair + component`."""
+    components = np.flatnonzero(contact.dofs.ravel() >= 0)
+    return contact.dofs.ravel()[components], components
 
 
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
-    """Dynamic stiffness `K + i n w C - (n w)^2 M` of the harmonics n, condensed; omega in rad/s, amplitude in N.
+    """Condense the dynamic stiffness `K + i n w C - (n w)^2 M` of Eq. (1) at the harmonics n to the Z_r of Eq. (8).
 
-    orders: harmonics above the static one, ascending; the excitation acts in the first of them, which is 1.
+    Parameters
+    ----------
+    model : ReducedModel
+        Matrices, loads and contact pairs.
+    omega : float
+        w, rad/s.
+    excitation_amplitude : float
+        N.
+    orders : tuple of int
+        Harmonics above the static one, ascending; the excitation acts in the first of them, which is 1.
 
-    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Where the structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
@@ -119,7 +131,7 @@ def build_structure(
 
 
 def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
-    """Linear model (and whether its conjugate holds) with the places of the harmonics that see it."""
+    """Linear models (and whether the conjugate is meant) with the places of the harmonics to which they apply."""
     seen = [model.harmonic_structure(harmonic) for harmonic in orders]
     for number, (linear, conjugate) in enumerate(seen):
         same = [other is linear and folded == conjugate for other, folded in seen]
@@ -132,7 +144,7 @@ class Condensed:
     """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
 
     stiffness (..., n_rel, n_rel): Schur complement, N/m. force (..., n_rel): reduced load, N. motion (..., n, n_rel):
-    all displacements that follow a unit u. held_motion (..., n): displacement under the load with u = 0, m.
+    all displacements under a unit u. held_motion (..., n): displacement under the load with u = 0, m.
     """
 
     stiffness: Matrix
@@ -142,7 +154,22 @@ class Condensed:
 
 
 def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Static condensation of (dynamic) stiffnesses; raises numpy.linalg.LinAlgError where the rest is singular."""
+    """Static condensation of (dynamic) stiffnesses on some displacements.
+
+    Parameters
+    ----------
+    full : array (..., n, n)
+        Stiffness, N/m.
+    relative : array (n_rel,)
+        Indices of the displacements that remain.
+    load : array (..., n)
+        N.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Where the block of the other displacements is singular.
+    """
     n = full.shape[-1]
     internal = np.setdiff1d(np.arange(n), relative)
     motion = cast("Matrix", np.zeros((*full.shape[:-1], relative.size), full.dtype))

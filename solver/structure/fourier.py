@@ -1,4 +1,4 @@
-"""The Fourier basis: one ordering, and the way between harmonics and time.
+"""The Fourier basis, Eq. (5): the order of the harmonics, and the transforms between harmonics and time.
 
 Harmonics are real, in the order 0, cos 1, sin 1, cos 2, sin 2, ... (`2 H + 1` of them, on the last axis). Time samples
 are equally spaced over one period, the first at phase 0 (`N` of them, on the last axis). A complex amplitude `X` of
@@ -35,7 +35,20 @@ class FourierBasis:
 
 @lru_cache(maxsize=32)
 def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
-    """Fourier basis, Eq. (5). Raises ValueError where the highest order is not below N/2: samples would alias."""
+    """Fourier basis, Eq. (5).
+
+    Parameters
+    ----------
+    orders : tuple of int
+        Harmonics above the static one, ascending.
+    n_samples : int
+        N, equally spaced over the period.
+
+    Raises
+    ------
+    ValueError
+        Where the highest order is not below N/2: the samples would alias.
+    """
     highest = max(orders, default=0)
     if n_samples <= 2 * highest:
         raise ValueError(f"{n_samples} samples cannot tell {highest} harmonics apart")
@@ -49,7 +62,7 @@ def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
 
 
 def synthesis(orders: tuple[int, ...], phase: FloatArray) -> FloatArray:
-    """Matrix (2H+1, n) that gives a series of these orders at phases (n,), rad: `x = x_h @ synthesis`."""
+    """Matrix (2H+1, n) of the series of Eq. (5) with these orders at phases (n,), rad: `x = x_h @ synthesis`."""
     angle = np.array(orders, np.float64)[:, None] * phase
     values = np.empty((2 * len(orders) + 1, len(phase)))
     values[0] = 1.0
@@ -81,7 +94,7 @@ def derivative(values_h: FloatArray, rates: FloatArray) -> FloatArray:
 
 
 def change_orders(values_h: FloatArray, orders: tuple[int, ...], wanted: tuple[int, ...]) -> FloatArray:
-    """The same series (..., 2H+1) with other harmonics: zero where it had none, cut off where it has too many."""
+    """The same series with other harmonics, (..., 2H+1): new ones are zero, those not wanted are truncated."""
     changed = np.zeros((*values_h.shape[:-1], 2 * len(wanted) + 1))
     changed[..., 0] = values_h[..., 0]
     for place, order in enumerate(wanted):

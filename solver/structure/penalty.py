@@ -1,7 +1,7 @@
-"""The penalty of each pair and the formulation that suits it, from the scene alone.
+"""The penalty eps of each pair, Eq. (9), and the formulation that suits it, from the scene alone.
 
-With any penalty the balance is exact as the number of harmonics grows; at a finite number it is as good as those of the
-*predicted* force that are left out are small. With the structure's stiffness `Z_n` these are
+With any penalty the balance is exact as the number of harmonics grows; at a finite number its error comes from the
+harmonics of the *predicted* force that are left out. With the structure's stiffness `Z_n` these are
 `(1 - E_n / Z_n) lambda_n`, where E_n is the penalty as it acts on the displacement. So E_n has to be near Z_n above the
 highest harmonic:
 
@@ -10,8 +10,8 @@ highest harmonic:
 - a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is marched with its mass
   (`solver.contact.rigid_slider`),
   `E_n = -(n w)^2 m + i n w c`;
-- a mass that a stiff spring ties to its slider is marched with its mass as long as the harmonics left out see that, and
-  taken at displacement level from where they see the spring.
+- a mass that a stiff spring ties to its slider is marched with its mass as long as that dominates in the harmonics that
+  are left out, and taken at displacement level where the spring does.
 """
 
 from __future__ import annotations
@@ -22,17 +22,14 @@ import numpy as np
 
 from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure.condensation import condense, relative_indices
-
-INERTIAL = 2.0  # ratio of the stiffness at twice the rate to that at the rate: 1 for a spring, 4 for a mass
-INERTIAL_RATE = 8.0  # of the frequency: where that is judged first, for any number of harmonics alike
-DRAG = 0.1  # of m w: forgets the start of a period to a half within the next
-STATIC_SHARE = 1e-5  # of the stiffness at the frequency: what holds the mean position of a marched mass
+from solver.structure.options import STRUCTURE
 
 
 @dataclass(frozen=True)
 class Penalty:
-    """normal, tangential (n_contact,): N/m. inertial (n_contact,): whether the pair is marched with its mass.
+    """Penalties of the pairs, Eq. (9), and the masses of those that are marched with them.
 
+    normal, tangential (n_contact,): eps, N/m. inertial (n_contact,): whether the pair is marched with its mass.
     mass (n_contact,): kg. drag (n_contact,): N s/m. mean (n_contact,): N/m, holds the mean tangential position of pairs
     that are marched with their mass: their friction force alone leaves it undetermined while they stick. It is so small
     that it does not hold one that slips. These three are used for inertial pairs only, `tangential` for the others.
@@ -49,16 +46,25 @@ class Penalty:
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """Penalty from the condensed `K + s^2 M` at the real rate s of the first harmonic left out, `(highest + 1) omega`.
 
-    At a real rate the structure has no resonances: it shows an elastic joint its stiffness and a slider its mass.
+    At a real rate the structure has no resonances: an elastic joint appears as a stiffness, a slider as a mass.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The structure.
+    omega : float
+        Angular frequency, rad/s.
+    highest : int
+        Highest harmonic of the balance.
     """
     rate = (highest + 1) * omega
     size = _stiffness_at(model, rate)
-    low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
+    low, high = (_stiffness_at(model, times * STRUCTURE.inertial_rate * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-    inertial = has_tangent & (high > INERTIAL * low)
-    if inertial.any() and highest + 1 > INERTIAL_RATE:
-        # a mass behind a spring: harmonics that see the spring alone are not left to the mass
-        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL * size[:, 1]
+    inertial = has_tangent & (high > STRUCTURE.inertial_ratio * low)
+    if inertial.any() and highest + 1 > STRUCTURE.inertial_rate:
+        # a mass behind a spring: where the spring dominates in the harmonics left out, it is the penalty
+        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > STRUCTURE.inertial_ratio * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
         mass[inertial] = _mass_at(model, rate)[inertial]
@@ -67,33 +73,33 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
         tangential=size[:, 1],
         inertial=inertial,
         mass=mass,
-        drag=DRAG * mass * omega,
-        mean=STATIC_SHARE * _stiffness_at(model, omega)[:, 1],
+        drag=STRUCTURE.drag_fraction * mass * omega,
+        mean=STRUCTURE.mean_stiffness_fraction * _stiffness_at(model, omega)[:, 1],
     )
 
 
 def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     """Diagonal of the condensed `K + s^2 M` at each pair, normal and (larger) tangential, (n_contact, 2), N/m.
 
-    The diagonal is what a pair shows that moves alone. Measured on the dovetail sector at resonance: three times as
-    much takes four times the Newton iterations, half as much takes as many, all within 1 % in the response.
+    The diagonal is the stiffness of a pair that moves alone. Measured on the dovetail sector at resonance: three times
+    as much takes four times the Newton iterations, half as much takes as many, all within 1 % in the response.
     """
-    _, slots = relative_indices(model.contact)
+    _, components = relative_indices(model.contact)
     size = np.zeros((model.contact.n_contact, 2))
     diagonal = np.real(np.diag(_condensed_at(model, rate)))
-    np.maximum.at(size, (slots // 3, np.minimum(slots % 3, 1)), diagonal)
-    # a pair without such a displacement, or one that nothing resists, still needs a number to divide by
+    np.maximum.at(size, (components // 3, np.minimum(components % 3, 1)), diagonal)
+    # a pair without such a displacement, or one without stiffness, still needs a number to divide by
     return np.where(size > 0.0, size, 1.0)
 
 
 def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Mass (n_contact,), kg, that a pair moves against a force along a tangent, all other pairs being free."""
-    _, slots = relative_indices(model.contact)
+    """Mass (n_contact,), kg, that resists a tangential force on a pair, all other pairs being free."""
+    _, components = relative_indices(model.contact)
     # 1 / G grows as k + m s^2 where it is inertial, G the compliance
     low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
     mass = np.full(model.contact.n_contact, np.inf)
-    tangent = slots % 3 > 0
-    np.minimum.at(mass, slots[tangent] // 3, ((high - low) / (3.0 * rate**2))[tangent])
+    tangent = components % 3 > 0
+    np.minimum.at(mass, components[tangent] // 3, ((high - low) / (3.0 * rate**2))[tangent])
     return mass
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
-from solver.newton import preconditioner as factor
+from solver.newton import preconditioner
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.preconditioner import HarmonicFactor, build_factor
 from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
 from solver.settings import SolverSettings
@@ -50,7 +53,7 @@ def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, 
     right = np.random.default_rng(seed).normal(size=predicted.shape)
     dense = dense_of(tangent)
     exact = np.linalg.solve(dense, right.ravel()).reshape(right.shape)
-    # NEUTRAL shifts the eigenvalues by 1e-8
+    # neutral_shift moves the eigenvalues by 1e-8
     assert np.linalg.norm(found.solve(right) - exact) < 1e-6 * np.linalg.norm(exact)
     assert found.sign == np.linalg.slogdet(dense)[0]
 
@@ -70,13 +73,12 @@ def test_a_part_of_the_slip_space_steers_the_iteration(monkeypatch: pytest.Monke
     balance, predicted = case(5)
     tangent = tangent_of(balance, predicted)
     whole = find_slip_space(tangent, MANY, 0, 0.0)
-    part = find_slip_space(tangent, 0, MANY, factor.CUTOFF)
+    part = find_slip_space(tangent, 0, MANY, NEWTON.partial_cutoff)
     assert whole is not None
     assert part is not None
     assert part.size < whole.size
     assert not part.exact
-    monkeypatch.setattr(factor, "EXACT_FEW", 0)
-    monkeypatch.setattr(factor, "EXACT", 0)
+    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, exact_directions=0, exact_directions_of_few=0))
     right = np.random.default_rng(6).normal(size=predicted.shape)
     found = JacobianSolver().solve(tangent, right)
     assert np.linalg.norm(tangent.apply(found) - right) < 2e-3 * np.linalg.norm(right)
@@ -85,12 +87,10 @@ def test_a_part_of_the_slip_space_steers_the_iteration(monkeypatch: pytest.Monke
 def test_a_slip_space_that_is_too_large_is_left_to_the_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
     balance, predicted = case(7)
     tangent = tangent_of(balance, predicted)
-    assert find_slip_space(tangent, 10, 10, factor.CUTOFF) is None
-    monkeypatch.setattr(factor, "EXACT_FEW", 0)
-    monkeypatch.setattr(factor, "MOST", 0)
-    monkeypatch.setattr(factor, "EXACT", 0)
-    monkeypatch.setattr(factor, "DENSE", 100)
-    monkeypatch.setattr(factor, "build_period_factor", lambda _: None)
+    assert find_slip_space(tangent, 10, 10, NEWTON.partial_cutoff) is None
+    few = {"exact_directions": 0, "exact_directions_of_few": 0, "partial_directions": 0, "low_unknowns": 100}
+    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, **few))
+    monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
     assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
     right = np.random.default_rng(8).normal(size=predicted.shape)
     found = JacobianSolver().solve(tangent, right)

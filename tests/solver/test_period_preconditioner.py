@@ -10,13 +10,10 @@ import pytest
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
-from solver.newton import linear_solver as linear
-from solver.newton import period_preconditioner as period_factor
-from solver.newton import preconditioner as factor
+from solver.newton import period_preconditioner, preconditioner
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import (
-    PASSES,
-    RESONANT,
     PeriodFactor,
     build_march,
     build_period_factor,
@@ -90,9 +87,9 @@ def test_the_march_solves_what_it_says_sample_by_sample() -> None:
     n_samples, size = found.inverse.shape[:2]
     n_contact = size // 3
     right = np.random.default_rng(4).normal(size=(n_samples, size))
-    steps, states = march_samples(found.inverse, found.coupling, found.own, found.carried, right, PASSES)
+    steps, states = march_samples(found.inverse, found.coupling, found.own, found.carried, right, NEWTON.march_periods)
     state = np.zeros((n_contact, 3))
-    for _ in range(PASSES):
+    for _ in range(NEWTON.march_periods):
         slow = np.empty((2, n_samples, size))
         for n in range(n_samples):
             # step and state as two unknowns, nothing eliminated
@@ -129,17 +126,17 @@ def test_resonances_are_the_large_singular_values_of_what_differs(nodal_diameter
     added, seen = resonances(joint)
     sizes = np.linalg.svd(whole, compute_uv=False)
     left = np.linalg.svd(whole - added.T @ seen, compute_uv=False)
-    assert sizes[0] > 3.0 * RESONANT
+    assert sizes[0] > 3.0 * NEWTON.resonant_difference
     # where more directions differ than are looked for some are left
-    most = RESONANT if nodal_diameter == 0 else 1.3 * RESONANT
+    most = NEWTON.resonant_difference * (1.0 if nodal_diameter == 0 else 1.3)
     assert left[0] < 1.01 * most
-    assert 0 < len(seen) <= np.count_nonzero(sizes > RESONANT)
+    assert 0 < len(seen) <= np.count_nonzero(sizes > NEWTON.resonant_difference)
 
 
 def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.MonkeyPatch) -> None:
     # with every direction and nothing cut off it is the inverse, whatever the harmonics see
-    monkeypatch.setattr(period_factor, "RESONANT", 1e-9)
-    monkeypatch.setattr(period_factor, "RANK", 100)
+    everything = replace(NEWTON, resonant_difference=1e-9, resonances=100)
+    monkeypatch.setattr(period_preconditioner, "NEWTON", everything)
     balance, predicted = case(5, highest=12, samples=25, kinds=("constant_load_one_tangent",) * 9)
     tangent = tangent_of(balance, 3.0 * predicted)
     step = np.random.default_rng(6).normal(size=predicted.shape)
@@ -197,8 +194,8 @@ def products(monkeypatch: pytest.MonkeyPatch, solver: JacobianSolver, tangent: L
 @pytest.fixture
 def large_slip_space(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every slip space is too large to be factorised."""
-    for limit in ("EXACT", "EXACT_FEW", "MOST"):
-        monkeypatch.setattr(factor, limit, 0)
+    none = replace(NEWTON, exact_directions=0, exact_directions_of_few=0, partial_directions=0)
+    monkeypatch.setattr(preconditioner, "NEWTON", none)
 
 
 @pytest.mark.usefixtures("large_slip_space")
@@ -218,8 +215,8 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
     right = tangent.apply(np.random.default_rng(2).normal(size=predicted.shape))
     found = products(monkeypatch, JacobianSolver(), tangent, right)
     assert found <= 25
-    monkeypatch.setattr(factor, "DENSE", 300)
-    monkeypatch.setattr(factor, "build_period_factor", lambda _: None)
+    monkeypatch.setattr(preconditioner, "NEWTON", replace(preconditioner.NEWTON, low_unknowns=300))
+    monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
     assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
     assert found < 0.75 * products(monkeypatch, JacobianSolver(), tangent, right)
 
@@ -227,7 +224,7 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
 @pytest.mark.usefixtures("large_slip_space")
 def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant() -> None:
     balance, predicted = case(8, highest=5, samples=64)
-    assert predicted.size > linear.SMALL - 50
+    assert predicted.size > NEWTON.dense_unknowns - 50
     solver = JacobianSolver()
     random = np.random.default_rng(9)
     for _ in range(4):
