@@ -15,8 +15,8 @@ from solver.accuracy.error_estimate import UNKNOWN, Estimate
 from solver.accuracy.harmonic_levels import fewer, on_ladder, steps_to_reach, steps_to_see
 from solver.accuracy.harmonic_reach import reach
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
-from solver.continuation.harmonic_homotopy import lead_to, start_with_tail
-from solver.continuation.ratcheting import creeps, rest_masses
+from solver.continuation.homotopy import add_harmonics, start_with_tail
+from solver.continuation.ratcheting import ratchets, shake_down
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import transfer
@@ -83,7 +83,7 @@ class Level:
             )
             if level is not None:
                 return level
-        led = lead_to(self.case, self.joint, self.point.evaluation, resolution, effort)
+        led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, effort)
         if led is None:
             return None
         return self._transferred(replace(self.case, resolution=resolution), led, resolution, effort)
@@ -109,9 +109,9 @@ class Level:
         """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
         settings = self.case.settings
         share = CREEP * settings.rtol
-        if not creeps(self.joint, self.point.evaluation, share):
+        if not ratchets(self.joint, self.point.evaluation, share):
             return self
-        rested = rest_masses(self.joint, self.point, share, settings.tolerance, effort)
+        rested = shake_down(self.joint, self.point, share, settings.tolerance, effort)
         return Level(self.case, self.joint, rested)
 
     def least_work(self) -> float:

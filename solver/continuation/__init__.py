@@ -1,1 +1,1 @@
-"""Ways to a state: natural steps, arc length, homotopies, the first state, transients, states after a fold."""
+"""Continuation: natural steps, arc length, homotopies, first state, relaxation in time, states after a fold."""

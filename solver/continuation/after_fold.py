@@ -1,4 +1,4 @@
-"""Where a branch ends while the joint wears: the states that the vibration can land on."""
+"""States after a fold: where the vibration can go on when its branch ends while the joint wears."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from solver.continuation.arc_length import follow_arc
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.transient import settle
+from solver.continuation.options import CONTINUATION
+from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -16,22 +17,36 @@ from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
 
-SPAN = 0.01  # of the frequency: natural length of arc-length steps
 
-
-def landings(
+def states_after_fold(
     case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
 ) -> Iterator[PathPoint | Outcome]:
-    """Stable states beyond the end of a branch, the most physical one first; none is sought before it is asked for.
+    """Stable states beyond the end of a branch, the most physical one first; each is sought when it is asked for.
 
-    last: the last state of the branch. worn (n_contact,): m, a wear depth just beyond its end. First the state that the
-    structure settles to in time at that depth; then the branch at the depth of the last state, followed along the
-    frequency through its folds and back to the same frequency; then a state from nothing. Last of all, why there is no
-    (other) state: where the structure drifts away at the first attempt no other one is made.
+    First the periodic state to which the structure relaxes in time at the wear depth beyond the end; then the branch at
+    the depth of the last state, followed along the frequency through its folds and back to the same frequency; then a
+    state from nothing.
+
+    Parameters
+    ----------
+    case, joint : Case, Joint
+        Where the branch ends.
+    last : PathPoint
+        The last state of the branch.
+    worn : array (n_contact,)
+        Wear depth just beyond the end of the branch, m.
+    solver, effort
+        As in `solve_balance`.
+
+    Yields
+    ------
+    PathPoint or Outcome
+        A state, or last of all why there is no (other) one. Where the mean positions run away at the first attempt,
+        ADRIFT, no other one is made.
     """
-    outcome, settled = settle(case, joint, worn, last.evaluation, joint, last.history, solver, effort)
-    if settled is not None:
-        yield settled
+    outcome, relaxed = relax_to_periodic(case, joint, worn, last.evaluation, joint, last.history, solver, effort)
+    if relaxed is not None:
+        yield relaxed
     if outcome is Outcome.ADRIFT:
         yield outcome
         return
@@ -44,10 +59,11 @@ def landings(
         return is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), solver)
 
     tolerance = case.settings.tolerance
-    # the frequency of the state is the target, so the walk begins at it
+    # the target is the frequency of the state itself
     start = PathPoint(joint.omega, last.evaluation, last.evaluation.history)
+    span = CONTINUATION.fold_search_length * joint.omega
     for toward in (-1.0, 1.0):
-        arc = follow_arc(balance_at, start, joint.omega, SPAN * joint.omega, solver, tolerance, effort, stays, toward)
+        arc = follow_arc(balance_at, start, joint.omega, span, solver, tolerance, effort, stays, toward)
         if arc.point is not None and arc.folds:
             yield arc.point
     outcome, other = solve_first_state(case, joint.omega, joint.excitation_amplitude, worn, solver, effort)

@@ -1,7 +1,7 @@
-"""A branch followed by arc length through its folds, until a stable state at the target is reached.
+"""Pseudo-arc-length continuation of a branch through its folds, until an accepted state at the target is reached.
 
-Each step solves the bordered system by block elimination with the solver of the plain Jacobian: two right sides, one
-kept factorisation.
+Each step solves the bordered system by block elimination with the solver of the plain Jacobian: two right-hand sides,
+one kept factorisation.
 """
 
 from __future__ import annotations
@@ -11,27 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import BalanceAt, PathPoint, vibration_change
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
 
-ARC_STEPS = 250
-ARC_FAILURES = 80  # correctors that did not converge, in all
-FARTHEST = 10.0  # natural lengths of the parameter from the start or behind the target
-ARC_ITERATIONS = 8
-LONGEST = 0.2  # scaled length of a step
-JUMP = 0.2  # relative change of the vibration at a fold that is more than a corner of the branch
-REFINEMENTS = 3  # points added around a fold
-
 
 @dataclass(frozen=True)
 class ArcResult:
-    """point: state at the target, None where it was not reached. folds: values of the parameter where it turned.
+    """End of a continuation by arc length.
 
-    jumps: those of the folds that a slow change of the parameter jumps at: where the arc has come back to their value,
-    the vibration is another one.
+    point: state at the target, None where it was not reached. folds: values of the parameter at which it turned back.
+    jumps: those of the folds at which a slow change of the parameter makes the state jump: where the branch has
+    returned to their value of the parameter, the vibration is another one.
     """
 
     point: PathPoint | None
@@ -52,9 +46,23 @@ def follow_arc(
 ) -> ArcResult:
     """Follow the branch by arc length, through folds, until it crosses the target in a state that is accepted.
 
-    span: natural length of the parameter. The history is held at that of the start. The search ends, too, where the
-    branch has gone `FARTHEST` from start and target, and after `ARC_STEPS` steps. toward: sign of the parameter's first
-    step where that is not towards the target; the target may then be the start.
+    The history is held at that of the start. The search also ends at a distance of `CONTINUATION.farthest` from start
+    and target, and after `CONTINUATION.arc_steps` steps.
+
+    Parameters
+    ----------
+    balance_at : callable
+        Balance at a value of the parameter, of pairs with a history (n_contact, 2), m.
+    start : PathPoint
+        State to begin with.
+    target, span : float
+        Value of the parameter that is sought, and its natural length.
+    solver, tolerance, effort
+        As in `solve_balance`.
+    accept : callable
+        Whether a state at the target ends the search.
+    toward : float
+        Sign of the parameter's first step where that is not towards the target; the target may then be the start.
     """
     toward = toward or float(np.sign(target - start.parameter)) or 1.0
     arc = _Arc(
@@ -66,10 +74,10 @@ def follow_arc(
     direction[-1] = toward
     folds: list[float] = []
     turns: list[int] = []
-    length, failures = 0.02, 0
-    low = min(start.parameter, target) - FARTHEST * abs(span)
-    high = max(start.parameter, target) + FARTHEST * abs(span)
-    for _ in range(ARC_STEPS):
+    length, failures = CONTINUATION.first_arc, 0
+    low = min(start.parameter, target) - CONTINUATION.farthest * abs(span)
+    high = max(start.parameter, target) + CONTINUATION.farthest * abs(span)
+    for _ in range(CONTINUATION.arc_steps):
         if effort.exhausted:
             break
         point = points[-1]
@@ -78,32 +86,32 @@ def follow_arc(
             break
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
         reached = None
-        while reached is None and length > 1e-4 and failures < ARC_FAILURES:
+        while reached is None and length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
             reached = arc.step(point, tangent, length, tolerance, effort)
             failures += reached is None
-            length *= 1.6 if reached is not None else 0.5
-        if reached is None and failures < ARC_FAILURES:
-            reached = arc.step_over_kink(point, tangent, tolerance, effort)
+            length *= CONTINUATION.arc_growth if reached is not None else 0.5
+        if reached is None and failures < CONTINUATION.arc_failures:
+            reached = arc.step_over_corner(point, tangent, tolerance, effort)
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
             # the start lies so near to a fold that the first step goes round it
-            if length > 4e-4 and failures < ARC_FAILURES:
+            if 0.25 * length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
                 length *= 0.25
                 failures += 1
                 continue
             folds.append(point.parameter)
             turns.append(0)
-        length = min(max(length, 1e-3), LONGEST)
+        length = min(max(length, CONTINUATION.renewed_arc), CONTINUATION.longest_arc)
         points.append(reached)
         path.append(arc.place(reached.parameter, reached.evaluation))
         if len(points) > 2 and (path[-1][-1] - path[-2][-1]) * (path[-2][-1] - path[-3][-1]) < 0.0:
             folds.append(arc.fold(points[-3:], tolerance, effort))
             turns.append(len(points) - 2)
         if (reached.parameter - target) * (point.parameter - target) <= 0.0 and point.parameter != target:
-            landed = arc.land(point, reached, target, tolerance, effort)
-            if landed is not None and accept(landed):
-                return ArcResult(landed, tuple(folds), _jumps(folds, turns, [*points, landed], toward))
+            found = arc.state_at(point, reached, target, tolerance, effort)
+            if found is not None and accept(found):
+                return ArcResult(found, tuple(folds), _jumps(folds, turns, [*points, found], toward))
         if not low <= reached.parameter <= high:
             break
         direction = path[-1] - path[-2]
@@ -111,16 +119,16 @@ def follow_arc(
 
 
 def _jumps(folds: list[float], turns: list[int], points: list[PathPoint], toward: float) -> tuple[float, ...]:
-    """Folds at which the branch turns back and comes again as another one; turns: the places of the folds."""
+    """Folds at which the branch turns back and returns with another vibration; turns: the places of the folds."""
     jumps: list[float] = []
-    free = 0  # folds on the way round another one are none of their own
+    free = 0  # folds between another one and the return of the branch do not count
     for fold, turn in zip(folds, turns, strict=True):
         if turn < free:
             continue
         beyond = [place for place in range(turn + 1, len(points)) if (points[place].parameter - fold) * toward > 0.0]
         again = beyond[0] if beyond else len(points) - 1
         one, other = points[turn].evaluation, points[again].evaluation
-        if max(vibration_change(one, other), vibration_change(other, one)) > JUMP:
+        if max(vibration_change(one, other), vibration_change(other, one)) > CONTINUATION.smooth_change:
             jumps.append(fold)
         free = again
     return tuple(jumps)
@@ -141,12 +149,13 @@ class _Arc:
         return np.append(evaluation.predicted_h.ravel() / self.size, parameter / self.span)
 
     def slope(self, parameter: float, evaluation: Evaluation) -> FloatArray:
-        """Derivative (n_rel, m) of the residual to parameter / span.
+        """Derivative (n_rel, m), N, of the residual with respect to parameter / span.
 
-        A difference: it only steers the corrector, whose residual is exact.
+        A difference: it only gives directions to the corrector, whose residual is exact.
         """
-        ahead = self.balance_at(parameter + 1e-7 * self.span, self.history).evaluate(evaluation.predicted_h)
-        return (ahead.residual - evaluation.residual) / 1e-7
+        step = CONTINUATION.parameter_difference
+        ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
+        return (ahead.residual - evaluation.residual) / step
 
     def tangent(self, parameter: float, evaluation: Evaluation) -> FloatArray | None:
         """Unit tangent of the branch, of either sign; None where it is not defined."""
@@ -156,7 +165,7 @@ class _Arc:
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
             return None
-        # at a fold the step is far too long to be squared, and yet it is the direction
+        # near a fold the step is so long that its square overflows, yet its direction is right
         tangent /= largest
         return np.asarray(tangent / np.linalg.norm(tangent))
 
@@ -168,19 +177,20 @@ class _Arc:
         base = self.place(point.parameter, point.evaluation)
         unknown = base + length * tangent
         slope: FloatArray | None = None
-        for _ in range(ARC_ITERATIONS):
+        for _ in range(CONTINUATION.arc_iterations):
             parameter = float(unknown[-1] * self.span)
             balance = self.balance_at(parameter, self.history)
             evaluation = balance.evaluate(unknown[:-1].reshape(shape) * self.size)
+            # zero but for round-off: the plane across the tangent is linear, and every iterate lies in it
             ahead = float(tangent @ (unknown - base)) - length
             norm = evaluation.scaled_residual()
-            if norm <= tolerance and abs(ahead) < 1e-3 * length:
+            if norm <= tolerance:
                 return PathPoint(parameter, evaluation, self.history)
-            if not np.isfinite(norm) or np.linalg.norm(unknown - base) > 4.0 * length:
+            if not np.isfinite(norm) or np.linalg.norm(unknown - base) > CONTINUATION.arc_wander * length:
                 return None
             if slope is None:
                 slope = self.slope(parameter, evaluation)
-            # [J slope; tangent] by blocks: the step with the parameter held, and what a change of it brings
+            # [J slope; tangent] by blocks: the step with the parameter held, and the step per change of the parameter
             held, moved = self.solver.solve_two(balance.linearise(evaluation), evaluation.residual, slope)
             held, moved = held.ravel() / self.size, moved.ravel() / self.size
             pivot = tangent[-1] - tangent[:-1] @ moved
@@ -191,7 +201,7 @@ class _Arc:
             effort.iterations += 1
         return None
 
-    def step_over_kink(
+    def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, effort: Effort
     ) -> PathPoint | None:
         """Point behind a corner of the branch, where a contact sample changes its state and the branch may turn back.
@@ -202,7 +212,7 @@ class _Arc:
         """
         shape = point.evaluation.predicted_h.shape
         base = self.place(point.parameter, point.evaluation)
-        for length in (1e-2, 1e-3, 1e-4):
+        for length in CONTINUATION.corner_arcs:
             ahead = base + length * tangent
             parameter = float(ahead[-1] * self.span)
             behind = self.balance_at(parameter, self.history).evaluate(ahead[:-1].reshape(shape) * self.size)
@@ -213,22 +223,23 @@ class _Arc:
                 reached = self.step(point, sign * turned, length, tolerance, effort)
                 if reached is None:
                     continue
-                way = self.place(reached.parameter, reached.evaluation) - base
-                if way @ tangent > -0.99 * np.linalg.norm(way):
+                chord = self.place(reached.parameter, reached.evaluation) - base
+                if chord @ tangent > -CONTINUATION.backward_cosine * np.linalg.norm(chord):
                     return reached
         return None
 
-    def land(
+    def state_at(
         self, before: PathPoint, after: PathPoint, target: float, tolerance: float, effort: Effort
     ) -> PathPoint | None:
         """State at the target between two points of the branch; None where Newton's method leaves them."""
-        share = (target - before.parameter) / (after.parameter - before.parameter)
+        fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
-        start = one + share * (other - one)
+        start = one + fraction * (other - one)
         balance: Balance = self.balance_at(target, self.history)
-        result = solve_balance(balance, start, self.solver, tolerance, effort, 15)
+        result = solve_balance(balance, start, self.solver, tolerance, effort, CONTINUATION.target_iterations)
         found = result.evaluation.predicted_h
-        near = np.linalg.norm(found - start) <= 2.0 * np.linalg.norm(other - one) + 1e-6 * self.size
+        farthest = CONTINUATION.target_distance * np.linalg.norm(other - one) + CONTINUATION.target_slack * self.size
+        near = np.linalg.norm(found - start) <= farthest
         return PathPoint(target, result.evaluation, self.history) if result.converged and near else None
 
     def fold(self, points: list[PathPoint], tolerance: float, effort: Effort) -> float:
@@ -238,16 +249,17 @@ class _Arc:
         takes the place of one of the outer ones, a few times.
         """
         top = points[1].parameter > points[0].parameter
-        for _ in range(REFINEMENTS):
+        for _ in range(CONTINUATION.fold_points):
             places = [self.place(point.parameter, point.evaluation) for point in points]
             at = np.array([-np.linalg.norm(places[1] - places[0]), 0.0, np.linalg.norm(places[2] - places[1])])
             square, slope, _ = np.polyfit(at, [place[-1] for place in places], 2)
-            vertex = float(np.clip(-0.5 * slope / square, 0.9 * at[0], 0.9 * at[2])) if square != 0.0 else 0.0
-            if abs(vertex) < 1e-3 * (at[2] - at[0]):
-                vertex = 0.1 * (at[2] if at[2] > -at[0] else at[0])
+            low, high = CONTINUATION.fold_reach * at[0], CONTINUATION.fold_reach * at[2]
+            vertex = float(np.clip(-0.5 * slope / square, low, high)) if square != 0.0 else 0.0
+            if abs(vertex) < CONTINUATION.fold_resolution * (at[2] - at[0]):
+                vertex = CONTINUATION.fold_offset * (at[2] if at[2] > -at[0] else at[0])
             other = places[2] if vertex > 0.0 else places[0]
-            way = (other - places[1]) / np.linalg.norm(other - places[1])
-            added = self.step(points[1], way, abs(vertex), tolerance, effort)
+            chord = (other - places[1]) / np.linalg.norm(other - places[1])
+            added = self.step(points[1], chord, abs(vertex), tolerance, effort)
             if added is None:
                 break
             new = [points[0], points[1], added, points[2]] if vertex > 0.0 else [points[0], added, *points[1:]]

@@ -1,13 +1,14 @@
-"""One state of the joint: the static one, the periodic one above it, and what is reported of it."""
+"""The first state of a joint: the static one, and the periodic one that is reached from it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from solver.continuation.arc_length import follow_arc
-from solver.continuation.friction_homotopy import solve_from_less_friction
+from solver.continuation.homotopy import solve_from_less_friction
 from solver.continuation.natural import follow_naturally
-from solver.continuation.transient import settle
+from solver.continuation.options import CONTINUATION
+from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -18,46 +19,56 @@ from solver.stability.hill import is_stable
 from solver.structure.fourier import change_orders, from_complex
 from solver.structure.joint import Case, Joint, static_joint
 
-LOAD_STEPS = 20
-FEW_ITERATIONS = 5  # of a load step from the state before, grown with its load
-RELIEF = (0.1, 0.4)  # of the static friction forces, where vibration cannot be raised from the static state
-
 
 def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
-    """Frictional unilateral state under the static load, raised gradually from nothing; None where there is none.
+    """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), the load raised from nothing.
 
-    The state depends on the path of the load, so it is raised in equal steps and each starts from the tangential state
-    of the one before. The first evaluation lets the pairs stick. Steps that Newton's method does not find are found by
-    way of less friction (`friction_homotopy`).
+    The state depends on the history of the load, so it is raised in equal steps and each starts from the tangential
+    state of the one before. In the first evaluation the pairs stick. Steps that Newton's method does not find are found
+    by a homotopy in the friction coefficient.
+
+    Parameters
+    ----------
+    joint : Joint
+        Its excitation is left out.
+    wear_depth : array (n_contact,)
+        Wear depth, m, held.
+    tolerance, effort
+        As in `solve_balance`.
+
+    Returns
+    -------
+    PathPoint or None
+        The parameter of the point is the load factor, 1. None where no state is found.
     """
-    solver = JacobianSolver()
+    solver, n_steps = JacobianSolver(), CONTINUATION.load_steps
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
         return Balance.frozen(static_joint(joint, load_factor), history, wear_depth)
 
     history = np.zeros((joint.contact.n_contact, 2))
-    first = balance_at(1.0 / LOAD_STEPS, history)
+    first = balance_at(1.0 / n_steps, history)
     start = first.joint.structure.force_h()
     found = solve_from_less_friction(first, start, solver, tolerance, effort)
     if found is None:
         return None
-    point = PathPoint(1.0 / LOAD_STEPS, found.evaluation, final_history(first, found.evaluation))
-    for step in range(2, LOAD_STEPS + 1):
-        share = step / LOAD_STEPS
-        whole = balance_at(share, point.history)
+    point = PathPoint(1.0 / n_steps, found.evaluation, final_history(first, found.evaluation))
+    for step in range(2, n_steps + 1):
+        load_factor = step / n_steps
+        whole = balance_at(load_factor, point.history)
         # without gaps and wear the state grows with its load; much friction allows others that do not
         grown = point.evaluation.predicted_h * (step / (step - 1.0))
-        result = solve_balance(whole, grown, solver, tolerance, effort, FEW_ITERATIONS)
+        result = solve_balance(whole, grown, solver, tolerance, effort, CONTINUATION.load_step_iterations)
         if result.converged:
-            point = PathPoint(share, result.evaluation, final_history(whole, result.evaluation))
+            point = PathPoint(load_factor, result.evaluation, final_history(whole, result.evaluation))
             continue
-        point, arrived = follow_naturally(balance_at, point, share, solver, tolerance, effort)
+        point, arrived = follow_naturally(balance_at, point, load_factor, solver, tolerance, effort)
         if not arrived:
-            whole = balance_at(share, point.history)
+            whole = balance_at(load_factor, point.history)
             found = solve_from_less_friction(whole, point.evaluation.predicted_h, solver, tolerance, effort)
             if found is None:
                 return None
-            point = PathPoint(share, found.evaluation, final_history(whole, found.evaluation))
+            point = PathPoint(load_factor, found.evaluation, final_history(whole, found.evaluation))
     return point
 
 
@@ -69,15 +80,31 @@ def solve_first_state(
     solver: JacobianSolver,
     effort: Effort,
 ) -> tuple[Outcome, PathPoint | None]:
-    """Periodic state found from nothing: the static state first, then the excitation raised; or why there is none.
+    """Periodic state from nothing: the static state first, then the excitation is raised.
 
     A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails or
     ends in an unstable state, the vibration without the joint is tried as the start. Pairs that the static load has
-    left at their friction limit slip under the smallest vibration, in states that do not lie near the static one:
-    vibration shakes such pairs down, so it is raised from states that carry less friction, too. Then the vibration is
-    left to build up in time under the whole excitation (`transient`), and arc length in the excitation comes last.
+    left at their friction limit slip under the smallest vibration, in states that are not near the static one; they
+    shake down, so the excitation is raised from states of less static friction, too. Then the vibration builds up in
+    time under the whole excitation (`transient`), and arc length in the excitation comes last.
 
-    omega: rad/s. wear_depth (n_contact,): m, held fixed. The parameter of the point is the share of the excitation, 1.
+    Parameters
+    ----------
+    case : Case
+        Model, friction and settings.
+    omega, excitation_amplitude : float
+        rad/s, N.
+    wear_depth : array (n_contact,)
+        Wear depth, m, held.
+    solver, effort
+        As in `solve_balance`.
+
+    Returns
+    -------
+    outcome : Outcome
+        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE or ADRIFT.
+    point : PathPoint or None
+        The state; its parameter is the load factor of the excitation, 1.
     """
     tolerance = case.settings.tolerance
     quiet = case.joint(omega, 0.0)
@@ -85,8 +112,8 @@ def solve_first_state(
     if static is None:
         return Outcome.STATIC_FAILED, None
 
-    def balance_at(share: float, history: FloatArray) -> Balance:
-        return Balance.frozen(case.joint(omega, share * excitation_amplitude), history, wear_depth)
+    def balance_at(load_factor: float, history: FloatArray) -> Balance:
+        return Balance.frozen(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
 
     unstable = False
 
@@ -117,28 +144,29 @@ def solve_first_state(
         slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
         if stays(slid):
             return Outcome.CONVERGED, slid
-    for share in RELIEF:
-        relieved = Balance.frozen(quiet, _relieved(quiet, static, share), wear_depth)
+    for fraction in CONTINUATION.relief:
+        relieved = Balance.frozen(quiet, _relieved(quiet, static, fraction), wear_depth)
         result = solve_balance(relieved, start, solver, tolerance, effort)
         if result.converged:
             held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
-            risen, climbed = follow_naturally(balance_at, held, 1.0, solver, tolerance, effort)
-            if climbed and stays(risen):
-                return Outcome.CONVERGED, risen
+            loaded, reached_load = follow_naturally(balance_at, held, 1.0, solver, tolerance, effort)
+            if reached_load and stays(loaded):
+                return Outcome.CONVERGED, loaded
     joint = case.joint(omega, excitation_amplitude)
-    why, settled = settle(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, effort)
-    if settled is not None:
-        return Outcome.CONVERGED, PathPoint(1.0, settled.evaluation, settled.history)
+    why, relaxed = relax_to_periodic(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, effort)
+    if relaxed is not None:
+        return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
-        reached = follow_arc(balance_at, point, 1.0, 0.2, solver, tolerance, effort, stays).point
+        span = CONTINUATION.load_length
+        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, effort, stays).point
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None
 
 
-def _relieved(joint: Joint, static: PathPoint, share: float) -> FloatArray:
-    """Tangential history (n_contact, 2), m, with which pairs carry a share less of their static friction force."""
-    return static.history + share * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
+def _relieved(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:
+    """Tangential history (n_contact, 2), m, with which pairs carry a fraction less of their static friction force."""
+    return static.history + fraction * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 
 def _free_motion(balance: Balance) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Where the structure settles: the harmonics of its motion followed in time from a given motion to a periodic one.
+"""Relaxation in time to a periodic state: the harmonics of a motion vary slowly until they are constant.
 
 The motion is y(t) = Re sum Y_n(T) exp(i n w t) with amplitudes that vary slowly, so that d/dt acts on Y_n as
 i n w + d/dT. With the velocity V = (i n w + d/dT) Y as a state of its own, the equation of motion reads
@@ -9,13 +9,13 @@ and an implicit Euler step of length D in T from (Y_0, V_0), with s = i n w + 1/
 
     (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D.
 
-This is the harmonic balance again, with other matrices and loads: it is condensed on the contact pairs and solved by
+This is the harmonic balance, Eq. (8), with other matrices and loads: it is condensed on the contact pairs and solved by
 the same Newton's method. A motion that repeats (V_0 = i n w Y_0, Y = Y_0) fulfils the balance exactly, whatever D, and
 D -> infinity is that balance. Friction is closed over one period with the history of the step before. The static
 harmonic is no exception, with s = 1/D.
 
-A short step follows the transient of the structure, a long one damps all that decays; growing motions leave an unstable
-state as long as 1/D exceeds their rate, so D starts at one period and the state found last is tested.
+A short step resolves the transient of the structure, a long one damps everything that decays. Growing motions leave an
+unstable state as long as 1/D exceeds their rate, so D starts at one period, and the stability of the state is tested.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ComplexArray, FloatArray, Matrix
@@ -36,17 +37,6 @@ from solver.structure.condensation import CondensedStructure, condense, relative
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint
 
-MOST_STEPS = 120
-MOST_FAILURES = 60  # steps that did not converge or changed too much
-ADRIFT = 1e3  # mean relative displacement over the largest one that vibration and start show
-SHORTEST = 1.0 / 64.0  # periods
-LONGEST = 1e9  # periods
-WANTED = 0.25  # relative change of the motion over a step
-LARGEST = 0.6  # relative change over a step that is not divided
-SETTLED = 0.02  # relative change over a step from which the periodic state is sought
-NEAR = 0.1  # of the motion: farther from where the motion has settled, a periodic state is another one
-STEP_TOLERANCE = 1e-6  # of the scaled residual of a step, which is no result
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -57,13 +47,13 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class _CarriedStructure(CondensedStructure):
-    """A structure under a load in all harmonics, carried_h (n_rel, 2H+1), N."""
+class _LoadedStructure(CondensedStructure):
+    """A structure under a load in all harmonics, load_h (n_rel, 2H+1), N."""
 
-    carried_h: FloatArray
+    load_h: FloatArray
 
     def force_h(self) -> FloatArray:
-        return self.carried_h
+        return self.load_h
 
 
 class Transient:
@@ -98,11 +88,11 @@ class Transient:
         return Motion(none, none)
 
     def resumed(self, motion: Motion) -> Motion:
-        """A periodic motion of another joint (another frequency or load) taken up by this one."""
+        """Initial motion from a periodic one of another joint (another frequency or load): the same amplitudes."""
         return Motion(motion.displacement, self.rates[:, None] * motion.displacement)
 
     def step(self, before: Motion, inverse: float) -> Joint:
-        """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion."""
+        """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion `before`."""
         orders = len(self.parts)
         n_rel = self.relative.size
         stiffness = np.empty((orders, n_rel, n_rel), complex)
@@ -114,11 +104,11 @@ class Transient:
         kept: dict[str, Any] = {field.name: getattr(plain, field.name) for field in fields(plain)}
         kept["static_stiffness"] = np.real(stiffness[0])
         kept["dynamic_stiffness"] = stiffness[1:]
-        carried = from_complex(np.real(force[0]), force[1:].T)
-        return replace(self.joint, structure=_CarriedStructure(**kept, carried_h=carried))
+        load_h = from_complex(np.real(force[0]), force[1:].T)
+        return replace(self.joint, structure=_LoadedStructure(**kept, load_h=load_h))
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
-        """Motion at the end of such a step, from the state that its balance has."""
+        """Motion at the end of such a step, from the solution of its balance."""
         return self._motion(
             evaluation, np.asarray(self.rates + inverse, np.complex128), self._loads(before, inverse), before, inverse
         )
@@ -131,8 +121,8 @@ class Transient:
         loads: list[Matrix] = []
         for place, (mass, damping, _, load) in enumerate(self.parts):
             moved, velocity = before.displacement[place], before.velocity[place]
-            carried = mass @ ((self.rates[place] + inverse) * moved + velocity) + damping @ moved
-            loads.append(load + inverse * carried)
+            inertia = mass @ ((self.rates[place] + inverse) * moved + velocity) + damping @ moved
+            loads.append(load + inverse * inertia)
         return loads
 
     def _motion(
@@ -152,7 +142,7 @@ class Transient:
         return Motion(displacement, velocity if before is None else velocity - inverse * before.displacement)
 
 
-def settle(
+def relax_to_periodic(
     case: Case,
     joint: Joint,
     wear_depth: FloatArray,
@@ -162,14 +152,32 @@ def settle(
     solver: JacobianSolver,
     effort: Effort,
 ) -> tuple[Outcome, PathPoint | None]:
-    """Stable state of `joint` that the structure settles to from a state of `start_joint`, or why there is none.
+    """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
-    wear_depth (n_contact,): m, held fixed. history (n_contact, 2): m, tangential history at the start. Both joints
-    have the same pairs and harmonics; frequency and load may differ: the start without excitation finds the state that
-    builds up from rest. At most `MOST_STEPS` steps in time. The parameter of the point is NaN.
+    Parameters
+    ----------
+    case : Case
+        Model and settings of both joints.
+    joint : Joint
+        Where the state is sought.
+    wear_depth : array (n_contact,)
+        Wear depth, m, held.
+    start, start_joint : Evaluation, Joint
+        State to begin with. Both joints have the same pairs and harmonics; frequency and load may differ: a start
+        without excitation leads to the state that builds up from rest.
+    history : array (n_contact, 2)
+        Tangential history at the start, m.
+    solver, effort
+        As in `solve_balance`.
 
-    ADRIFT: a joint that slips all over forgets where it was, and nothing but friction may hold its parts; where their
-    mean position runs away there is no periodic state. START_FAILED: no stable state was found otherwise.
+    Returns
+    -------
+    outcome : Outcome
+        CONVERGED. ADRIFT where the mean positions run away: a joint that slips all over forgets where it was, nothing
+        but friction may hold its parts, and then there is no periodic state. START_FAILED where no stable state is
+        found otherwise, in `CONTINUATION.transient_steps` steps.
+    point : PathPoint or None
+        The state; its parameter is NaN.
     """
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
@@ -177,35 +185,40 @@ def settle(
     period = 2.0 * np.pi / joint.omega
     length, tried, failures = 1.0, np.inf, 0
     size = float(np.abs(start.displacement_h).max())
-    for _ in range(MOST_STEPS):
+    for _ in range(CONTINUATION.transient_steps):
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
-        tolerance = max(STEP_TOLERANCE, case.settings.tolerance)
-        result = solve_balance(balance, predicted, solver, tolerance, effort, 12)
+        tolerance = max(CONTINUATION.transient_tolerance, case.settings.tolerance)
+        most = CONTINUATION.transient_iterations
+        result = solve_balance(balance, predicted, solver, tolerance, effort, most)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
-        if not result.converged or (change > LARGEST and length > 1.0):
-            length *= 0.35
+        if not result.converged or (change > CONTINUATION.largest_change and length > 1.0):
+            length *= CONTINUATION.transient_cut
             failures += 1
-            if length < SHORTEST or failures > MOST_FAILURES:
+            if length < CONTINUATION.shortest_transient or failures > CONTINUATION.transient_failures:
                 break
             continue
         motion, predicted = ahead, result.evaluation.predicted_h
         history = final_history(balance, result.evaluation)
         moved = np.abs(result.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
-        if moved[:, :, 0].max() > ADRIFT * size:
+        if moved[:, :, 0].max() > CONTINUATION.runaway * size:
             return Outcome.ADRIFT, None
-        # not again until the motion has calmed further: Newton's method from a motion that still moves is lost work
-        if change < SETTLED and (change < 0.3 * tried or length >= LONGEST):
+        # not again until the motion changes less: from a motion that still changes Newton's method fails
+        renewed = change < CONTINUATION.renewed_attempt * tried or length >= CONTINUATION.longest_transient
+        if change < CONTINUATION.relaxed_change and renewed:
             tried = change
             found = _periodic(case, joint, wear_depth, predicted, history, solver, effort)
-            if found is not None and _change(transient.periodic(found.evaluation), motion) < NEAR:
-                return Outcome.CONVERGED, found
-        elif change > SETTLED:
+            if found is not None:
+                distance = _change(transient.periodic(found.evaluation), motion)
+                if distance < CONTINUATION.relaxed_distance:
+                    return Outcome.CONVERGED, found
+        elif change > CONTINUATION.relaxed_change:
             tried = np.inf
         # amplitudes have no meaning over less than a period: only where Newton's method fails are steps shorter
-        length = min(max(length * float(np.clip(WANTED / max(change, 1e-300), 0.5, 2.5)), 1.0), LONGEST)
+        growth = float(np.clip(CONTINUATION.wanted_change / max(change, 1e-300), *CONTINUATION.transient_growth))
+        length = min(max(length * growth, 1.0), CONTINUATION.longest_transient)
     return Outcome.START_FAILED, None
 
 
@@ -218,16 +231,16 @@ def _periodic(
     solver: JacobianSolver,
     effort: Effort,
 ) -> PathPoint | None:
-    """Stable periodic state from a motion that has settled."""
+    """Stable periodic state from a motion that has relaxed."""
     balance = Balance.frozen(joint, history, wear_depth)
-    result = solve_balance(balance, predicted, solver, case.settings.tolerance, effort, 10)
+    result = solve_balance(balance, predicted, solver, case.settings.tolerance, effort, CONTINUATION.near_iterations)
     if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
         return None
     return PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
 
 
 def _change(before: Motion, after: Motion) -> float:
-    """Change of the vibration over the larger one of both."""
+    """Change of the vibrating amplitudes over the larger ones of two motions."""
     one, other = before.displacement[1:], after.displacement[1:]
     size = max(float(np.linalg.norm(one)), float(np.linalg.norm(other)))
     return float(np.linalg.norm(other - one)) / size if size > 0.0 else 0.0

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.continuation.arc_length import JUMP, follow_arc
+from solver.continuation.arc_length import follow_arc
 from solver.continuation.natural import follow_naturally
-from solver.continuation.transient import settle
+from solver.continuation.options import CONTINUATION
+from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -103,11 +104,11 @@ class Route:
         beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
         joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
         unworn = np.zeros(self.case.model.contact.n_contact)
-        why, found = settle(self.case, joint, unworn, end.evaluation, before, end.history, solver, effort)
+        why, found = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, solver, effort)
         if found is None:
             return why
         landed = PathPoint(beyond, found.evaluation, found.history)
-        if vibration_change(end.evaluation, found.evaluation) <= JUMP:
+        if vibration_change(end.evaluation, found.evaluation) <= CONTINUATION.smooth_change:
             return Step(landed)
         # an arc that broke off behind the fold has found it all the same
         return Step(

@@ -2,9 +2,10 @@
 
 Over two periods T = 2 pi / w of the excitation a state is the same series with the fundamental w / 2, its harmonics the
 even ones. A disturbance with a multiplier beyond -1 changes its sign from one period to the next: it is a series of
-the odd ones. A shift by T leaves the state as it is, so the Jacobian of the balance over two periods couples no even harmonic
-with an odd one, and the determinant of its odd part is that of Hill's equation at the multiplier -1. As in `hill` its
-sign is that of the joint that is open all over where no multiplier lies beyond -1; each one that does changes it.
+the odd ones. A shift by T leaves the state as it is, so the Jacobian of the balance over two periods couples no even
+harmonic with an odd one, and the determinant of its odd part is that of Hill's equation at the multiplier -1. As in
+`hill` its sign is that of the joint that is open all over where no multiplier lies beyond -1; each one that does
+changes it.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.continuation.natural import CALM
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -85,7 +85,7 @@ class AdaptiveSteps:
             if tried is not None:
                 ratio, point, error = tried
                 # down there the wear rate has a corner, or the branch ends, which shows in the vibration
-                calm = vibration_change(way.point.evaluation, point.evaluation) < CALM
+                calm = vibration_change(way.point.evaluation, point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
                     self._accept(point, length)
                     self.error = error

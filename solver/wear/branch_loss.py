@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.continuation.after_fold import landings
+from solver.continuation.after_fold import states_after_fold
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
@@ -27,7 +27,7 @@ def state_after_fold(
     """A stable state at the depths `worn` (n_contact,), m, just beyond the end of the branch of `last`; why there is
     none. Raises OutOfTimeError.
     """
-    for landed in landings(case, joint, last, worn, solver, effort):
+    for landed in states_after_fold(case, joint, last, worn, solver, effort):
         if isinstance(landed, Outcome):
             return landed
         # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch

@@ -12,7 +12,8 @@ from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.pair_error import slip_work_error
 from solver.accuracy.period_events import lacks_even
 from solver.accuracy.refinement import refine
-from solver.continuation.natural import SMALLEST_SHARE, follow_naturally
+from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
@@ -210,7 +211,7 @@ class Trajectory:
             return True
         # the end of a branch is to be known to a share of the count; in the first step to that of the step
         resolution = RESOLUTION * (self.cycle if self.cycle > 0.0 else length) / length
-        shortest = max(min(resolution, SMALLEST_SHARE), SMALLEST_RESOLUTION)
+        shortest = max(min(resolution, CONTINUATION.shortest_fraction), SMALLEST_RESOLUTION)
         last, arrived = follow_naturally(
             balance_at,
             base,

@@ -7,7 +7,7 @@ import pytest
 
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.loading_history import start_states as continuation
+from solver.loading_history import start_states
 from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray
 from solver.newton.solve_balance import Effort
@@ -29,7 +29,7 @@ SETTINGS = SolverSettings(27, 512)
 def _presented(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """States that double their period are handed out, to be looked at here."""
     if "outcome" not in request.function.__name__:
-        monkeypatch.setattr(continuation, "doubles_period", lambda *_: False)
+        monkeypatch.setattr(start_states, "doubles_period", lambda *_: False)
 
 
 def start_of(scene: Scene) -> StartState:
@@ -138,7 +138,7 @@ def test_the_outcome_says_so() -> None:
 def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = drawn("impact", 17)
     with monkeypatch.context() as presented:
-        presented.setattr(continuation, "doubles_period", lambda *_: False)
+        presented.setattr(start_states, "doubles_period", lambda *_: False)
         start = start_of(scene)
     assert start.outcome is Outcome.CONVERGED
     history = march_wear(scene.model, 0.0, start, 1.0, 1.0, "implicit", np.zeros(1), SETTINGS)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.transient import settle
+from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.linear_solver import JacobianSolver
@@ -106,7 +106,7 @@ def test_the_structure_settles_to_the_state_that_the_balance_has(nodal_diameter:
     outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Effort())
     assert outcome is Outcome.CONVERGED
     assert rest is not None
-    outcome, settled = settle(
+    outcome, settled = relax_to_periodic(
         case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Effort()
     )
     assert outcome is Outcome.CONVERGED

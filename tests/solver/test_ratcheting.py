@@ -1,4 +1,4 @@
-"""Marched masses that creep come to rest, and what a state without creep is worth."""
+"""Ratcheting of marched masses ends in shakedown, and what a state without it is worth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from solver.accuracy.certificate import certify
 from solver.accuracy.level import Level
-from solver.continuation.ratcheting import creep_work, creeps, rest_masses
+from solver.continuation.ratcheting import ratcheting_work, ratchets, shake_down
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
@@ -29,8 +29,8 @@ def started(seed: int) -> StartState:
     return next(follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings()))[1]
 
 
-def creeping(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoint]:
-    """The first state that is refined at the frequency of the scene, before anything is done about its creep."""
+def ratcheting(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoint]:
+    """The first state that is refined at the frequency of the scene, before its masses shake down."""
     seen: list[tuple[Joint, PathPoint]] = []
 
     def note(level: Level, _: Effort) -> Level:
@@ -45,39 +45,39 @@ def creeping(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoi
 
 
 def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.MonkeyPatch) -> None:
-    joint, point = creeping(SHAKEN_DOWN, monkeypatch)
-    assert creep_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
+    joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
+    assert ratcheting_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
     assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
-    rested = rest_masses(joint, point, 1e-3, TOLERANCE, Effort())
-    assert rested.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
-    assert rested.evaluation.scaled_residual() <= TOLERANCE
-    assert certify(joint, rested.evaluation).holds(TOLERANCE)
+    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Effort())
+    assert shaken.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
+    assert shaken.evaluation.scaled_residual() <= TOLERANCE
+    assert certify(joint, shaken.evaluation).holds(TOLERANCE)
 
 
 def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    joint, point = creeping(SLIDING_ON, monkeypatch)
-    rested = rest_masses(joint, point, 1e-3, TOLERANCE, Effort())
-    assert not creeps(joint, rested.evaluation, 1e-3)
-    assert rested.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
+    joint, point = ratcheting(SLIDING_ON, monkeypatch)
+    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Effort())
+    assert not ratchets(joint, shaken.evaluation, 1e-3)
+    assert shaken.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
     # the next state starts from where this one stays
-    again = rest_masses(joint, rested, 1e-3, TOLERANCE, Effort())
-    assert again is rested
-    middle = rested.evaluation.displacement_h[:, 1:, 0] - rested.evaluation.history
-    moved = np.abs(rested.evaluation.displacement_h[:, 1:, 1:]).max()
+    again = shake_down(joint, shaken, 1e-3, TOLERANCE, Effort())
+    assert again is shaken
+    middle = shaken.evaluation.displacement_h[:, 1:, 0] - shaken.evaluation.history
+    moved = np.abs(shaken.evaluation.displacement_h[:, 1:, 1:]).max()
     assert np.abs(middle[joint.penalty.inertial]).max() < 0.1 * moved
 
 
 @pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
-def test_states_whose_slip_was_creep_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert started(seed).outcome is Outcome.CONVERGED
     if seed != SHAKEN_DOWN:
-        # without rest it tries all harmonics in vain, for minutes
+        # without shakedown it tries all harmonics in vain, for minutes
         return
     monkeypatch.setattr(Level, "at_rest", lambda level, _: level)
     assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
 
 
-def test_wear_of_other_harmonics_is_not_that_of_creep_to_where_they_rest() -> None:
+def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position() -> None:
     # at rest with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     start = started(710)
     assert start.outcome is Outcome.CONVERGED

@@ -1,4 +1,4 @@
-"""States led to more harmonics: the ends of the way, and what is found along it."""
+"""Harmonics added by homotopy: its ends, and the states that it finds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from solver.accuracy import refinement as adapt
 from solver.accuracy.level import Level
-from solver.continuation.harmonic_homotopy import _compliances, _Way, lead_to, start_with_tail
+from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances, start_with_tail
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.loading_history.start_states import follow_branch
@@ -35,21 +35,22 @@ def states() -> list[tuple[Case, float, float, PathPoint]]:
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_the_way_begins_at_the_state_and_ends_at_the_balance(which: int) -> None:
+def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     joint = replace(case, resolution=RICH).joint(omega, amplitude)
     new = np.arange(5, 9)
-    way = _Way(joint, point.evaluation.history, point.evaluation.wear_depth, new, *_compliances(joint, new))
+    at = point.evaluation
+    homotopy = HarmonicHomotopy(joint, at.history, at.wear_depth, new, *compliances(joint, new))
     start = change_orders(point.evaluation.predicted_h, case.resolution.orders, RICH.orders)
-    assert way.at(0.0, point.history).evaluate(start).scaled_residual() <= 2e-8
-    assert way.at(1.0, point.history).joint.structure is joint.structure
-    nearly = way.at(1.0 - 1e-9, point.history).evaluate(start).residual
-    whole = way.at(1.0, point.history).evaluate(start).residual
+    assert homotopy.at(0.0, point.history).evaluate(start).scaled_residual() <= 2e-8
+    assert homotopy.at(1.0, point.history).joint.structure is joint.structure
+    nearly = homotopy.at(1.0 - 1e-9, point.history).evaluate(start).residual
+    whole = homotopy.at(1.0, point.history).evaluate(start).residual
     assert nearly == pytest.approx(whole, rel=1e-5, abs=1e-6 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_state_is_led_to_the_one_that_a_warm_start_finds(which: int) -> None:
+def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
     led = Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
@@ -57,7 +58,7 @@ def test_a_state_is_led_to_the_one_that_a_warm_start_finds(which: int) -> None:
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(led.case, omega, amplitude, led.point)
     assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
-    along = lead_to(case, case.joint(omega, amplitude), point.evaluation, RICH, Effort())
+    along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Effort())
     assert along is not None
     assert along.scaled_residual() <= case.settings.tolerance
 

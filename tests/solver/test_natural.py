@@ -8,8 +8,9 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import ARC_FAILURES, ARC_ITERATIONS, ARC_STEPS, follow_arc
+from solver.continuation.arc_length import follow_arc
 from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -135,7 +136,8 @@ def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> Non
     effort = Effort()
     result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, effort)
     assert result.point is None
-    assert effort.iterations <= (ARC_STEPS + ARC_FAILURES) * ARC_ITERATIONS
+    attempts = CONTINUATION.arc_steps + CONTINUATION.arc_failures
+    assert effort.iterations <= attempts * CONTINUATION.arc_iterations
 
 
 def test_history_is_handed_on_or_kept() -> None:

@@ -1,0 +1,184 @@
+"""Homotopies to states that Newton's method does not find at once: in the friction coefficient, in the harmonics.
+
+*Friction.* A static state under little friction is found from nothing: where a pair slips its force is bound to the
+normal one. With a friction coefficient of 2 and more most pairs stick, and the first iterations do not show which of
+them slip, and in which direction: they cycle among sets of slipping pairs, or end in one of several states that exist
+then. With less friction the joint has one state, found in a few iterations. From there the friction coefficient is
+raised in steps of its logarithm: pairs stop slipping one by one, and the limit is the structure with its closed pairs
+glued.
+
+*Harmonics.* A balance of H harmonics is the one of more harmonics in which the new ones take the contact force up
+exactly as the penalty E_n does: with the compliance G_n = 1 / Z_n replaced by 1 / E_n the predicted forces
+(1 - E_n G_n) lambda_n that were left out are zero (`solver.structure.penalty`). So with
+
+    G_n(s) = (1 - s) / E_n + s G_n
+
+for the new harmonics the known state is a solution at s = 0, and the state with all of them the one at s = 1; in
+between the predicted forces that were left out grow from nothing. The compliance is interpolated, since the stiffnesses
+of an elastic joint and of a mass have opposite signs: interpolated stiffnesses would pass through a resonance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.prolongation import carried_history
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.settings import Resolution
+from solver.structure.fourier import build_basis, change_orders, to_complex
+from solver.structure.joint import Case, Joint
+
+
+def solve_from_less_friction(
+    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, effort: Effort
+) -> PathPoint | None:
+    """State of a balance, by a homotopy from less friction where there is much or Newton's method fails.
+
+    The history of the balance is held: the states on the homotopy are no states of the joint.
+
+    Parameters
+    ----------
+    balance : Balance
+        The problem.
+    start : array (n_rel, m)
+        Predicted force to begin with, N.
+    solver, tolerance, effort
+        As in `solve_balance`.
+
+    Returns
+    -------
+    PathPoint or None
+        The parameter of the point is the friction coefficient. None where no state is found.
+    """
+    target = balance.joint.friction_coefficient
+
+    def balance_at(logarithm: float, _: FloatArray) -> Balance:
+        friction = target if logarithm == 0.0 else target * float(np.exp(logarithm))
+        return replace(balance, joint=replace(balance.joint, friction_coefficient=friction))
+
+    friction = min(target, CONTINUATION.moderate_friction)
+    for _ in range(CONTINUATION.friction_attempts):
+        logarithm = float(np.log(friction / target)) if friction < target else 0.0
+        less = balance_at(logarithm, balance.history)
+        result = solve_balance(less, start, solver, tolerance, effort, CONTINUATION.cold_iterations)
+        if result.converged:
+            lower = PathPoint(logarithm, result.evaluation, balance.history)
+            point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, effort, keep_history=True)
+            if arrived:
+                return PathPoint(target, point.evaluation, point.history)
+        friction *= CONTINUATION.friction_reduction
+    return None
+
+
+def add_harmonics(
+    case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, effort: Effort
+) -> Evaluation | None:
+    """State with more harmonics, by a homotopy in their compliance.
+
+    Parameters
+    ----------
+    case, joint, evaluation : Case, Joint, Evaluation
+        The known state.
+    resolution : Resolution
+        All its harmonics and new ones, and at least as many samples.
+    effort : Effort
+        Where Newton iterations are counted.
+
+    Returns
+    -------
+    Evaluation or None
+        With the penalty of `case`: the state is still to be transferred to the penalty of its own harmonics. None where
+        the homotopy does not reach its end.
+    """
+    tolerance = case.settings.tolerance
+    finer = replace(case, resolution=resolution).joint(joint.omega, joint.excitation_amplitude)
+    new = np.flatnonzero(~np.isin(resolution.orders, case.resolution.orders))
+    homotopy = HarmonicHomotopy(finer, evaluation.history, evaluation.wear_depth, new, *compliances(finer, new))
+    start = change_orders(evaluation.predicted_h, case.resolution.orders, resolution.orders)
+    first = homotopy.at(0.0, evaluation.history)
+    result = solve_balance(first, start, JacobianSolver(), tolerance, effort)
+    if not result.converged:
+        return None
+    point = PathPoint(0.0, result.evaluation, evaluation.history)
+    last, arrived = follow_naturally(homotopy.at, point, 1.0, JacobianSolver(), tolerance, effort, keep_history=True)
+    return last.evaluation if arrived else None
+
+
+def start_with_tail(
+    joint: Joint, evaluation: Evaluation, old: tuple[int, ...], inertial: BoolArray | None = None
+) -> tuple[Balance, FloatArray]:
+    """Balance and predicted force (n_rel, m), N, from which a state is solved with more harmonics.
+
+    The new harmonics are those of the force samples and the motion of the structure under them: zeros would remove the
+    impacts that the samples have.
+
+    Parameters
+    ----------
+    joint : Joint
+        With all harmonics.
+    evaluation, old : Evaluation, tuple of int
+        The known state and its harmonics.
+    inertial : array (n_contact,), optional
+        As in `carried_history`, by default those of the joint.
+    """
+    history = carried_history(evaluation, old, joint.penalty.inertial if inertial is None else inertial, joint)
+    balance = Balance.frozen(joint, history, evaluation.wear_depth)
+    orders = joint.basis.orders
+    force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
+    motion_h, force_h = (
+        joint.to_relative(change_orders(part, old, orders)) for part in (evaluation.displacement_h, evaluation.force_h)
+    )
+    for place in np.flatnonzero(~np.isin(orders, old)):
+        both = slice(2 * place + 1, 2 * place + 3)
+        force_h[:, both] = force[:, both]
+        amplitude = force[:, 2 * place + 1] - 1j * force[:, 2 * place + 2]
+        moved = -np.linalg.solve(joint.structure.dynamic_stiffness[place], amplitude)
+        motion_h[:, 2 * place + 1], motion_h[:, 2 * place + 2] = moved.real, -moved.imag
+    return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
+
+
+def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexArray]:
+    """Compliances 1 / E_n and G_n, (k, n_rel, n_rel), m/N, of the penalty and of the structure.
+
+    places (k,): of the harmonics among those of the joint.
+    """
+    unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
+    unit[:, :, 1::2] = 1.0
+    penalty = to_complex(joint.to_relative(joint.surplus(unit)))[:, places]
+    return np.stack([np.diag(1.0 / column) for column in penalty.T]), np.linalg.inv(
+        joint.structure.dynamic_stiffness[places]
+    ).astype(complex)
+
+
+@dataclass(frozen=True)
+class HarmonicHomotopy:
+    """Balances between the state without the new harmonics, s = 0, and that with them, s = 1.
+
+    joint: with all harmonics. history (n_contact, 2), wear_depth (n_contact,): m, held. new (k,): places of the new
+    harmonics. penalty_compliance, compliance: as `compliances` returns them.
+    """
+
+    joint: Joint
+    history: FloatArray
+    wear_depth: FloatArray
+    new: IntArray
+    penalty_compliance: ComplexArray
+    compliance: ComplexArray
+
+    def at(self, parameter: float, _: FloatArray) -> Balance:
+        """Balance at the homotopy parameter s; its history is held."""
+        structure = self.joint.structure
+        if parameter < 1.0:
+            mixed = structure.dynamic_stiffness.astype(complex)
+            mixed[self.new] = np.linalg.inv((1.0 - parameter) * self.penalty_compliance + parameter * self.compliance)
+            structure = replace(structure, dynamic_stiffness=mixed)
+        joint = replace(self.joint, structure=structure)
+        return Balance.frozen(joint, self.history, self.wear_depth)
