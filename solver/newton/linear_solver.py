@@ -1,4 +1,4 @@
-"""Newton directions: solves with the exact Jacobian, Eqs. (16)-(19).
+"""Newton directions: solves with the exact Jacobian, Eqs. (16) and (17).
 
 Directly where it is small; otherwise by GMRES, preconditioned with a factorisation that is kept from solve to solve.
 """

@@ -49,9 +49,9 @@ def test_relative_displacements_come_pair_by_pair() -> None:
         position=np.zeros((2, 3)),
         surface=("a", "b"),
     )
-    indices, slots = relative_indices(contact)
+    indices, components = relative_indices(contact)
     assert indices.tolist() == [5, 2, 0, 4]
-    assert slots.tolist() == [0, 2, 4, 5]
+    assert components.tolist() == [0, 2, 4, 5]
 
 
 @pytest.mark.parametrize("harmonic", [1, 2, 3])

@@ -50,8 +50,8 @@ def test_derivative_is_the_limit_of_differences_in_time() -> None:
     step = 1e-6  # of a period
     phase = 0.3
 
-    def value(share: float) -> float:
-        angle = 2 * np.pi * share
+    def value(fraction: float) -> float:
+        angle = 2 * np.pi * fraction
         row = [1.0, *(f(n * angle) for n in (1, 2, 3) for f in (np.cos, np.sin))]
         return float(values_h @ row)
 

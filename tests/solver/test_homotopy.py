@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy import refinement as adapt
 from solver.accuracy.level import Level
 from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances, start_with_tail
 from solver.harmonic_balance.converged import PathPoint
@@ -53,10 +52,10 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) ->
 def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
-    led = Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
-    assert led is not None
+    found = Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
+    assert found is not None
     best = solved_at(case, omega, amplitude, point, RICH)
-    ours = response(led.case, omega, amplitude, led.point)
+    ours = response(found.case, omega, amplitude, found.point)
     assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
     along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Effort())
     assert along is not None
@@ -73,17 +72,17 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
 
 
 def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, led = random_scene(THROWN_OFF), []
-    led_to = adapt.Level.led_to
+    scene, attempts = random_scene(THROWN_OFF), []
+    led_to = Level.led_to
 
-    def noted(level: adapt.Level, resolution: Resolution, effort: Effort) -> adapt.Level | None:
+    def noted(level: Level, resolution: Resolution, effort: Effort) -> Level | None:
         found = led_to(level, resolution, effort)
-        led.append(found is not None)
+        attempts.append(found is not None)
         return found
 
-    monkeypatch.setattr(adapt.Level, "led_to", noted)
+    monkeypatch.setattr(Level, "led_to", noted)
     frequencies = np.array([scene.frequency_hz])
     states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
     assert next(states)[1].outcome is Outcome.CONVERGED
-    # on the way to it warm starts fail, and states are led to more harmonics
-    assert any(led)
+    # during the sweep warm starts fail, and harmonics are added by homotopy
+    assert any(attempts)

@@ -1,16 +1,13 @@
-"""States followed along a parameter: naturally, and by arc length through a fold."""
+"""Natural continuation along a parameter, and the history that its states leave."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import follow_arc
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -71,73 +68,10 @@ def test_natural_steps_end_before_a_fold_and_say_so() -> None:
     balance_at, first, size = wall(WALL_OMEGA)
     point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Effort())
     assert not arrived
-    # the branch without impacts ends where the mass reaches the wall; 1/64 of the way is the shortest step
+    # the branch without impacts ends where the mass reaches the wall; 1/64 of the range is the shortest step
     assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
     assert point.evaluation.scaled_residual() <= TOLERANCE
     assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
-
-
-@lru_cache
-def upper_branch_size(amplitude: float) -> float:
-    """Motion on the branch with impacts, along the frequency: a way round the fold."""
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
-    idle = np.zeros(1)
-
-    def balance_at(omega: float, history: FloatArray) -> Balance:
-        return Balance.frozen(case.joint(omega, amplitude), history, idle)
-
-    found = first_point(case, 0.9, amplitude, idle)
-    point = PathPoint(0.9, found.evaluation, found.history)
-    for omega in np.linspace(0.95, WALL_OMEGA, 6):
-        point, arrived = follow_naturally(balance_at, point, float(omega), JacobianSolver(), TOLERANCE, Effort())
-        assert arrived
-    structure = case.joint(WALL_OMEGA, amplitude).structure
-    response = structure.response_h(point.evaluation.displacement_h[0, :1])
-    return float(np.hypot(response[0, 1], response[0, 2]))
-
-
-def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
-    balance_at, first, size = wall(WALL_OMEGA)
-    visited: list[float] = []
-
-    def watched(amplitude: float, history: FloatArray) -> Balance:
-        visited.append(amplitude)
-        return balance_at(amplitude, history)
-
-    start = first(0.03)
-    result = follow_arc(watched, start, 0.06, 0.03, JacobianSolver(), TOLERANCE, Effort())
-    point = result.point
-    assert point is not None
-    assert len(result.folds) == 2
-    assert result.folds[0] == pytest.approx(GRAZING, rel=0.01, abs=0.0)
-    assert point.parameter == 0.06
-    assert point.evaluation.scaled_residual() <= TOLERANCE
-    assert size(point) == pytest.approx(upper_branch_size(0.06), rel=1e-6, abs=0.0)
-    # back behind the start on the unstable branch between
-    assert min(visited) < 0.02
-
-
-def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
-    balance_at, first, _ = wall(0.9)
-    start = first(0.01)
-    natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Effort())
-    assert arrived
-    result = follow_arc(balance_at, start, 0.03, 0.02, JacobianSolver(), TOLERANCE, Effort())
-    arc = result.point
-    assert arc is not None
-    assert result.folds == ()
-    size = np.abs(natural.evaluation.force_h).max()
-    assert size > 0.001
-    assert arc.evaluation.force_h == pytest.approx(natural.evaluation.force_h, abs=1e-6 * size)
-
-
-def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
-    balance_at, first, _ = wall(0.5)
-    effort = Effort()
-    result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, effort)
-    assert result.point is None
-    attempts = CONTINUATION.arc_steps + CONTINUATION.arc_failures
-    assert effort.iterations <= attempts * CONTINUATION.arc_iterations
 
 
 def test_history_is_handed_on_or_kept() -> None:

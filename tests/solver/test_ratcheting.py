@@ -78,7 +78,7 @@ def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pyte
 
 
 def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position() -> None:
-    # at rest with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
+    # shaken down with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     start = started(710)
     assert start.outcome is Outcome.CONVERGED
     assert start.state is not None

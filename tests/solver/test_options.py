@@ -1,0 +1,44 @@
+"""Tuning constants: frozen, one instance a room, one meaning a name, each with what it is and why."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+import solver
+
+ROOT = Path(solver.__file__).parent
+ROOMS = sorted(path.parent.name for path in ROOT.glob("*/options.py"))
+
+
+def instance(room: str) -> object:
+    """The one instance in the options of a room."""
+    module = importlib.import_module(f"solver.{room}.options")
+    (found,) = (value for name, value in vars(module).items() if name.isupper() and dataclasses.is_dataclass(value))
+    return found
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_options_are_frozen_and_named_after_their_room(room: str) -> None:
+    options = instance(room)
+    assert type(options).__name__.endswith("Options")
+    for field in dataclasses.fields(options):  # type: ignore[arg-type]
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(options, field.name, 0)
+
+
+def test_no_two_options_have_one_name() -> None:
+    names = [field.name for room in ROOMS for field in dataclasses.fields(instance(room))]  # type: ignore[arg-type]
+    assert len(names) > 50
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_option_is_used_in_a_line_of_code(room: str) -> None:
+    code = "".join(path.read_text() for path in ROOT.rglob("*.py") if path.name != "options.py")
+    for field in dataclasses.fields(instance(room)):  # type: ignore[arg-type]
+        assert re.search(rf"\b[A-Z_]+\.{field.name}\b", code), field.name
