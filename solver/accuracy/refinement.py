@@ -142,7 +142,7 @@ def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint)
 def _allowed(here: Level, resolution: Resolution) -> bool:
     if not here.case.model.holds(resolution.highest):
         return False
-    most = MOST_OF_FEW if here.joint.slots.size <= NEWTON.few_displacements else MOST_UNKNOWNS
+    most = MOST_OF_FEW if here.joint.slots.size <= NEWTON.small_joint_displacements else MOST_UNKNOWNS
     if resolution.highest > MOST_HARMONICS:
         # friction alone: motions that hit something take their time in vain
         if not all(order % 2 for order in resolution.orders):

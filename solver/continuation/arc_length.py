@@ -236,7 +236,7 @@ class _Arc:
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         start = one + fraction * (other - one)
         balance: Balance = self.balance_at(target, self.history)
-        result = solve_balance(balance, start, self.solver, tolerance, effort, CONTINUATION.target_iterations)
+        result = solve_balance(balance, start, self.solver, tolerance, effort, CONTINUATION.near_iterations)
         found = result.evaluation.predicted_h
         farthest = CONTINUATION.target_distance * np.linalg.norm(other - one) + CONTINUATION.target_slack * self.size
         near = np.linalg.norm(found - start) <= farthest
@@ -253,10 +253,10 @@ class _Arc:
             places = [self.place(point.parameter, point.evaluation) for point in points]
             at = np.array([-np.linalg.norm(places[1] - places[0]), 0.0, np.linalg.norm(places[2] - places[1])])
             square, slope, _ = np.polyfit(at, [place[-1] for place in places], 2)
-            low, high = CONTINUATION.fold_reach * at[0], CONTINUATION.fold_reach * at[2]
+            low, high = CONTINUATION.vertex_reach * at[0], CONTINUATION.vertex_reach * at[2]
             vertex = float(np.clip(-0.5 * slope / square, low, high)) if square != 0.0 else 0.0
-            if abs(vertex) < CONTINUATION.fold_resolution * (at[2] - at[0]):
-                vertex = CONTINUATION.fold_offset * (at[2] if at[2] > -at[0] else at[0])
+            if abs(vertex) < CONTINUATION.vertex_resolution * (at[2] - at[0]):
+                vertex = CONTINUATION.vertex_offset * (at[2] if at[2] > -at[0] else at[0])
             other = places[2] if vertex > 0.0 else places[0]
             chord = (other - places[1]) / np.linalg.norm(other - places[1])
             added = self.step(points[1], chord, abs(vertex), tolerance, effort)

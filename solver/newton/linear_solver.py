@@ -99,7 +99,7 @@ class JacobianSolver:
 
         # a fixed start: the answer must not depend on what was computed before
         start = np.random.default_rng(0).normal(size=factor.rows.size * m)
-        return ritz_values(product, start, NEWTON.arnoldi_products)
+        return ritz_values(product, start, NEWTON.sign_products)
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():

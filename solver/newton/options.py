@@ -1,4 +1,4 @@
-"""Tuning constants of Newton's method and of its linear solvers: meaning, unit, evidence."""
+"""Tuning constants of Newton's method and of its linear solvers."""
 
 from __future__ import annotations
 
@@ -7,71 +7,77 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """Dimensionless numbers and counts; none of them changes what a converged state is, only whether it is found."""
+    """Counts and ratios; each with its meaning and the evidence for its value.
 
-    # --- iteration ---
-    # Iterations of one solve. Cold starts near a resonance take up to 40, warm ones 2 to 5 (prototypes of the solver).
+    They decide whether a state is found and at what cost, not what a converged state is.
+    """
+
+    # iteration
     iterations: int = 30
-    # Full steps in a row without a new lowest residual, after which steps are halved instead.
+    """Of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
     full_steps: int = 6
-    # Shortest halved step, over the full one.
+    """Full steps in a row without a new lowest residual, after which steps are halved instead."""
     shortest_step: float = 1.0 / 128.0
-    # Residual over the lowest one so far, from which the iteration returns to the best point at once.
+    """Of the full step: seven halvings."""
     divergence: float = 1e6
+    """Residual over the lowest one so far, from which the iteration returns to the best point at once."""
 
-    # --- GMRES and Arnoldi's method ---
-    # Relative residual of a Newton direction: each iteration gains up to three digits with it.
+    # GMRES and Arnoldi's method
     forcing: float = 1e-3
-    # Products over which the residual has to fall below `stagnation_ratio` of itself, else the cycle ends.
+    """Relative residual of a Newton direction: up to three digits are gained in an iteration."""
     stagnation_products: int = 20
+    """Products over which the residual has to fall below `stagnation_ratio` of itself, else the cycle ends."""
     stagnation_ratio: float = 0.75
-    # Singular value over the largest one: directions below it are left out of a solution that does not converge.
+    """Of the residual, see `stagnation_products`."""
     null_space: float = 1e-5
-    # Relative to the vector or to a pair that slips: less is round-off, no new direction. Accuracy is 2e-16.
+    """Singular value over the largest one: directions below it are left out of a solution that does not converge."""
     round_off: float = 1e-11
-    # Products with the Jacobian from which the sign of its determinant is judged.
-    arnoldi_products: int = 24
-    # Real part of the eigenvalues, 1 with an exact factorisation, that is taken as certainly positive.
+    """Of a vector, or of a pair that slips: less is no new direction. Double precision has 2e-16."""
+    sign_products: int = 24
+    """Products of Arnoldi's method from which the sign of a determinant is judged."""
     certain_real_part: float = 0.15
+    """Of the eigenvalues, 1 where the factorisation is exact: above it they are certainly positive."""
 
-    # --- which factorisation ---
-    # Unknowns up to which a dense factorisation of this Jacobian costs less than one iteration with a kept one.
+    # which factorisation
     dense_unknowns: int = 250
-    # Products with a kept factorisation that was exact before a new one is made: a new one takes as long.
+    """Unknowns up to which a dense factorisation of each Jacobian costs less than iterations with a kept one."""
     exact_products: int = 12
-    # The same where a new one would not be exact either.
+    """Products with a kept factorisation that was exact before a new one is made, which takes as long."""
     kept_products: int = 30
-    # The same for the march through the period: GMRES finds resonances one by one.
+    """The same where a new one would not be exact either."""
     period_products: int = 80
-    # Cycles of GMRES with a new factorisation that is not exact.
+    """The same for the march through the period: GMRES finds resonances one by one."""
     restarts: int = 6
+    """Cycles of GMRES with a new factorisation that is not exact."""
 
-    # --- slip space (slip_preconditioner) ---
-    # Relative displacements up to which a joint counts as small: impacts couple most harmonics and directions there.
-    few_displacements: int = 40
-    # Directions that are factorised with nothing left out: 48 pairs with five harmonics near a resonance have as many.
+    # slip space
+    small_joint_displacements: int = 40
+    """Relative displacements up to which a joint is small: impacts couple most harmonics and directions there."""
     exact_directions: int = 600
-    # The same of a small joint, where no other factorisation steers well.
+    """Directions factorised with nothing left out: 48 pairs with five harmonics near a resonance have as many."""
     exact_directions_of_few: int = 2500
-    # The same where the sign of the determinant is not certain otherwise.
+    """The same of a small joint, for which no other factorisation is a good preconditioner."""
     sign_directions: int = 4000
-    # Directions that are factorised where those below `partial_cutoff` of a slipping pair are left out.
+    """The same where the sign of the determinant is not certain otherwise."""
     partial_directions: int = 1000
+    """Directions factorised where those below `partial_cutoff` are left out."""
     partial_cutoff: float = 0.05
-    # Shift of all eigenvalues, 1 for a pair that sticks. A joint that slips as a whole may lie anywhere along its slip:
-    # an eigenvalue that is zero but for round-off would give the determinant any sign.
+    """Of a pair that slips, see `partial_directions`."""
     neutral_shift: float = 1e-8
+    """Shift of the eigenvalues, 1 for a pair that sticks. A joint that slips as a whole may lie anywhere along its
+    slip: an eigenvalue that is zero but for round-off would give the determinant any sign."""
 
-    # --- groups of harmonics (preconditioner) and march through the period (period_preconditioner) ---
-    # Unknowns of the lowest harmonics that are factorised together; higher ones one by one.
+    # groups of harmonics, march through the period
     low_unknowns: int = 800
-    # Periods of the march: slip forgets what was before it.
+    """Unknowns of the lowest harmonics that are factorised together; the others one by one."""
     march_periods: int = 2
-    # Difference of stiffness from that of most harmonics, over the penalty, that is taken into account.
+    """Periods of the march: slip forgets what was before it."""
     resonant_difference: float = 0.2
-    # Most such differences in a harmonic, and powers of the difference by which they are found.
+    """Of the penalty: larger differences of stiffness from that of most harmonics are taken into account."""
     resonances: int = 6
+    """Such differences in a harmonic, at most."""
     power_iterations: int = 2
+    """Powers of the difference by which they are found: its large singular values stand out."""
 
 
 NEWTON = NewtonOptions()

@@ -83,7 +83,7 @@ def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor
 
 
 def _slip_space(tangent: Linearisation) -> SlipSpace | None:
-    few = tangent.joint.slots.size <= NEWTON.few_displacements
+    few = tangent.joint.slots.size <= NEWTON.small_joint_displacements
     exact = NEWTON.exact_directions_of_few if few else NEWTON.exact_directions
     return find_slip_space(tangent, exact, NEWTON.partial_directions, NEWTON.partial_cutoff)
 

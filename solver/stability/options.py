@@ -1,4 +1,4 @@
-"""Tuning constants of the stability tests: meaning, unit, evidence."""
+"""Tuning constants of the stability tests."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class StabilityOptions:
-    """Resolution and size with which period doubling is looked for."""
+    """Resolution and size with which period doubling is looked for, with the evidence."""
 
-    # Harmonics and samples with which a state is judged at least: the sharpness of the contact decides, with fewer
-    # a stable mass at a wall is taken for one that doubles its period (tests/solver/test_period_doubling).
     doubling_harmonics: int = 19
+    """Harmonics with which a state is judged at least: the sharpness of the contact decides, and with fewer a stable
+    mass at a wall is taken for one that doubles its period."""
     doubling_samples: int = 256
-    # Unknowns of the balance over two periods, whose Jacobian is factorised as it is: an LU of 1584 takes 0.1 s.
+    """Samples of a period, at least, with so many harmonics."""
     doubling_unknowns: int = 1500
+    """Of the balance over two periods, whose Jacobian is factorised as it is: 1584 take 0.1 s."""
 
 
 STABILITY = StabilityOptions()
