@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import studyrunner.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
 
 # isort: split
 import argparse
@@ -198,9 +198,9 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
     try:
-        from studyrunner.mpi.version_check import call_roll
+        from studyrunner.mpi.version_check import check_versions
 
-        call_roll(ranks)
+        check_versions(ranks)
         options = parse_options(arguments)
         from studyrunner.study.study_file import read_study
 
@@ -226,9 +226,9 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.mpi.version_check import answer_roll_call
+    from studyrunner.mpi.version_check import report_version
 
-    answer_roll_call(ranks)
+    report_version(ranks)
     job = wait_for_message(ranks)
     if job is not None:
         from studyrunner.run import Job, work_on_job
@@ -265,13 +265,13 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.progress import RunProgress, format_seconds
     from studyrunner.run import Interrupted, run_study
     from studyrunner.scene.scene import build_study_scene
+    from studyrunner.system.progress import ProgressDisplay, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_output("-o", path, study.files)
-    progress = RunProgress()
+    progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
     model = build_study_scene(study)
     for line in compare_with_archived(study, model):

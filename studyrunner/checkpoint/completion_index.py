@@ -19,7 +19,7 @@ MOST_OF_OTHERS = 2.0**30
 """Bytes: what other studies have left under the same name is kept up to this size."""
 
 
-class Ledger:
+class CompletionIndex:
     """Every finished history and start state of a plan, in a store that may hold them from earlier runs.
 
     What a task computes does not depend on what was there before: a run that goes on ends with the same numbers.

@@ -37,12 +37,12 @@ def describe_software() -> dict[str, str]:
     }
 
 
-def answer_roll_call(ranks: Ranks) -> None:
+def report_version(ranks: Ranks) -> None:
     """Any other rank: tells rank 0 what it runs."""
     ranks.send((platform.node(), describe_software()), 0)
 
 
-def call_roll(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
+def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
     """Rank 0: raises LauncherError where another rank runs something else, or does not answer within `seconds`.
 
     Raises KeyboardInterrupt where another rank was interrupted.

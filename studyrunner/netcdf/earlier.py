@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
-from studies.vetting import is_hdf5, vet_scene
 from studyrunner.netcdf.provenance import POINTS_LEFT
 from studyrunner.study.archive import SCENE_GROUP
 from studyrunner.user_error import UserError
@@ -19,13 +19,13 @@ def holds_finished_result(path: Path) -> bool:
     Such a file is not replaced by one with less in it. Raises UserError where it is no result of run-study at all,
     which is not replaced by anything.
     """
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
+    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
 
     try:
         if not path.exists() or path.stat().st_size == 0:
             return False
         if is_hdf5(path):
-            vet_scene(path, SCENE_GROUP, (_STUDY, POINTS_LEFT))
+            check_scene_readable(path, SCENE_GROUP, (_STUDY, POINTS_LEFT))
             with open_hdf5(path, LARGEST_RESULT) as file:
                 if read_attribute(file, _STUDY) is not None:
                     left = read_attribute(file, POINTS_LEFT)

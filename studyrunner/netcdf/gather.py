@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.checkpoint.completion_index import Ledger
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.records import empty_record, variable_sizes
 from studyrunner.checkpoint.store import Store
@@ -77,7 +77,7 @@ class _Entry:
 def gather(
     study: Study,
     facts: SceneFacts,
-    ledger: Ledger,
+    completion: CompletionIndex,
     path: Path,
     of_scene: Sequence[SceneVariable] = (),
     scene: KeptScene | None = None,
@@ -89,7 +89,7 @@ def gather(
     computed yet say so in their outcome. keep_finished: `path` holds a finished result, and is left as it is where
     points of this one are missing. Raises StorageError.
     """
-    index, gathered = _read_through(study, facts, ledger)
+    index, gathered = _read_through(study, facts, completion)
     left = gathered.outcomes[NOT_COMPUTED]
     if left and keep_finished:
         return gathered
@@ -97,8 +97,8 @@ def gather(
         with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
-            _write_values(file, study, facts, ledger.store, index)
-            _write_scene(file, study, ledger.store, of_scene)
+            _write_values(file, study, facts, completion.store, index)
+            _write_scene(file, study, completion.store, of_scene)
             _write_coordinates(file, study, facts)
             if scene is not None:
                 write_scene_group(file, scene)
@@ -108,7 +108,7 @@ def gather(
     return gathered
 
 
-def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Index, Gathered]:
+def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[_Index, Gathered]:
     """Reads every file once, piece by piece: where each point is, how it ended, and the table.
 
     A record that is not the one that is asked for, as another run may have changed its file, leaves its points out.
@@ -117,20 +117,20 @@ def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Ind
     n_points = math.prod(shape)
     index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
     found: dict[int, list[_Entry]] = {}
-    for march in itertools.chain.from_iterable(ledger.plan.marches):
-        for key, share, place in zip(ledger.histories(march), march.shares, ledger.places(march), strict=True):
+    for march in itertools.chain.from_iterable(completion.plan.marches):
+        for key, share, place in zip(completion.histories(march), march.shares, completion.places(march), strict=True):
             if place is not None:
                 found.setdefault(place[0], []).append(_Entry(place[1], key, share.points))
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
     changed: list[str] = []
-    at_once = max(1, int(_BYTES_A_SLAB // ledger.store.kind.itemsize))
+    at_once = max(1, int(_BYTES_A_SLAB // completion.store.kind.itemsize))
     for number, entries in found.items():
         entries.sort(key=lambda entry: entry.row)
         for first in range(0, len(entries), at_once):
-            there, records = _read_entries(ledger.store, number, entries[first : first + at_once])
+            there, records = _read_entries(completion.store, number, entries[first : first + at_once])
             if len(there) < len(entries[first : first + at_once]):
-                changed.append(ledger.store.path(number).name)
+                changed.append(completion.store.path(number).name)
             for outcome, entry in zip(records["outcome"].tolist(), there, strict=True):
                 outcomes[outcome] += len(entry.points)
                 at = np.ravel_multi_index(np.transpose(entry.points), shape)
@@ -139,8 +139,8 @@ def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Ind
                 collected.add([entry.points for entry in there], records)
     outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
     lost = [
-        f"{name} in {ledger.store.folder.name} does not hold any more what this run has written there: its points are"
-        " not computed, the same command goes on"
+        f"{name} in {completion.store.folder.name} does not hold any more what this run has written there:"
+        " its points are not computed, the same command goes on"
         for name in dict.fromkeys(changed)
     ]
     return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))

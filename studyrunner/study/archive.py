@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studies.sandboxed_read import check_result_readable, check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
-from studies.vetting import is_hdf5, vet_result, vet_scene
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -52,10 +52,10 @@ class Archived:
 
 def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file, called `name` by the user. Raises UserError."""
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5
+    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
 
     try:
-        vet_scene(path, SCENE_GROUP, _ATTRIBUTES)
+        check_scene_readable(path, SCENE_GROUP, _ATTRIBUTES)
         with open_hdf5(path, LARGEST_RESULT) as file:
             found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
             if not found["study"]:
@@ -77,7 +77,7 @@ def check_result_file(path: Path, name: str) -> None:
             raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
         if not path.is_file() or not is_hdf5(path):
             raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
-        vet_result(path)
+        check_result_readable(path)
     except SceneError as error:
         where = "the file" if error.key == "model" else error.key
         raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
@@ -87,7 +87,7 @@ def check_result_file(path: Path, name: str) -> None:
 
 
 def _read_text(file: h5py.File, name: str) -> str:
-    from studies.hdf5_guard import read_attribute
+    from studies.guards.hdf5_guard import read_attribute
 
     value = read_attribute(file, name)
     if value is None:

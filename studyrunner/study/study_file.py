@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
-from studies.vetting import is_hdf5, vet_scene
 from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file
@@ -208,7 +208,7 @@ def _find_scene(model: str, source: str, path: Path, archived: Archived | None) 
             raise UserError(source, "scene.model", model, remedy)
     with scene_errors(source, scene_path):
         if not group:
-            vet_scene(scene_path)
+            check_scene_readable(scene_path)
         offers = ("mesh",) if has_mesh(scene_path, group) else ()
     return {"path": scene_path, "group": group, "offers": offers}
 

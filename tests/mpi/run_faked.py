@@ -28,13 +28,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner import progress, run
+from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.mpi.launcher import launcher_rank
 from studyrunner.plan.results import Kept, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
+from studyrunner.system import progress
 from tests.studyrunner.fakes import fake_branch, fake_evaluate
 
 BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)

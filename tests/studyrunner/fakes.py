@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.checkpoint.completion_index import Ledger
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.course import start_marches
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Kept, MarchResult, StartResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
+from studyrunner.task_progress import start_marches
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(
@@ -115,29 +115,29 @@ def without_values(result: MarchResult, outcome: int) -> MarchResult:
     return replace(result, outcome=outcome, values=values, **nothing)
 
 
-def open_ledger(
+def open_completion(
     study: Study, plan: TaskPlan, folder: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
-) -> Ledger:
+) -> CompletionIndex:
     """What is in the folder of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
+    completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
     if fresh:
-        ledger.forget_all()
-    return ledger
+        completion.forget_all()
+    return completion
 
 
-def fake_ledger(
+def fake_completion(
     study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path, facts: SceneFacts = FACTS
-) -> Ledger:
+) -> CompletionIndex:
     """The folder of a run that had these results and no others, some in a file."""
     marches = march_of_points(plan)
-    ledger = open_ledger(study, plan, folder, facts, fresh=True)
+    completion = open_completion(study, plan, folder, facts, fresh=True)
     for place, result in enumerate(results):
-        ledger.add_history(marches[result.points], result)
+        completion.add_history(marches[result.points], result)
         if place % 3 == 0:
-            ledger.store.flush()
-    ledger.store.flush()
-    return ledger
+            completion.store.flush()
+    completion.store.flush()
+    return completion
 
 
 def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:

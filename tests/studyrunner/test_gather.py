@@ -25,7 +25,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger, fake_march, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_march, fake_starts, without_values
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -49,9 +49,9 @@ def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gather
     """The file of a run of the study with these results."""
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
-    ledger = fake_ledger(study, plan, results, parts_folder(path))
-    with contextlib.closing(ledger.store):
-        return gather.gather(study, FACTS, ledger, path)
+    completion = fake_completion(study, plan, results, parts_folder(path))
+    with contextlib.closing(completion.store):
+        return gather.gather(study, FACTS, completion, path)
 
 
 @pytest.fixture
@@ -330,9 +330,9 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    ledger = fake_ledger(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
-    with contextlib.closing(ledger.store):
-        gather.gather(study, FACTS, ledger, tmp_path / "dovetail.nc")
+    completion = fake_completion(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
+    with contextlib.closing(completion.store):
+        gather.gather(study, FACTS, completion, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
 

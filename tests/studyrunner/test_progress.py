@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from studyrunner import progress, run
+from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.plan.results import Kept, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.progress import RunProgress, Standing
 from studyrunner.scene.scene import describe_scene
+from studyrunner.system import progress
+from studyrunner.system.progress import ProgressDisplay, Standing
 from tests.studyrunner.fakes import fake_evaluate
 
 LINE = re.compile(
@@ -39,7 +40,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     found = Clock()
-    monkeypatch.setattr("studyrunner.progress.time.monotonic", found)
+    monkeypatch.setattr("studyrunner.system.progress.time.monotonic", found)
     return found
 
 
@@ -50,7 +51,7 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
         looks.append(clock.now)
         return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("marching")
         shown.begin_tasks()
         for tenth in range(36_000):
@@ -67,7 +68,7 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
 
 
 def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("finding the natural frequencies")
         clock.now += 300.0
         shown.begin_tasks()
@@ -102,7 +103,7 @@ def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, caps
         return Standing(5, 20, 30.0, ("210 Hz implicit",))
 
     monkeypatch.setattr(progress, "Console", lambda **_: Console(file=screen, force_terminal=True, width=160))
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("marching")
         shown.begin_tasks()
         for _ in range(1000):

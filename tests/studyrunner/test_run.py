@@ -21,9 +21,9 @@ from studyrunner.cli import main
 from studyrunner.evaluate import _solver_settings, build_result
 from studyrunner.plan.results import Kept, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
-from studyrunner.progress import format_seconds
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
+from studyrunner.system.progress import format_seconds
 from studyrunner.variables import ASKED
 from tests.studyrunner.fakes import fake_evaluate, without_values
 from tests.studyrunner.histories import history
@@ -116,7 +116,7 @@ def test_unexpected_failure_keeps_the_old_file(
     earlier = (folder / "out.nc").read_bytes()
     shutil.rmtree(folder / "out.nc.parts")
     with monkeypatch.context() as broken:
-        broken.setattr(run.Course, "take", fail)
+        broken.setattr(run.TaskProgress, "take", fail)
         assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_bytes() == earlier

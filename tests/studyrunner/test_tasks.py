@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.course import start_marches
 from studyrunner.plan.estimate import AUTOMATIC_HARMONICS
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import Settings, TaskPlan, build_tasks
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
+from studyrunner.task_progress import start_marches
 from studyrunner.variables import CERTIFICATE
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")

@@ -2,7 +2,8 @@
 
 Nothing out of the file is followed: external, soft and user-defined links, external storage and virtual datasets are
 refused, and so are types other than numbers and text, filters that need a plug-in, and sizes that the file itself does
-not account for. What the library makes of damaged bytes is found out by a process of its own, see `studies.vetting`.
+not account for. What the library makes of damaged bytes is found out by a process of its own, see
+`studies.sandboxed_read`.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class Standing:
         return ", ".join(parts)
 
 
-class RunProgress:
+class ProgressDisplay:
     """What the user sees while a study runs. Only rank 0 has one."""
 
     def __init__(self) -> None:
