@@ -1,24 +1,23 @@
-"""Task -> result: the only importer of the solver."""
+"""Task -> result: the only place from which the solver computes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
-from solver.packing import Packed
+from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution, SolverSettings
-from studyrunner.checkpoint.records import failed_result
+from solver.settings import Resolution
 from studyrunner.plan.places import describe_reach, known_to, show_count
-from studyrunner.plan.results import Kept, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, Settings
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import AUTO
 from studyrunner.system.machine_faults import (
     MachineFaultError,
@@ -26,6 +25,7 @@ from studyrunner.system.machine_faults import (
     is_fault_of_machine,
     tells_of_machine,
 )
+from studyrunner.variables import KEPT
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,6 @@ INACCURATE, SENSITIVE = int(Outcome.INACCURATE), int(Outcome.SENSITIVE)
 COMPLETE = frozenset(int(outcome) for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to their last cycle."""
 
-Keep = Callable[[Kept], None]
-"""Takes note of how far a task is."""
-
 _ROUND_OFF = 1e-10
 
 
@@ -54,9 +51,7 @@ def endings() -> tuple[Ending, ...]:
     return tuple(Ending(int(outcome), outcome.meaning, outcome.sentence) for outcome in sorted(Outcome))
 
 
-def build_evaluator(
-    model: ReducedModel, friction_coefficient: float
-) -> Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]:
+def build_evaluator(model: ReducedModel, friction_coefficient: float) -> Evaluate:
     """The function that does the tasks of a study on this model and gives their results one by one."""
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -73,7 +68,6 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
     """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.loading_history.start_states import follow_branch
-    from solver.packing import pack
 
     wanted = sorted(task.order_left)
     branch = follow_branch(
@@ -83,17 +77,16 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
         # no state depends on those that are known
         np.array([task.frequencies[position] for position in wanted]),
         cast("Literal['up', 'down', 'ramp']", task.sweep),
-        _solver_settings(task.settings),
-        keep=lambda progress: keep(Kept(progress.text, progress.arrays)),
-        resume=_packed(task.resume),
+        task.settings,
+        keep=keep,
+        resume=task.resume,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
         _raise_fault(start)
-        packed = pack(start)
-        yield StartResult(wanted[place], Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
+        yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
 
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
@@ -101,8 +94,6 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 
     A fault of the machine is no result of the task: what it owes is not computed, and may be tried again.
     """
-    from solver.packing import pack
-
     lost = is_fault_of_machine(error)
     message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
     if isinstance(task, MarchTask):
@@ -111,10 +102,8 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
         return
     nan = math.nan
     start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
-    packed = pack(start)
     for position in [place for place in task.order if place not in task.known][n_given:]:
-        kept = Kept(packed.text, packed.arrays)
-        yield StartResult(position, kept, moves=False, n_unknowns=0, lost=message if lost else "")
+        yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
@@ -125,7 +114,7 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
     """
     reached = task.resume
 
-    def note(progress: Kept) -> None:
+    def note(progress: Packed) -> None:
         nonlocal reached
         reached = progress
         keep(progress)
@@ -144,10 +133,9 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
 
 def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its shares is read."""
-    from solver.packing import unpack
     from solver.wear.march import march_wear
 
-    start = None if task.start is None else unpack(Packed(task.start.text, task.start.arrays))
+    start = None if task.start is None else unpack(task.start)
     if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
     # The march begins at cycle 0, whether that count is kept or not.
@@ -160,11 +148,11 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         task.step,
         cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
         counts,
-        _solver_settings(task.settings),
+        task.settings,
         largest_depth=task.largest_depth,
         loops=task.loops,
-        keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
-        resume=_packed(task.resume),
+        keep=keep,
+        resume=task.resume,
     )
     _raise_fault(history)
     return history
@@ -188,7 +176,6 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     rows = np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
-    values = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
     jump = history.jump_cycle
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
@@ -199,23 +186,18 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
     errors, depths = history.worn_volume_error[known], history.wear_depth[known]
-    return MarchResult(
-        points=share.points,
-        outcome=int(outcome),
-        values=values,
-        jump_cycle=jump,
-        error_estimate=float(errors[-1]) if known.size else math.nan,
-        newton_iterations=history.newton_iterations,
-        run_time=history.run_time,
-        branch=history.branch,
-        fold_frequency=history.fold_frequency,
-        step_limit=history.step_limit / slower,
-        oscillates=history.oscillates,
-        last_cycle=last,
-        largest_wear_depth=float(depths.max(initial=0.0)) if known.size else math.nan,
-        message=_message(task, history, outcome, place, slower, known, last),
-        share=place,
-    )
+    of_share: dict[str, Any] = {
+        "outcome": int(outcome),
+        "jump_cycle": jump,
+        "error_estimate": float(errors[-1]) if known.size else math.nan,
+        "step_limit": history.step_limit / slower,
+        "last_cycle": last,
+        "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
+        "message": _message(task, history, outcome, place, slower, known, last),
+    }
+    of_march = {name: getattr(history, name) for name in KEPT if name not in of_share}
+    variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
+    return MarchResult(share.points, {**variables, **of_march, **of_share}, place)
 
 
 def share_outcome(
@@ -309,13 +291,3 @@ def _moves(start: StartState) -> bool:
         return False
     motion_h = start.state.displacement_h
     return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))
-
-
-def _solver_settings(settings: Settings) -> SolverSettings:
-    # "auto" goes through as it is: the solver has to know it.
-    limit = settings.time_limit
-    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol, limit)
-
-
-def _packed(kept: Kept | None) -> Packed | None:
-    return None if kept is None else Packed(kept.text, kept.arrays)

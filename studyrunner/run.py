@@ -15,8 +15,6 @@ from studyrunner.evaluate import COMPLETE, CRASHED, NOT_COMPUTED, build_evaluato
 from studyrunner.mpi.crashes import (
     MOST_DEATHS,
     Crash,
-    Evaluate,
-    Keep,
     count_crashes,
     forget_crashes,
     note_tasks,
@@ -27,7 +25,7 @@ from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
 from studyrunner.netcdf.earlier import holds_finished_result
 from studyrunner.netcdf.output import parts_folder, remove_leftovers
 from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.results import MarchResult, StartResult
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 from studyrunner.scene.scene import describe_scene, scene_to_keep
 from studyrunner.scene.variables import build_scene_variables

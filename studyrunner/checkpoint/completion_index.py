@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from studyrunner.checkpoint.records import failed_result, pack
+from solver.packing import Packed
+from studyrunner.checkpoint.records import pack
 from studyrunner.checkpoint.shelf import Place
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
-from studyrunner.plan.results import Kept, MarchResult, StartResult, read_start
+from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 
 MOST_OF_OTHERS = 2.0**30
@@ -89,7 +90,7 @@ class CompletionIndex:
         """Start states of a branch that are known and from which there is something to march."""
         keys, needed = self._starts[branch.number], self._needed(branch)
         return [
-            read_start(place, self.store.read_start(key))
+            unpack_start(place, self.store.read_start(key))
             for place, key in enumerate(keys)
             if place in needed and self.store.has_start(key)
         ]
@@ -114,7 +115,7 @@ class CompletionIndex:
 
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
         """A start state has come."""
-        self.store.add_start(self._starts[branch.number][result.position], result.keep())
+        self.store.add_start(self._starts[branch.number][result.position], result.pack())
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """A history has come."""
@@ -126,7 +127,7 @@ class CompletionIndex:
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """A task says how far it is."""
-        if not isinstance(progress, Kept):
+        if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
         self.store.keep_progress(self.key(task), progress)
 
@@ -137,7 +138,7 @@ class CompletionIndex:
             without_state = {
                 place
                 for place, key in enumerate(keys)
-                if self.store.has_start(key) and read_start(place, self.store.read_start(key)).failed
+                if self.store.has_start(key) and unpack_start(place, self.store.read_start(key)).failed
             }
             for place in without_state:
                 self.store.forget_start(keys[place])

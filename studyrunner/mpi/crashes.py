@@ -15,19 +15,13 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.files import NotPlainError, create, open_plain, sync_folder
-
-Keep = Callable[[Kept], None]
-"""Takes note of how far a task is."""
-
-Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]
-"""Does a task: gives its results one by one, and hands over now and then how far it is."""
 
 MOST_DEATHS = 2
 """A task that has ended so many processes is not tried again."""

@@ -12,7 +12,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from studyrunner.study.study import AUTO, Automatic, Study
+from solver.settings import Automatic
+from studyrunner.study.study import AUTO, Study
 
 Index = tuple[int, ...]
 Choice = tuple[int, int, int]

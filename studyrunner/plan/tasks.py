@@ -8,6 +8,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from solver.packing import Packed
+from solver.settings import Automatic, SolverSettings
 from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
@@ -16,7 +18,6 @@ from studyrunner.plan.estimate import (
     iterations_of_march,
     seconds_an_iteration,
 )
-from studyrunner.plan.results import Kept
 from studyrunner.plan.sharing import (
     Alike,
     Choice,
@@ -28,7 +29,7 @@ from studyrunner.plan.sharing import (
     rtol_is_idle,
     share_histories,
 )
-from studyrunner.study.study import AUTO, SOLVER_AXES, Automatic, Study
+from studyrunner.study.study import AUTO, SOLVER_AXES, Study
 from studyrunner.variables import ASKED, CERTIFICATE, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
@@ -36,17 +37,6 @@ BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 
 _NEIGHBOURS = 4  # frequencies whose marches take about as long
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Solver keys of a task."""
-
-    harmonics: int | Automatic
-    samples: int | Automatic
-    tolerance: float
-    rtol: float
-    time_limit: float
 
 
 @dataclass(frozen=True)
@@ -62,11 +52,11 @@ class BranchTask:
     number: int
     excitation_amplitude: float
     sweep: str
-    settings: Settings
+    settings: SolverSettings
     frequencies: tuple[float, ...]
     cost: float
     known: frozenset[int] = frozenset()
-    resume: Kept | None = field(default=None, compare=False, repr=False)
+    resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
 
     @property
@@ -118,7 +108,7 @@ class MarchTask:
     number: int
     branch: int
     position: int
-    settings: Settings
+    settings: SolverSettings
     scheme: str
     largest_depth: float | None
     shares: tuple[Share, ...]
@@ -129,8 +119,8 @@ class MarchTask:
     cost: float
     n_unknowns: int
     moves: bool = True
-    start: Kept | None = field(default=None, compare=False, repr=False)
-    resume: Kept | None = field(default=None, compare=False, repr=False)
+    start: Packed | None = field(default=None, compare=False, repr=False)
+    resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
 
     @property
@@ -280,9 +270,9 @@ def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
             yield from ((one,) for one in lines)
 
 
-def _settings(study: Study, line: Index) -> Settings:
+def _settings(study: Study, line: Index) -> SolverSettings:
     harmonics, samples, tolerance, rtol = line[2:]
-    return Settings(
+    return SolverSettings(
         harmonics=study.harmonics[harmonics],
         samples=study.samples[samples],
         tolerance=study.tolerance[tolerance],

@@ -11,6 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
+from solver.settings import Automatic, Scheme
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
     axis_of,
@@ -26,7 +27,6 @@ from studyrunner.study.values import (
 from studyrunner.user_error import WrongValueError
 from studyrunner.variables import ASKED, KEPT, SCENE
 
-Automatic = Literal["auto"]
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
 
@@ -50,7 +50,6 @@ NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_
 HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_harmonics))]
 SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
 FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
-Scheme = Literal["implicit", "explicit", "adaptive"]
 Sweep = Literal["up", "down", "ramp"]
 
 

@@ -168,8 +168,7 @@ def replay(
 
 
 def _history(task: MarchTask) -> MarchResult:
-    nan = float("nan")
-    return MarchResult(task.points, 0, {}, nan, nan, 0, 0.0, 0, nan, float("inf"), False, nan, nan)
+    return MarchResult(task.points, {"outcome": 0})
 
 
 def lognormal(rng: np.random.Generator, spread: float) -> float:

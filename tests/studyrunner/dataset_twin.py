@@ -47,7 +47,7 @@ def build_dataset(
             for name in loops:
                 arrays[name][point][:, list(study.outputs.loops)] = result.values[name]
             for name in KEPT:
-                arrays[name][point] = getattr(result, name)
+                arrays[name][point] = result.values[name]
     dataset = xr.Dataset(
         {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
         coords={

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.task_progress import start_marches
-from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(
     n_displacements=6,
@@ -31,13 +32,13 @@ FACTS = SceneFacts(
 )
 
 
-def no_keep(progress: Kept) -> None:
+def no_keep(progress: Packed) -> None:
     """Progress that nobody keeps."""
 
 
 def fake_evaluate(
     task: BranchTask | MarchTask,
-    keep: Callable[[Kept], None] = no_keep,
+    keep: Keep = no_keep,
     facts: SceneFacts = FACTS,
     seconds: float = 0.0,
 ) -> Iterator[StartResult | MarchResult]:
@@ -56,7 +57,7 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
     for position in task.order:
         if position not in task.known:
             start = (task.frequencies[position], task.excitation_amplitude, task.sweep == "up", *settings)
-            yield StartResult(position, Kept("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
+            yield StartResult(position, Packed("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
@@ -80,22 +81,27 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
         if ASKED[name].flags:
             values[name] = values[name] >= 0.0
         values[name] = values[name].astype(ASKED[name].dtype)
-    return MarchResult(
-        points=share.points,
-        outcome=0,
-        values=values,
-        jump_cycle=np.nan,
-        error_estimate=0.01,
-        newton_iterations=round(fingerprint),
-        run_time=pause,
-        branch=0,
-        fold_frequency=np.nan,
-        step_limit=np.inf,
-        oscillates=False,
-        last_cycle=task.cycles[-1],
-        largest_wear_depth=1e-6,
-        share=place,
-    )
+    totals = {
+        "outcome": 0,
+        "jump_cycle": np.nan,
+        "error_estimate": 0.01,
+        "newton_iterations": round(fingerprint),
+        "run_time": pause,
+        "branch": 0,
+        "fold_frequency": np.nan,
+        "step_limit": np.inf,
+        "oscillates": False,
+        "last_cycle": task.cycles[-1],
+        "largest_wear_depth": 1e-6,
+        "message": "",
+    }
+    return MarchResult(share.points, {**values, **totals}, place)
+
+
+def changed(result: MarchResult, **values: object) -> MarchResult:
+    """The result with other values of some variables."""
+    assert values.keys() <= result.values.keys()
+    return replace(result, values={**result.values, **values})
 
 
 def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
@@ -106,13 +112,20 @@ def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
                 yield task, fake_march(task, place=place)
 
 
+def totals_of(result: MarchResult, *names: str) -> list[float]:
+    """Values of some variables without further dimensions."""
+    return [result.values[name] for name in names]
+
+
 def without_values(result: MarchResult, outcome: int) -> MarchResult:
     """The result as it is where there is no state: NaN, or 0 where the variable is a whole number."""
     values = {
-        name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0) for name, array in result.values.items()
+        name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0)
+        for name, array in result.values.items()
+        if name not in KEPT
     }
     nothing = dict.fromkeys(("last_cycle", "error_estimate", "largest_wear_depth"), np.nan)
-    return replace(result, outcome=outcome, values=values, **nothing)
+    return changed(result, outcome=outcome, **values, **nothing)
 
 
 def open_completion(

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.evaluate import COMPLETE
-from studyrunner.plan.results import Kept
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
-from tests.studyrunner.fakes import FACTS, fake_branch, fake_march, open_completion, without_values
+from tests.studyrunner.fakes import FACTS, changed, fake_branch, fake_march, open_completion, without_values
 
 BASE = (
     "axes.frequency=[100, 110, 120]",
@@ -54,7 +54,7 @@ def compute(completion: CompletionIndex, n_tasks: int = 1000, failing: frozenset
             for place in range(task.n_results):
                 result = fake_march(task, place=place)
                 if task.number in failing:
-                    result = replace(without_values(result, 4), message="why")
+                    result = changed(without_values(result, 4), message="why")
                 waiting.extend(progress.take(task, result))
     completion.store.flush()
     return n_starts, n_marches
@@ -149,7 +149,7 @@ def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder: Path)
             for start in fake_branch(branch):
                 failed = branch is down and start.position == 1
                 completion.add_start(branch, replace(start, n_unknowns=0) if failed else start)
-        completion.keep(down, Kept("progress", (np.zeros(1),)))
+        completion.keep(down, Packed("progress", (np.zeros(1),)))
         compute(completion)
         assert completion.n_points_finished == 12
         completion.forget_failed(COMPLETE)
@@ -224,18 +224,18 @@ def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished
 def test_tasks_know_their_keys_and_their_progress(folder: Path) -> None:
     with completion_of(folder) as completion:
         branch, march = completion.plan.branches[0], completion.plan.marches[0][3]
-        completion.keep(branch, Kept("branch", ()))
-        completion.keep(march, Kept("march", ()))
+        completion.keep(branch, Packed("branch", ()))
+        completion.keep(march, Packed("march", ()))
         with pytest.raises(TypeError, match="no progress"):
             completion.keep(march, "anything")
     with completion_of(folder) as completion:
         first, second = completion.branches_left()
-        assert (first.key, first.resume) == (completion.key(branch), Kept("branch", ()))
+        assert (first.key, first.resume) == (completion.key(branch), Packed("branch", ()))
         assert (second.key, second.resume) == (completion.key(completion.plan.branches[1]), None)
         found = completion.marches_from(0, march.position)
         assert [task.key for task in found] == [completion.key(task) for task in found]
         assert [task.resume for task in found] == [
-            None if t.number != march.number else Kept("march", ()) for t in found
+            None if t.number != march.number else Packed("march", ()) for t in found
         ]
 
 

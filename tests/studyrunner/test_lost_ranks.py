@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.evaluate import CRASHED
 from studyrunner.mpi.crashes import Crash
-from studyrunner.plan.results import Kept
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
@@ -60,7 +60,7 @@ def assert_finished(progress: TaskProgress, completion: CompletionIndex) -> None
 
 def test_a_branch_goes_on_behind_what_it_has_given(completion: CompletionIndex) -> None:
     progress, branch, marches = begin(completion, 2)
-    completion.keep(branch, Kept("progress", (np.ones(3),)))
+    completion.keep(branch, Packed("progress", (np.ones(3),)))
     (again,) = progress.take_back([(branch, 3)], {})
     assert isinstance(again, BranchTask)
     assert again.order_left == branch.order[2:]
@@ -75,7 +75,7 @@ def test_a_march_gives_all_its_histories_again(completion: CompletionIndex) -> N
     progress, _, marches = begin(completion, 5)
     march = next(task for task in marches if task.n_results > 1)
     progress.take(march, fake_march(march))
-    completion.keep(march, Kept("progress", (np.ones(3),)))
+    completion.keep(march, Packed("progress", (np.ones(3),)))
     (again,) = progress.take_back([(march, march.n_results - 1)], {})
     assert (again, again.resume is not None) == (march, True)
     finish(progress, [again, *(task for task in marches if task != march)])

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.system import progress
@@ -124,7 +124,7 @@ def build_slow(model: object, friction_coefficient: float) -> Callable[..., Iter
     """The stand-in for the solver; each start state and each march takes a while."""
     facts = describe_scene(model)
 
-    def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         for result in fake_evaluate(task, keep, facts):
             time.sleep(0.15)
             yield result

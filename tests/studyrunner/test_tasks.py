@@ -9,10 +9,11 @@ from collections.abc import Sequence
 
 import pytest
 
+from solver.settings import SolverSettings
 from studyrunner.cli import main
 from studyrunner.plan.estimate import AUTOMATIC_HARMONICS
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import Settings, TaskPlan, build_tasks
+from studyrunner.plan.tasks import TaskPlan, build_tasks
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import start_marches
@@ -168,7 +169,7 @@ def test_marches_are_found_by_their_start_state() -> None:
 def test_automatic_settings_are_those_of_the_task_and_estimated_for_the_plan() -> None:
     study, plan = plan_of("axes.frequency=150", "axes.harmonics=[3, 'auto']", "axes.rtol=[1e-2, 1e-3]")
     assert [branch.settings for branch in plan.branches] == [
-        Settings(harmonics, "auto", 1e-8, rtol, math.inf)
+        SolverSettings(harmonics, "auto", 1e-8, rtol, math.inf)
         for harmonics, rtol in itertools.product((3, "auto"), (1e-2, 1e-3))
     ]
     assert plan.n_unknowns == 2 * (2 * AUTOMATIC_HARMONICS + 1)
