@@ -165,7 +165,7 @@ def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi: OpenMpi, tmp_pat
     """The library waits for it for ever, the others for some minutes."""
     assert ranks._SECONDS_TO_START <= 120.0
     program = (
-        "import os; from studyrunner import ranks; ranks._SECONDS_TO_START = 2.0;"
+        "import os; from studyrunner.mpi import ranks; ranks._SECONDS_TO_START = 2.0;"
         "os.environ['OMPI_COMM_WORLD_RANK'] == '2' and os.kill(os.getpid(), 9); ranks.start_ranks()"
     )
     done = subprocess.run(

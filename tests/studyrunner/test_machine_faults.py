@@ -162,7 +162,7 @@ def test_a_task_that_broke_off_teaches_nothing_of_those_like_it(
 
 
 KERNELS = """
-from studyrunner.machine_faults import guard_kernel_cache
+from studyrunner.system.machine_faults import guard_kernel_cache
 guard_kernel_cache()
 guard_kernel_cache()
 import kernel

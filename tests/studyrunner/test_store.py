@@ -567,7 +567,7 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from studyrunner.store import Store
+from studyrunner.checkpoint.store import Store
 store = Store(Path(sys.argv[1]), np.dtype([("key", "S32")]))
 print("locked", flush=True)
 time.sleep(float(sys.argv[2]))
