@@ -22,8 +22,7 @@ from studyrunner.mpi.crashes import (
 )
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
-from studyrunner.netcdf.earlier import holds_finished_result
-from studyrunner.netcdf.output import parts_folder, remove_leftovers
+from studyrunner.netcdf.output import holds_finished_result, parts_folder, remove_leftovers
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
