@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_answer, scene_frequencies, scene_has, scene_mesh
-from studies.stuck_modes import stuck_frequencies
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
