@@ -107,7 +107,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
-    """The histories of a task, one for each of its shares.
+    """The histories of a task, the one of the march itself first.
 
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
     another history, which then takes a march of its own.
@@ -123,23 +123,23 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
     # with more time it goes on from there
     left = reached if history.outcome is Outcome.TIME_LIMIT else None
     yield replace(build_result(task, history), progress=left)
-    for place, share in enumerate(task.shares[1:], start=1):
+    for place, scaled in enumerate(task.histories[1:], start=1):
         if not history.oscillates:
             yield replace(build_result(task, history, place), progress=left)
         else:
-            alone = replace(task, shares=(share,), resume=None)
-            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
+            alone = replace(task, histories=(scaled,), resume=None)
+            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), place=place)
 
 
 def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
-    """The march of a task from its start state, at all counts at which one of its shares is read."""
+    """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.march import march_wear
 
     start = None if task.start is None else unpack(task.start)
     if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
     # The march begins at cycle 0, whether that count is kept or not.
-    counts = np.unique(np.concatenate([[0.0], *(task.counts(share) for share in task.shares)]))
+    counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
     history = march_wear(
         model,
         friction_coefficient,
@@ -165,28 +165,28 @@ def _raise_fault(ended: StartState | WearHistory) -> None:
 
 
 def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:
-    """What the result file holds of one share of a march: the output counts and variables that the task asks for.
+    """What the result file holds of one history of a task: the output counts and variables that the task asks for.
 
-    What is per cycle is per cycle of the share. A share knows nothing of what came after its last count: jumps, errors,
+    What is per cycle is per cycle of that history. It knows nothing of what came after its last count: jumps, errors,
     the end of the march. What was computed of a history that ends early is kept. Effort is that of the march.
     """
-    share, own = task.shares[place], task.shares[0]
-    slower = share.wear_coefficient / own.wear_coefficient if place else 1.0
-    counts = np.array(task.counts(share))
+    scaled, own = task.histories[place], task.histories[0]
+    slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
+    counts = np.array(task.counts(scaled))
     rows = np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
     jump = history.jump_cycle
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
-    outcome = share_outcome(task, history, known, place, whole=bool(reached.all()))
+    outcome = scaled_outcome(task, history, known, place, whole=bool(reached.all()))
     last = task.cycles[-1]
     if not reached.all():
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
     errors, depths = history.worn_volume_error[known], history.wear_depth[known]
-    of_share: dict[str, Any] = {
+    of_its_own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,
         "error_estimate": float(errors[-1]) if known.size else math.nan,
@@ -195,18 +195,18 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
         "message": _message(task, history, outcome, place, slower, known, last),
     }
-    of_march = {name: getattr(history, name) for name in KEPT if name not in of_share}
+    of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
-    return MarchResult(share.points, {**variables, **of_march, **of_share}, place)
+    return MarchResult(scaled.points, {**variables, **of_march, **of_its_own}, place)
 
 
-def share_outcome(
+def scaled_outcome(
     task: MarchTask, history: WearHistory, known: NDArray[np.intp], place: int, *, whole: bool
 ) -> Outcome:
-    """How one share of a march ended, judged by its own rows.
+    """How one history of a task ended, judged by its own rows.
 
-    known: rows of the history at the counts of the share that were reached. whole: whether these are all. The march
-    itself, which is the first share, ended as the history says; so did those that were not reached to their end.
+    known: rows of the march at its own counts that were reached. whole: whether these are all. The march
+    itself, which is the first one, ended as the history says; so did those that were not reached to their end.
     """
     ended = history.outcome
     if place == 0 or not whole:
@@ -242,9 +242,9 @@ def _message(
     known: NDArray[np.intp],
     last: float,
 ) -> str:
-    """What the outcome of a share does not say by itself.
+    """What the outcome of a history does not say by itself.
 
-    What the solver says counts the cycles of the march: it holds for the first share, and an error for all.
+    What the solver says counts the cycles of the march: it holds for the first history, and an error for all.
     """
     said = history.message if place == 0 or outcome is Outcome.EXCEPTION else ""
     if said or outcome is Outcome.CONVERGED or not known.size:

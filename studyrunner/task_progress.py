@@ -20,7 +20,7 @@ _TRIES_AGAIN = 1
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
-_LATE = 1.0  # a task that takes longer than expected goes on for such a share of the time that it has taken
+_LATE = 1.0  # a task that takes longer than expected goes on for such a fraction of the time that it has taken
 
 
 class TaskProgress:
@@ -57,7 +57,7 @@ class TaskProgress:
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
             last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
-            place = result.position if isinstance(result, StartResult) else result.share
+            place = result.position if isinstance(result, StartResult) else result.place
             return self._try_again(task) if place == last else ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
             self._completion.add_start(task, result)
@@ -119,7 +119,7 @@ class TaskProgress:
             else:
                 # it gives all of its histories again
                 n_given = task.n_results - n_left
-                self.n_points -= sum(len(share.points) for share in again.shares[:n_given])
+                self.n_points -= sum(len(scaled.points) for scaled in again.histories[:n_given])
                 self._left[task.kind] += task.cost * n_given / task.n_results
                 left.append(again)
         return left
@@ -174,8 +174,6 @@ def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[M
     tasks = []
     for task in planned:
         n_unknowns = started.n_unknowns or task.n_unknowns
-        share = n_unknowns / task.n_unknowns
-        share *= 1.0 if started.moves else _COST_AT_REST
-        cost = task.cost * share
+        cost = task.cost * (n_unknowns / task.n_unknowns * (1.0 if started.moves else _COST_AT_REST))
         tasks.append(replace(task, start=started.start, cost=cost, n_unknowns=n_unknowns, moves=started.moves))
     return tuple(tasks)

@@ -39,7 +39,7 @@ class CompletionIndex:
                 self._marches[march.number] = identities.of_march(self._histories[march.number])
 
     def histories(self, march: MarchTask) -> tuple[str, ...]:
-        """What the histories of a march are known by, one for each share."""
+        """What the histories of a march are known by."""
         return self._histories[march.number]
 
     @property
@@ -57,7 +57,7 @@ class CompletionIndex:
         )
 
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
-        """Where the histories of a march are, one for each share; None for those that are not finished."""
+        """Where the histories of a march are; None for those that are not finished."""
         return tuple(self.store.histories.get(key) for key in self._histories[march.number])
 
     def is_finished(self, march: MarchTask) -> bool:
@@ -119,8 +119,8 @@ class CompletionIndex:
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """A history has come."""
-        key = self._histories[march.number][result.share]
-        ended = result.share == march.n_results - 1 and result.progress is None
+        key = self._histories[march.number][result.place]
+        ended = result.place == march.n_results - 1 and result.progress is None
         self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
         if result.progress is not None:
             self.store.keep_progress(self.key(march), result.progress)
@@ -165,7 +165,7 @@ class CompletionIndex:
                     continue
                 for place, known in enumerate(self.places(march)):
                     if known is None:
-                        n_points += len(march.shares[place].points)
+                        n_points += len(march.histories[place].points)
                         self.add_history(march, failed_result(march, place, outcome, message))
         self.store.flush()
         return n_points

@@ -118,9 +118,10 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
     index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
     found: dict[int, list[_Entry]] = {}
     for march in itertools.chain.from_iterable(completion.plan.marches):
-        for key, share, place in zip(completion.histories(march), march.shares, completion.places(march), strict=True):
+        keys, places = completion.histories(march), completion.places(march)
+        for key, scaled, place in zip(keys, march.histories, places, strict=True):
             if place is not None:
-                found.setdefault(place[0], []).append(_Entry(place[1], key, share.points))
+                found.setdefault(place[0], []).append(_Entry(place[1], key, scaled.points))
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
     changed: list[str] = []

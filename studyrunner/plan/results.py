@@ -50,12 +50,12 @@ class MarchResult:
     values: variables of the result by name: those of `studyrunner.variables.KEPT`, which have no further dimensions,
         and arrays with the dimensions of the variable after the axes; after `last_cycle` these are NaN, or 0 where the
         variable is a whole number. What is not there is not known: NaN, 0 or an empty text in the file.
-    share: its place among the shares of the task. progress: how far a march was that was given up for its time.
+    place: its own among the histories of the task. progress: how far a march was that was given up for its time.
     """
 
     points: tuple[Index, ...]
     values: Mapping[str, Any]
-    share: int = 0
+    place: int = 0
     progress: Packed | None = None
 
     @property
@@ -77,5 +77,5 @@ Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | March
 
 
 def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> MarchResult:
-    """Result of a history that nobody computed to its end. place: its own among the shares of the task."""
-    return MarchResult(task.shares[place].points, {"outcome": outcome, "message": message}, place)
+    """Result of a history that nobody computed to its end. place: its own among the histories of the task."""
+    return MarchResult(task.histories[place].points, {"outcome": outcome, "message": message}, place)

@@ -15,7 +15,7 @@ from studyrunner.study.study import AUTO, Study
 from studyrunner.system.progress import count
 
 _OF_STATES = 0.5
-"""Share of the error of a worn volume from which on that of the wear rate is what it comes from."""
+"""Fraction of the error of a worn volume from which on that of the wear rate is what it comes from."""
 
 
 class WornVolumes:

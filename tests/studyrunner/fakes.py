@@ -61,11 +61,11 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
-    """A history whose values tell the share of the task."""
+    """A history whose values tell which of the task it is."""
     assert task.start is not None
-    share = task.shares[place]
+    scaled = task.histories[place]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
-    fingerprint += share.wear_coefficient * 1e9 + share.step * 1e-4 + 0.5 * (task.scheme == "implicit")
+    fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (task.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
@@ -95,7 +95,7 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
         "largest_wear_depth": 1e-6,
         "message": "",
     }
-    return MarchResult(share.points, {**values, **totals}, place)
+    return MarchResult(scaled.points, {**values, **totals}, place)
 
 
 def changed(result: MarchResult, **values: object) -> MarchResult:
@@ -155,7 +155,7 @@ def fake_completion(
 
 def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:
     """The march of each history, which is known by its points."""
-    return {share.points: task for line in plan.marches for task in line for share in task.shares}
+    return {scaled.points: task for line in plan.marches for task in line for scaled in task.histories}
 
 
 def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:

@@ -79,10 +79,10 @@ def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.
 
 
 def test_all_is_done_at_the_end_only() -> None:
-    assert Standing(3, 4, 0.0, ()).share(50.0) == 0.99
-    assert Standing(4, 4, 0.0, ()).share(50.0) == 1.0
+    assert Standing(3, 4, 0.0, ()).fraction(50.0) == 0.99
+    assert Standing(4, 4, 0.0, ()).fraction(50.0) == 1.0
     assert Standing(4, 4, 0.0, ()).describe(50.0) == "4 of 4 points, 100 %"
-    assert Standing(0, 4, 0.0, ()).share(0.0) < 0.01
+    assert Standing(0, 4, 0.0, ()).fraction(0.0) < 0.01
 
 
 def test_of_many_tasks_some_are_named() -> None:

@@ -82,7 +82,7 @@ def test_the_plan_tells_ramps_from_branches(sweeps: str, said: str, capsys: pyte
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
-    assert any(len(task.shares) > 1 for task in plan.marches[0])
+    assert any(len(task.histories) > 1 for task in plan.marches[0])
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         for task in line:
             assert task.branch == branch.number
@@ -94,11 +94,11 @@ def test_points_know_their_task() -> None:
                 assert values["excitation_amplitude"] == branch.excitation_amplitude
                 assert values["sweep"] == branch.sweep
                 assert values["harmonics"] == task.settings.harmonics == branch.settings.harmonics
-                (share,) = (share for share in task.shares if point in share.points)
-                assert values["wear_coefficient"] == share.wear_coefficient
+                (scaled,) = (scaled for scaled in task.histories if point in scaled.points)
+                assert values["wear_coefficient"] == scaled.wear_coefficient
                 if not task.held:
                     assert values["scheme"] == task.scheme
-                    assert values["step"] == share.step or task.scheme == "adaptive"
+                    assert values["step"] == scaled.step or task.scheme == "adaptive"
 
 
 def test_nothing_wears_without_a_wear_coefficient() -> None:
