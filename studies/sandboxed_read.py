@@ -46,7 +46,16 @@ def is_hdf5(path: Path) -> bool:
 def check_scene_readable(path: Path, group: str = "", attributes: Sequence[str] = ()) -> None:
     """Raises SceneError where reading all of a scene fails, would crash, or take too long or too much memory.
 
-    attributes: of the file, which are read as well. Whether the numbers make a model is not found here.
+    Whether the numbers make a model is not found here.
+
+    Parameters
+    ----------
+    path
+        A scene file, or one that holds a scene.
+    group
+        Where the scene stands in a file that holds more than one.
+    attributes
+        Of the file, which are read as well.
     """
     _check(path, [group, *attributes])
 

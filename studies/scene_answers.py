@@ -54,8 +54,11 @@ class ExactAnswer:
 def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
     """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
 
-    Raises SceneError where all displacements are relative ones of pairs, so that nothing moves, or where the stuck
-    structure is not held.
+    Raises
+    ------
+    SceneError
+        Where all displacements are relative ones of pairs, so that nothing moves, or where the stuck structure is not
+        held.
     """
     dofs = model.contact.dofs
     frequencies = np.full((len(model.linear), N_MODES), np.nan)

@@ -131,7 +131,10 @@ def parse_options(arguments: Sequence[str]) -> Options:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
 
-    arguments: None for those of the process, which ends here if the run did not come to its end.
+    Parameters
+    ----------
+    arguments
+        None for those of the process, which ends here if the run did not come to its end.
     """
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.

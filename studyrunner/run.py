@@ -88,11 +88,31 @@ def run_study(
 ) -> RunSummary:
     """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
 
-    It goes on from what an earlier run has left in the folder beside the file, unless `fresh`; retry_failed: points
-    that failed there are computed again; prune: what other studies have left there is removed at the end.
-    A finished result that stands there already is replaced by one without missing points only. Raises UserError where
-    another run is at work there or `path` is a file of something else, StorageError where something cannot be written,
-    and Interrupted.
+    A finished result that stands there already is replaced by one without missing points only.
+
+    Parameters
+    ----------
+    ranks, study, model
+        The ranks, and what they are to compute.
+    path
+        The result file. Beside it is the folder in which an earlier run has left what it had.
+    progress
+        What the user sees on the way.
+    fresh
+        Whether to begin anew. Else the run goes on from what is in the folder.
+    retry_failed
+        Whether points that failed there are computed again.
+    prune
+        Whether what other studies have left there is removed at the end.
+
+    Raises
+    ------
+    UserError
+        Where another run is at work there or `path` is a file of something else.
+    StorageError
+        Where something cannot be written.
+    Interrupted
+        Where the run is ended from outside; what there is has been written.
     """
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
@@ -146,9 +166,19 @@ def run_study(
 
 
 def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Crash]:
-    """Points whose task has crashed two processes in earlier runs have failed. The new crashes of which there is one.
+    """Points whose task has crashed two processes in earlier runs have failed.
 
-    fresh: crashes of this study's tasks in earlier runs do not count.
+    Parameters
+    ----------
+    completion
+        What is finished, in the folder of the run.
+    fresh
+        Whether crashes of this study's tasks in earlier runs do not count.
+
+    Returns
+    -------
+    list of Crash
+        The new ones of tasks that have crashed once.
     """
     folder, own = completion.store.folder, completion.keys
     new = count_crashes(folder)

@@ -150,9 +150,21 @@ class CompletionIndex:
                         self.store.forget_history(key)
 
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
-        """The task of this key ends its processes: no other run tries it again. How many points are lost with it.
+        """The task of this key ends its processes: no other run tries it again.
 
-        position: place on a branch that it was on the way to, None for a march. The branch ends before that place.
+        Parameters
+        ----------
+        key
+            Of the task.
+        position
+            Place on a branch that it was on the way to, before which the branch ends; None for a march.
+        outcome, message
+            Of the points that are lost with it.
+
+        Returns
+        -------
+        int
+            Number of these points.
         """
         n_points = 0
         for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):

@@ -65,9 +65,21 @@ def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
 
 
 def load_records(path: Path, *, check: bool = True) -> NDArray[np.void]:
-    """Records that stay on the disk until they are used. check: the sum as well.
+    """Records that stay on the disk until they are used.
 
-    Raises ValueError where they are damaged and OSError where they cannot be read.
+    Parameters
+    ----------
+    path
+        A file of records.
+    check
+        Whether all of it is read to see whether its check sum is right.
+
+    Raises
+    ------
+    ValueError
+        Where they are damaged.
+    OSError
+        Where they cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
         kind, n_records = _read_header(file)

@@ -153,7 +153,10 @@ class Store:
     def tick(self) -> None:
         """Called many times a second: hands over what waits, at once where nothing was written a moment ago.
 
-        Raises StorageError where what was handed over before could not be written.
+        Raises
+        ------
+        StorageError
+            Where what was handed over before could not be written.
         """
         self._take()
         if self._waiting.empty or self._writer.busy:

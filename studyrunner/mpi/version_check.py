@@ -43,9 +43,14 @@ def report_version(ranks: Ranks) -> None:
 
 
 def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
-    """Rank 0: raises LauncherError where another rank runs something else, or does not answer within `seconds`.
+    """Rank 0: compares what the other ranks run with what it runs itself.
 
-    Raises KeyboardInterrupt where another rank was interrupted.
+    Raises
+    ------
+    LauncherError
+        Where another rank runs something else, or does not answer within `seconds`.
+    KeyboardInterrupt
+        Where another rank was interrupted.
     """
     if ranks.size == 1:
         return

@@ -19,10 +19,21 @@ _SECONDS_TO_WRITE = 86400.0  # no run is at one file for so long
 
 
 def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
-    """The file that `path` stands for, links followed, after a try whether it can be written.
+    """The file that `path` stands for, links followed, after a try whether it can be written; nothing is changed.
 
-    option: the one on the command line that gave the path. inputs: files that the run reads and must not replace.
-    Nothing is changed. Raises UserError.
+    Parameters
+    ----------
+    option
+        The one on the command line that gave the path.
+    path
+        As the user gave it.
+    inputs
+        Files that the run reads and must not replace.
+
+    Raises
+    ------
+    UserError
+        Where it cannot be written, or is one of the inputs.
     """
 
     def wrong(remedy: str) -> UserError:
@@ -59,7 +70,10 @@ def try_to_create(path: Path) -> None:
 def remove_leftovers(path: Path, *, alone: bool) -> None:
     """Removes what runs that were killed have left while they wrote `path`.
 
-    alone: whether no other run is at work on it; else only what is old.
+    Parameters
+    ----------
+    alone
+        Whether no other run is at work on it; else only what is old.
     """
     for found in leftovers(path):
         # the file may have gone meanwhile, and one that stays is no harm
@@ -76,8 +90,12 @@ def parts_folder(path: Path) -> Path:
 def holds_finished_result(path: Path) -> bool:
     """Whether `path` is a result in which no point is missing.
 
-    Such a file is not replaced by one with less in it. Raises UserError where it is no result of run-study at all,
-    which is not replaced by anything.
+    Such a file is not replaced by one with less in it.
+
+    Raises
+    ------
+    UserError
+        Where it is no result of run-study at all, which is not replaced by anything.
     """
     from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
 

@@ -36,14 +36,8 @@ _REASONS = {
 class ScaledHistory:
     """A history that a march gives, its slow time scaled, and the points that have it at the same cycle counts.
 
-    Attributes
-    ----------
-    wear_coefficient
-        1/Pa. Its ratio to that of the march scales the slow time.
-    step
-        Cycles; that of the first point where the step does not matter.
-    points
-        Indices along the dimensions of the study.
+    wear_coefficient: 1/Pa; its ratio to that of the march scales the slow time. step: cycles; that of the first point
+    where the step does not matter. points: indices along the dimensions of the study.
     """
 
     wear_coefficient: float
@@ -55,12 +49,8 @@ class ScaledHistory:
 class Alike:
     """Choices whose histories one march computes.
 
-    Attributes
-    ----------
-    histories
-        For each of them the choices that have it; first those of the march itself, which goes farthest.
-    held
-        Nothing wears, so the state at cycle 0 holds for all cycles.
+    histories: for each of them the choices that have it; first those of the march itself, which goes farthest.
+    held: nothing wears, so the state at cycle 0 holds for all cycles.
     """
 
     histories: tuple[tuple[Choice, ...], ...]

@@ -72,7 +72,10 @@ def loop_numbers(study: Study) -> int:
 def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
     """All that the study asks of its scene. Natural frequencies of a bundled sector take some seconds.
 
-    Raises UserError where the scene cannot give them.
+    Raises
+    ------
+    UserError
+        Where the scene cannot give them.
     """
     asked = study.outputs.variables
     with _user_errors(study):

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.evaluate import endings
-from studyrunner.netcdf.gather import coordinates
+from studyrunner.netcdf.attributes import coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.results import MarchResult
 from studyrunner.scene.scene import SceneFacts
