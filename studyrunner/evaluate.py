@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -27,28 +27,7 @@ from studyrunner.system.machine_faults import (
 )
 from studyrunner.variables import KEPT
 
-
-@dataclass(frozen=True)
-class Ending:
-    """One way for a computation to end: its number and word in the result file and the sentence for the user."""
-
-    number: int
-    meaning: str
-    sentence: str
-
-
-CONVERGED, CRASHED, NOT_COMPUTED = int(Outcome.CONVERGED), int(Outcome.CRASHED), int(Outcome.NOT_COMPUTED)
-INACCURATE, SENSITIVE = int(Outcome.INACCURATE), int(Outcome.SENSITIVE)
-
-COMPLETE = frozenset(int(outcome) for outcome in Outcome if outcome.complete)
-"""Outcomes of points that were computed to their last cycle."""
-
 _ROUND_OFF = 1e-10
-
-
-def endings() -> tuple[Ending, ...]:
-    """All ways for a computation to end, by number."""
-    return tuple(Ending(int(outcome), outcome.meaning, outcome.sentence) for outcome in sorted(Outcome))
 
 
 def build_evaluator(model: ReducedModel, friction_coefficient: float) -> Evaluate:
@@ -98,7 +77,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
     message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
     if isinstance(task, MarchTask):
         for place in range(n_given, task.n_results):
-            yield failed_result(task, place, NOT_COMPUTED if lost else int(Outcome.EXCEPTION), message)
+            yield failed_result(task, place, Outcome.NOT_COMPUTED if lost else Outcome.EXCEPTION, message)
         return
     nan = math.nan
     start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.evaluate import COMPLETE, CRASHED, NOT_COMPUTED, build_evaluator, failed_results
+from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
     MOST_DEATHS,
     Crash,
@@ -186,7 +187,7 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
         forget_crashes(folder, own)
     for key, crashes in read_tally(folder).items():
         if key in own and len(crashes) >= MOST_DEATHS:
-            completion.take_as_failed(key, crashes[-1].position, CRASHED, crashes[-1].message)
+            completion.take_as_failed(key, crashes[-1].position, Outcome.CRASHED, crashes[-1].message)
             # it is on the disk: where it is asked for again, counting begins anew
             forget_crashes(folder, {key})
     tally = read_tally(folder)
@@ -206,11 +207,11 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
     return RunSummary(
         n_points=plan.n_points,
         n_complete=sum(outcomes[number] for number in COMPLETE),
-        n_left=outcomes[NOT_COMPUTED],
+        n_left=outcomes[Outcome.NOT_COMPUTED],
         n_found=n_found,
         findings=gathered.findings,
         certificates=gathered.certificates,
-        written=not (keep_finished and outcomes[NOT_COMPUTED]),
+        written=not (keep_finished and outcomes[Outcome.NOT_COMPUTED]),
     )
 
 

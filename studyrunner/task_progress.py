@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.evaluate import CRASHED, NOT_COMPUTED
 from studyrunner.mpi.crashes import MOST_DEATHS, Crash
 from studyrunner.plan.costs import LearnedCosts
 from studyrunner.plan.results import MarchResult, StartResult
@@ -105,7 +105,9 @@ class TaskProgress:
                 unknown = Crash(task.key, position, f"{MOST_DEATHS} ranks were lost while they were at it")
                 crash = crashes.get(at, unknown)
             if crash is not None:
-                self.n_points += self._completion.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+                self.n_points += self._completion.take_as_failed(
+                    crash.key, crash.position, Outcome.CRASHED, crash.message
+                )
             if isinstance(again, BranchTask):
                 if crash is not None and crash.position is not None:
                     behind = again.order[again.order.index(crash.position) :]
@@ -163,7 +165,7 @@ def fault_of(result: StartResult | MarchResult) -> str:
     """The fault of the machine that a rank sends in place of a result; nothing where it is one."""
     if isinstance(result, StartResult):
         return result.lost
-    return result.message if result.outcome == NOT_COMPUTED else ""
+    return result.message if result.outcome == Outcome.NOT_COMPUTED else ""
 
 
 def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:

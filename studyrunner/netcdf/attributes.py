@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import endings
+from solver.outcome import Outcome
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, Variable
@@ -27,9 +27,9 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
         found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(entry.flags)
     if name == "outcome":
-        found["flag_values"] = np.array([flag.number for flag in endings()], dtype=entry.dtype)
-        found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
-        found["sentences"] = "\n".join(flag.sentence for flag in endings())
+        found["flag_values"] = np.array(list(Outcome), dtype=entry.dtype)
+        found["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
+        found["sentences"] = "\n".join(flag.sentence for flag in Outcome)
     if name in ASKED and not entry.dtype.startswith("float"):
         found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
     return found

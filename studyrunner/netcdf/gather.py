@@ -17,11 +17,11 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.records import empty_record, variable_sizes
 from studyrunner.checkpoint.store import Store
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.netcdf.attributes import attributes, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
@@ -109,7 +109,7 @@ def gather(
         Where the file cannot be written, or a file of the run cannot be read.
     """
     index, gathered = _read_through(study, facts, completion)
-    left = gathered.outcomes[NOT_COMPUTED]
+    left = gathered.outcomes[Outcome.NOT_COMPUTED]
     if left and keep_finished:
         return gathered
     try:
@@ -157,7 +157,7 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
                 index.file[at], index.row[at], index.key[at] = number, entry.row, entry.key.encode()
             for collected in (table, findings):
                 collected.add([entry.points for entry in there], records)
-    outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
+    outcomes[Outcome.NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
     lost = [
         f"{name} in {completion.store.folder.name} does not hold any more what this run has written there:"
         " its points are not computed, the same command goes on"
@@ -261,7 +261,7 @@ def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np
     """Records of points that follow each other in the file."""
     files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
     missing = empty_record(store.kind)
-    missing["outcome"] = NOT_COMPUTED
+    missing["outcome"] = Outcome.NOT_COMPUTED
     records = np.repeat(missing, last - first)
     order = np.argsort(files, kind="stable")
     bounds = np.flatnonzero(np.diff(files[order], prepend=-2, append=-2))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import COMPLETE
+from solver.outcome import COMPLETE
 from studyrunner.plan.places import describe_point, show_percent
 from studyrunner.plan.sharing import Index
 from studyrunner.study.study import AUTO, Study

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.evaluate import endings
+from solver.outcome import Outcome
 from studyrunner.netcdf.attributes import coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.results import MarchResult
@@ -78,8 +78,8 @@ def build_dataset(
         if name in asked and not entry.dtype.startswith("float"):
             failed = "0 where there is no result, see last_cycle."
             dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
-    flags = endings()
-    dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
+    flags = Outcome
+    dataset["outcome"].attrs["flag_values"] = np.array([flag for flag in flags], dtype=np.int8)
     dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
     dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in flags)
     return dataset

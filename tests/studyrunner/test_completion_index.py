@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.outcome import COMPLETE
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
-from studyrunner.evaluate import COMPLETE
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.evaluate import NOT_COMPUTED, endings
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.gather import Gathered
 from studyrunner.netcdf.output import parts_folder
@@ -144,10 +144,10 @@ def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
     attributes = opened.outcome.attrs
     assert opened.outcome.dtype == np.int8
     assert attributes["flag_values"].dtype == np.int8
-    assert attributes["flag_values"].tolist() == [ending.number for ending in endings()]
+    assert attributes["flag_values"].tolist() == list(Outcome)
     assert attributes["flag_meanings"].split()[0] == "converged"
-    assert len(attributes["flag_meanings"].split()) == len(endings())
-    assert attributes["sentences"].splitlines() == [ending.sentence for ending in endings()]
+    assert len(attributes["flag_meanings"].split()) == len(Outcome)
+    assert attributes["sentences"].splitlines() == [ending.sentence for ending in Outcome]
 
 
 def test_whole_numbers_stay_whole(opened: xr.Dataset) -> None:
@@ -275,16 +275,16 @@ def test_slabs_are_all_points_in_the_order_of_the_file(shape: tuple[int, ...], n
 def test_outcomes_are_counted(tmp_path: Path) -> None:
     results = fake_results()
     results[0] = without_values(results[0], 6)
-    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, NOT_COMPUTED: 0}
+    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, Outcome.NOT_COMPUTED: 0}
 
 
 @pytest.mark.parametrize("n_left", [1, 7, 8])
 def test_points_that_are_not_computed_say_so(n_left: int, tmp_path: Path) -> None:
     results = fake_results()
-    assert write(results[n_left:], tmp_path / "out.nc").outcomes[NOT_COMPUTED] == n_left
+    assert write(results[n_left:], tmp_path / "out.nc").outcomes[Outcome.NOT_COMPUTED] == n_left
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         left = {point for result in results[:n_left] for point in result.points}
-        assert {tuple(place) for place in np.argwhere(opened.outcome.values == NOT_COMPUTED).tolist()} == left
+        assert {tuple(place) for place in np.argwhere(opened.outcome.values == Outcome.NOT_COMPUTED).tolist()} == left
         for name in set(CONTRACT) - {"outcome", "message"}:
             for point in left:
                 there = opened[name].values[point]
@@ -297,7 +297,7 @@ def test_points_that_are_not_computed_say_so(n_left: int, tmp_path: Path) -> Non
 def test_of_two_records_of_a_point_the_later_one_stands(tmp_path: Path) -> None:
     results = fake_results()
     later = changed(results[0], error_estimate=0.75)
-    assert write([*results, later], tmp_path / "out.nc").outcomes == {0: 8, NOT_COMPUTED: 0}
+    assert write([*results, later], tmp_path / "out.nc").outcomes == {0: 8, Outcome.NOT_COMPUTED: 0}
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = later.points
         assert opened.error_estimate.values[point] == 0.75

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.mpi import schedule
 from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -41,7 +41,7 @@ def whole(solver: Solver) -> xr.Dataset:
 
 def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
     """Points that are there are right, the others hold nothing; how many are there."""
-    left = found.outcome == NOT_COMPUTED
+    left = found.outcome == Outcome.NOT_COMPUTED
     for name in set(found.data_vars) - {"outcome", "message", "exact_worn_volume", "exact_response_amplitude"}:
         for point in np.argwhere(left.values):
             there = found[name].values[tuple(point)]

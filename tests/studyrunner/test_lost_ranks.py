@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.evaluate import CRASHED
 from studyrunner.mpi.crashes import Crash
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.study.study_file import read_study
@@ -95,7 +95,7 @@ def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion:
     assert again == first
     finish(progress, [again, *others])
     assert_finished(progress, completion)
-    assert len(completion.store.select(lambda records: records["outcome"] == CRASHED)) == crashed.n_results
+    assert len(completion.store.select(lambda records: records["outcome"] == Outcome.CRASHED)) == crashed.n_results
 
 
 def test_a_branch_that_crashed_twice_ends_there(completion: CompletionIndex) -> None:
