@@ -65,7 +65,7 @@ class Options:
     study: str
     output: Path | None
     plan: bool
-    overrides: tuple[str, ...]
+    overrides: list[str]
     write_scene: Path | None
     fresh: bool
     retry_failed: bool
@@ -95,7 +95,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
         metavar="STUDY",
         help="TOML file, result file or bundled study (default: dovetail)",
     )
-    parser.add_argument("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)")
+    parser.add_argument(
+        "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
+    )
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(
         "--set",
@@ -105,7 +107,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         metavar="KEY=VALUE",
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
-    parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
+    parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
     parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
@@ -115,17 +117,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         action="store_true",
         help="remove what other studies have left in OUT.nc.parts, once this is finished",
     )
-    found = parser.parse_args(list(arguments))
-    return Options(
-        study=found.study,
-        output=None if found.output is None else Path(found.output),
-        plan=found.plan,
-        overrides=tuple(found.overrides),
-        write_scene=None if found.write_scene is None else Path(found.write_scene),
-        fresh=found.fresh,
-        retry_failed=found.retry_failed,
-        prune=found.prune,
-    )
+    return Options(**vars(parser.parse_args(list(arguments))))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -81,7 +81,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
         return
     nan = math.nan
     start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
-    for position in [place for place in task.order if place not in task.known][n_given:]:
+    for position in task.order_left[n_given:]:
         yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
 
 

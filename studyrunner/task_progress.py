@@ -105,9 +105,8 @@ class TaskProgress:
                 unknown = Crash(task.key, position, f"{MOST_DEATHS} ranks were lost while they were at it")
                 crash = crashes.get(at, unknown)
             if crash is not None:
-                self.n_points += self._completion.take_as_failed(
-                    crash.key, crash.position, Outcome.CRASHED, crash.message
-                )
+                ended = crash.key, crash.position, Outcome.CRASHED, crash.message
+                self.n_points += self._completion.take_as_failed(*ended)
             if isinstance(again, BranchTask):
                 if crash is not None and crash.position is not None:
                     behind = again.order[again.order.index(crash.position) :]

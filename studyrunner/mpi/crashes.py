@@ -66,7 +66,7 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
                 os.pwrite(file.fileno(), text.ljust(_LINE - 1).encode() + b"\n", 0)
 
     def noted(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        wanted = [place for place in task.order if place not in task.known] if isinstance(task, BranchTask) else []
+        wanted = task.order_left if isinstance(task, BranchTask) else ()
         note(" ".join([task.key, *map(str, wanted[:1])]))
         for n_given, result in enumerate(evaluate(task, keep), start=1):
             yield result

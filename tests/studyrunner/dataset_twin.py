@@ -78,10 +78,9 @@ def build_dataset(
         if name in asked and not entry.dtype.startswith("float"):
             failed = "0 where there is no result, see last_cycle."
             dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
-    flags = Outcome
-    dataset["outcome"].attrs["flag_values"] = np.array([flag for flag in flags], dtype=np.int8)
-    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
-    dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in flags)
+    dataset["outcome"].attrs["flag_values"] = np.array(list(Outcome), dtype=np.int8)
+    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
+    dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in Outcome)
     return dataset
 
 
