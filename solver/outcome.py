@@ -47,6 +47,9 @@ class Outcome(IntEnum):
         return _SENTENCES[self]
 
 
+COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
+"""Outcomes of points that were computed to their last cycle."""
+
 _SENTENCES = {
     Outcome.CONVERGED: "The point was computed to tolerance.",
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",

@@ -28,6 +28,11 @@ class Packed:
     text: str
     arrays: tuple[NDArray[np.generic], ...]
 
+    @property
+    def n_bytes(self) -> int:
+        """Size in a file."""
+        return len(self.text) + sum(array.nbytes for array in self.arrays)
+
 
 def packable(known: type[T]) -> type[T]:
     """Decorator of the frozen results of the solver that a march or a sweep carries on; no two of one name."""

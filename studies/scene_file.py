@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
-from studies.hdf5_guard import (
+from studies.guards.hdf5_guard import (
     LARGEST_FILE,
     LARGEST_RESULT,
     find_datasets,

@@ -179,10 +179,21 @@ def _parallel_lines(
 def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.Dataset:
     """One result of several: the axes hold the values of all of them. A point in several is taken whole from the last.
 
-    dim: name of a key of the study that differs between them and is no axis, e.g. "friction_coefficient" or
-    "scene.friction_coefficient"; it becomes the first axis. A point in none of them is NaN, its whole numbers 0 and its
-    `outcome` -1, not_computed. Attributes are kept that all agree on. ValueError: the results have different axes or
-    pairs, are of different scenes and no `dim` is given, or lack the key.
+    A point in none of them is NaN, its whole numbers 0 and its `outcome` -1, not_computed. Attributes are kept that all
+    agree on.
+
+    Parameters
+    ----------
+    datasets
+        Results, read from files of `run-study`.
+    dim
+        Name of a key of the study that differs between them and is no axis, e.g. "friction_coefficient" or
+        "scene.friction_coefficient"; it becomes the first axis.
+
+    Raises
+    ------
+    ValueError
+        Where the results have different axes or pairs, are of different scenes and no `dim` is given, or lack the key.
     """
     if not datasets:
         raise ValueError("There are no results to join.")

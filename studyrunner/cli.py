@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import studyrunner.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
 
 # isort: split
 import argparse
@@ -65,7 +65,7 @@ class Options:
     study: str
     output: Path | None
     plan: bool
-    overrides: tuple[str, ...]
+    overrides: list[str]
     write_scene: Path | None
     fresh: bool
     retry_failed: bool
@@ -95,7 +95,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
         metavar="STUDY",
         help="TOML file, result file or bundled study (default: dovetail)",
     )
-    parser.add_argument("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)")
+    parser.add_argument(
+        "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
+    )
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(
         "--set",
@@ -105,7 +107,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         metavar="KEY=VALUE",
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
-    parser.add_argument("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop")
+    parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
     parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
@@ -115,23 +117,16 @@ def parse_options(arguments: Sequence[str]) -> Options:
         action="store_true",
         help="remove what other studies have left in OUT.nc.parts, once this is finished",
     )
-    found = parser.parse_args(list(arguments))
-    return Options(
-        study=found.study,
-        output=None if found.output is None else Path(found.output),
-        plan=found.plan,
-        overrides=tuple(found.overrides),
-        write_scene=None if found.write_scene is None else Path(found.write_scene),
-        fresh=found.fresh,
-        retry_failed=found.retry_failed,
-        prune=found.prune,
-    )
+    return Options(**vars(parser.parse_args(list(arguments))))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
 
-    arguments: None for those of the process, which ends here if the run did not come to its end.
+    Parameters
+    ----------
+    arguments
+        None for those of the process, which ends here if the run did not come to its end.
     """
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
@@ -198,9 +193,9 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
     try:
-        from studyrunner.mpi.version_check import call_roll
+        from studyrunner.mpi.version_check import check_versions
 
-        call_roll(ranks)
+        check_versions(ranks)
         options = parse_options(arguments)
         from studyrunner.study.study_file import read_study
 
@@ -226,9 +221,9 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.mpi.version_check import answer_roll_call
+    from studyrunner.mpi.version_check import report_version
 
-    answer_roll_call(ranks)
+    report_version(ranks)
     job = wait_for_message(ranks)
     if job is not None:
         from studyrunner.run import Job, work_on_job
@@ -265,13 +260,13 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.progress import RunProgress, format_seconds
     from studyrunner.run import Interrupted, run_study
     from studyrunner.scene.scene import build_study_scene
+    from studyrunner.system.progress import ProgressDisplay, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_output("-o", path, study.files)
-    progress = RunProgress()
+    progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
     model = build_study_scene(study)
     for line in compare_with_archived(study, model):

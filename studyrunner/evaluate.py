@@ -1,24 +1,23 @@
-"""Task -> result: the only importer of the solver."""
+"""Task -> result: the only place from which the solver computes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Literal, cast
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
-from solver.packing import Packed
+from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution, SolverSettings
-from studyrunner.checkpoint.records import failed_result
+from solver.settings import Resolution
 from studyrunner.plan.places import describe_reach, known_to, show_count
-from studyrunner.plan.results import Kept, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, Settings
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import AUTO
 from studyrunner.system.machine_faults import (
     MachineFaultError,
@@ -26,37 +25,12 @@ from studyrunner.system.machine_faults import (
     is_fault_of_machine,
     tells_of_machine,
 )
-
-
-@dataclass(frozen=True)
-class Ending:
-    """One way for a computation to end: its number and word in the result file and the sentence for the user."""
-
-    number: int
-    meaning: str
-    sentence: str
-
-
-CONVERGED, CRASHED, NOT_COMPUTED = int(Outcome.CONVERGED), int(Outcome.CRASHED), int(Outcome.NOT_COMPUTED)
-INACCURATE, SENSITIVE = int(Outcome.INACCURATE), int(Outcome.SENSITIVE)
-
-COMPLETE = frozenset(int(outcome) for outcome in Outcome if outcome.complete)
-"""Outcomes of points that were computed to their last cycle."""
-
-Keep = Callable[[Kept], None]
-"""Takes note of how far a task is."""
+from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
 
 
-def endings() -> tuple[Ending, ...]:
-    """All ways for a computation to end, by number."""
-    return tuple(Ending(int(outcome), outcome.meaning, outcome.sentence) for outcome in sorted(Outcome))
-
-
-def build_evaluator(
-    model: ReducedModel, friction_coefficient: float
-) -> Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]:
+def build_evaluator(model: ReducedModel, friction_coefficient: float) -> Evaluate:
     """The function that does the tasks of a study on this model and gives their results one by one."""
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -73,7 +47,6 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
     """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.loading_history.start_states import follow_branch
-    from solver.packing import pack
 
     wanted = sorted(task.order_left)
     branch = follow_branch(
@@ -83,17 +56,16 @@ def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, k
         # no state depends on those that are known
         np.array([task.frequencies[position] for position in wanted]),
         cast("Literal['up', 'down', 'ramp']", task.sweep),
-        _solver_settings(task.settings),
-        keep=lambda progress: keep(Kept(progress.text, progress.arrays)),
-        resume=_packed(task.resume),
+        task.settings,
+        keep=keep,
+        resume=task.resume,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:
         n_coefficients = 2 * len(start.resolution.orders) + 1
         n_unknowns = 0 if start.state is None else n_displacements * n_coefficients
         _raise_fault(start)
-        packed = pack(start)
-        yield StartResult(wanted[place], Kept(packed.text, packed.arrays), _moves(start), n_unknowns)
+        yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
 
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
@@ -101,31 +73,27 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 
     A fault of the machine is no result of the task: what it owes is not computed, and may be tried again.
     """
-    from solver.packing import pack
-
     lost = is_fault_of_machine(error)
     message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
     if isinstance(task, MarchTask):
         for place in range(n_given, task.n_results):
-            yield failed_result(task, place, NOT_COMPUTED if lost else int(Outcome.EXCEPTION), message)
+            yield failed_result(task, place, Outcome.NOT_COMPUTED if lost else Outcome.EXCEPTION, message)
         return
     nan = math.nan
     start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
-    packed = pack(start)
-    for position in [place for place in task.order if place not in task.known][n_given:]:
-        kept = Kept(packed.text, packed.arrays)
-        yield StartResult(position, kept, moves=False, n_unknowns=0, lost=message if lost else "")
+    for position in task.order_left[n_given:]:
+        yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
 
 
 def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
-    """The histories of a task, one for each of its shares.
+    """The histories of a task, the one of the march itself first.
 
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
     another history, which then takes a march of its own.
     """
     reached = task.resume
 
-    def note(progress: Kept) -> None:
+    def note(progress: Packed) -> None:
         nonlocal reached
         reached = progress
         keep(progress)
@@ -134,24 +102,23 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
     # with more time it goes on from there
     left = reached if history.outcome is Outcome.TIME_LIMIT else None
     yield replace(build_result(task, history), progress=left)
-    for place, share in enumerate(task.shares[1:], start=1):
+    for place, scaled in enumerate(task.histories[1:], start=1):
         if not history.oscillates:
             yield replace(build_result(task, history, place), progress=left)
         else:
-            alone = replace(task, shares=(share,), resume=None)
-            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), share=place)
+            alone = replace(task, histories=(scaled,), resume=None)
+            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), place=place)
 
 
 def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
-    """The march of a task from its start state, at all counts at which one of its shares is read."""
-    from solver.packing import unpack
+    """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.march import march_wear
 
-    start = None if task.start is None else unpack(Packed(task.start.text, task.start.arrays))
+    start = None if task.start is None else unpack(task.start)
     if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
     # The march begins at cycle 0, whether that count is kept or not.
-    counts = np.unique(np.concatenate([[0.0], *(task.counts(share) for share in task.shares)]))
+    counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
     history = march_wear(
         model,
         friction_coefficient,
@@ -160,11 +127,11 @@ def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, ke
         task.step,
         cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
         counts,
-        _solver_settings(task.settings),
+        task.settings,
         largest_depth=task.largest_depth,
         loops=task.loops,
-        keep=None if keep is None else lambda progress: keep(Kept(progress.text, progress.arrays)),
-        resume=_packed(task.resume),
+        keep=keep,
+        resume=task.resume,
     )
     _raise_fault(history)
     return history
@@ -177,54 +144,48 @@ def _raise_fault(ended: StartState | WearHistory) -> None:
 
 
 def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:
-    """What the result file holds of one share of a march: the output counts and variables that the task asks for.
+    """What the result file holds of one history of a task: the output counts and variables that the task asks for.
 
-    What is per cycle is per cycle of the share. A share knows nothing of what came after its last count: jumps, errors,
+    What is per cycle is per cycle of that history. It knows nothing of what came after its last count: jumps, errors,
     the end of the march. What was computed of a history that ends early is kept. Effort is that of the march.
     """
-    share, own = task.shares[place], task.shares[0]
-    slower = share.wear_coefficient / own.wear_coefficient if place else 1.0
-    counts = np.array(task.counts(share))
+    scaled, own = task.histories[place], task.histories[0]
+    slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
+    counts = np.array(task.counts(scaled))
     rows = np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
-    values = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
     jump = history.jump_cycle
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
-    outcome = share_outcome(task, history, known, place, whole=bool(reached.all()))
+    outcome = scaled_outcome(task, history, known, place, whole=bool(reached.all()))
     last = task.cycles[-1]
     if not reached.all():
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
     errors, depths = history.worn_volume_error[known], history.wear_depth[known]
-    return MarchResult(
-        points=share.points,
-        outcome=int(outcome),
-        values=values,
-        jump_cycle=jump,
-        error_estimate=float(errors[-1]) if known.size else math.nan,
-        newton_iterations=history.newton_iterations,
-        run_time=history.run_time,
-        branch=history.branch,
-        fold_frequency=history.fold_frequency,
-        step_limit=history.step_limit / slower,
-        oscillates=history.oscillates,
-        last_cycle=last,
-        largest_wear_depth=float(depths.max(initial=0.0)) if known.size else math.nan,
-        message=_message(task, history, outcome, place, slower, known, last),
-        share=place,
-    )
+    of_its_own: dict[str, Any] = {
+        "outcome": int(outcome),
+        "jump_cycle": jump,
+        "error_estimate": float(errors[-1]) if known.size else math.nan,
+        "step_limit": history.step_limit / slower,
+        "last_cycle": last,
+        "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
+        "message": _message(task, history, outcome, place, slower, known, last),
+    }
+    of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
+    variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
+    return MarchResult(scaled.points, {**variables, **of_march, **of_its_own}, place)
 
 
-def share_outcome(
+def scaled_outcome(
     task: MarchTask, history: WearHistory, known: NDArray[np.intp], place: int, *, whole: bool
 ) -> Outcome:
-    """How one share of a march ended, judged by its own rows.
+    """How one history of a task ended, judged by its own rows.
 
-    known: rows of the history at the counts of the share that were reached. whole: whether these are all. The march
-    itself, which is the first share, ended as the history says; so did those that were not reached to their end.
+    known: rows of the march at its own counts that were reached. whole: whether these are all. The march
+    itself, which is the first one, ended as the history says; so did those that were not reached to their end.
     """
     ended = history.outcome
     if place == 0 or not whole:
@@ -260,9 +221,9 @@ def _message(
     known: NDArray[np.intp],
     last: float,
 ) -> str:
-    """What the outcome of a share does not say by itself.
+    """What the outcome of a history does not say by itself.
 
-    What the solver says counts the cycles of the march: it holds for the first share, and an error for all.
+    What the solver says counts the cycles of the march: it holds for the first history, and an error for all.
     """
     said = history.message if place == 0 or outcome is Outcome.EXCEPTION else ""
     if said or outcome is Outcome.CONVERGED or not known.size:
@@ -309,13 +270,3 @@ def _moves(start: StartState) -> bool:
         return False
     motion_h = start.state.displacement_h
     return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))
-
-
-def _solver_settings(settings: Settings) -> SolverSettings:
-    # "auto" goes through as it is: the solver has to know it.
-    limit = settings.time_limit
-    return SolverSettings(settings.harmonics, settings.samples, settings.tolerance, settings.rtol, limit)
-
-
-def _packed(kept: Kept | None) -> Packed | None:
-    return None if kept is None else Packed(kept.text, kept.arrays)

@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, Ledger
+from solver.outcome import COMPLETE, Outcome
+from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.course import Course, fault_of
-from studyrunner.evaluate import COMPLETE, CRASHED, NOT_COMPUTED, build_evaluator, failed_results
+from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
     MOST_DEATHS,
     Crash,
-    Evaluate,
-    Keep,
     count_crashes,
     forget_crashes,
     note_tasks,
@@ -25,16 +23,16 @@ from studyrunner.mpi.crashes import (
 )
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
-from studyrunner.netcdf.earlier import holds_finished_result
-from studyrunner.netcdf.output import parts_folder, remove_leftovers
+from studyrunner.netcdf.output import holds_finished_result, parts_folder, remove_leftovers
 from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.results import MarchResult, StartResult
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
-from studyrunner.progress import RunProgress, count
 from studyrunner.scene.scene import describe_scene, scene_to_keep
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study import Study
 from studyrunner.system.folder_lock import StoreInUseError
+from studyrunner.system.progress import ProgressDisplay, count
+from studyrunner.task_progress import TaskProgress, fault_of
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -83,7 +81,7 @@ def run_study(
     study: Study,
     model: ReducedModel,
     path: Path,
-    progress: RunProgress,
+    progress: ProgressDisplay,
     *,
     fresh: bool = False,
     retry_failed: bool = False,
@@ -91,11 +89,31 @@ def run_study(
 ) -> RunSummary:
     """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
 
-    It goes on from what an earlier run has left in the folder beside the file, unless `fresh`; retry_failed: points
-    that failed there are computed again; prune: what other studies have left there is removed at the end.
-    A finished result that stands there already is replaced by one without missing points only. Raises UserError where
-    another run is at work there or `path` is a file of something else, StorageError where something cannot be written,
-    and Interrupted.
+    A finished result that stands there already is replaced by one without missing points only.
+
+    Parameters
+    ----------
+    ranks, study, model
+        The ranks, and what they are to compute.
+    path
+        The result file. Beside it is the folder in which an earlier run has left what it had.
+    progress
+        What the user sees on the way.
+    fresh
+        Whether to begin anew. Else the run goes on from what is in the folder.
+    retry_failed
+        Whether points that failed there are computed again.
+    prune
+        Whether what other studies have left there is removed at the end.
+
+    Raises
+    ------
+    UserError
+        Where another run is at work there or `path` is a file of something else.
+    StorageError
+        Where something cannot be written.
+    Interrupted
+        Where the run is ended from outside; what there is has been written.
     """
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements)
@@ -111,16 +129,16 @@ def run_study(
         for note in store.notes:
             progress.note(note)
         remove_leftovers(path, alone=store.locked)
-        ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+        completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
         if fresh:
-            ledger.forget_all()
-        crashes = take_crashes(ledger, fresh=fresh)
+            completion.forget_all()
+        crashes = take_crashes(completion, fresh=fresh)
         if retry_failed:
-            ledger.forget_failed(COMPLETE)
+            completion.forget_failed(COMPLETE)
         for crash in crashes:
-            if ledger.is_left(crash.key):
+            if completion.is_left(crash.key):
                 progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
-        n_found = ledger.n_points_finished
+        n_found = completion.n_points_finished
         if n_found:
             progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
 
@@ -129,7 +147,7 @@ def run_study(
             from studyrunner.netcdf.gather import gather
 
             store.flush()
-            gathered = gather(study, facts, ledger, path, of_scene, kept_scene, keep_finished)
+            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished)
             return _summarise(plan, n_found, gathered, keep_finished)
 
         try:
@@ -137,29 +155,39 @@ def run_study(
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
             with _evaluator(job, rank=0) as evaluate:
-                run_tasks(ranks, ledger, evaluate, progress)
+                run_tasks(ranks, completion, evaluate, progress)
             progress.say("writing the result")
             summary = write()
         except KeyboardInterrupt:
             raise Interrupted(write()) from None
         if summary.n_left == 0:
-            forget_crashes(store.folder, None if prune else ledger.keys)
-            ledger.prune(0.0 if prune else MOST_OF_OTHERS)
+            forget_crashes(store.folder, None if prune else completion.keys)
+            completion.prune(0.0 if prune else MOST_OF_OTHERS)
     return summary
 
 
-def take_crashes(ledger: Ledger, *, fresh: bool = False) -> list[Crash]:
-    """Points whose task has crashed two processes in earlier runs have failed. The new crashes of which there is one.
+def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Crash]:
+    """Points whose task has crashed two processes in earlier runs have failed.
 
-    fresh: crashes of this study's tasks in earlier runs do not count.
+    Parameters
+    ----------
+    completion
+        What is finished, in the folder of the run.
+    fresh
+        Whether crashes of this study's tasks in earlier runs do not count.
+
+    Returns
+    -------
+    list of Crash
+        The new ones of tasks that have crashed once.
     """
-    folder, own = ledger.store.folder, ledger.keys
+    folder, own = completion.store.folder, completion.keys
     new = count_crashes(folder)
     if fresh:
         forget_crashes(folder, own)
     for key, crashes in read_tally(folder).items():
         if key in own and len(crashes) >= MOST_DEATHS:
-            ledger.take_as_failed(key, crashes[-1].position, CRASHED, crashes[-1].message)
+            completion.take_as_failed(key, crashes[-1].position, Outcome.CRASHED, crashes[-1].message)
             # it is on the disk: where it is asked for again, counting begins anew
             forget_crashes(folder, {key})
     tally = read_tally(folder)
@@ -179,11 +207,11 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
     return RunSummary(
         n_points=plan.n_points,
         n_complete=sum(outcomes[number] for number in COMPLETE),
-        n_left=outcomes[NOT_COMPUTED],
+        n_left=outcomes[Outcome.NOT_COMPUTED],
         n_found=n_found,
         findings=gathered.findings,
         certificates=gathered.certificates,
-        written=not (keep_finished and outcomes[NOT_COMPUTED]),
+        written=not (keep_finished and outcomes[Outcome.NOT_COMPUTED]),
     )
 
 
@@ -219,13 +247,14 @@ def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluat
     return note_tasks(evaluate, job.folder, rank)
 
 
-def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunProgress) -> None:
+def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, progress: ProgressDisplay) -> None:
     """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
-    course = Course(ledger, {key: len(crashes) for key, crashes in read_tally(ledger.store.folder).items()})
+    tally = read_tally(completion.store.folder)
+    tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
-        new = course.take(task, result)
-        if isinstance(task, BranchTask) and course.n_starts_left == 0:
+        new = tasks.take(task, result)
+        if isinstance(task, BranchTask) and tasks.n_starts_left == 0:
             progress.say("marching through the remaining wear histories")
         return new
 
@@ -244,17 +273,17 @@ def run_tasks(ranks: Ranks, ledger: Ledger, evaluate: Evaluate, progress: RunPro
     def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
         had = f", which had {count(len(lost), 'task')}" if lost else ""
         progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in count_crashes(ledger.store.folder, rank)}
-        return course.take_back(lost, crashes)
+        crashes = {crash.key: crash for crash in count_crashes(completion.store.folder, rank)}
+        return tasks.take_back(lost, crashes)
 
     def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
-        ledger.store.tick()
-        progress.tick(lambda: course.look(running()))
+        completion.store.tick()
+        progress.tick(lambda: tasks.look(running()))
 
-    if course.branches:
-        n_branches = count(len(course.branches), "branch", "branches")
-        n_starts = count(course.n_starts_left, "start state")
+    if tasks.branches:
+        n_branches = count(len(tasks.branches), "branch", "branches")
+        n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, course.begin(), evaluate, take, course.costs, tick, ledger.keep, take_back, is_sick)
-    ledger.store.flush()
+    serve_tasks(ranks, tasks.begin(), evaluate, take, tasks.costs, tick, completion.keep, take_back, is_sick)
+    completion.store.flush()

@@ -27,6 +27,10 @@ class Variable:
         return self.dtype.startswith("U")
 
 
+_AUXILIARY, _REFERENCE = "auxiliaryInformation", "referenceInformation"
+_UNPLACED = "NaN where the scene does not say."
+_NO_FORM = "NaN where no closed form holds."
+
 ASKED = {
     "worn_volume": Variable(
         ("cycle",),
@@ -148,20 +152,19 @@ ASKED = {
 
 SCENE: dict[str, dict[str, Variable]] = {
     "mesh": {
-        "mesh_x": Variable(("mesh_node",), "m", "position of the node, x", content="auxiliaryInformation"),
-        "mesh_y": Variable(("mesh_node",), "m", "position of the node, y", content="auxiliaryInformation"),
-        "mesh_z": Variable(("mesh_node",), "m", "position of the node, z", content="auxiliaryInformation"),
+        **{
+            f"mesh_{axis}": Variable(("mesh_node",), "m", f"position of the node, {axis}", content=_AUXILIARY)
+            for axis in "xyz"
+        },
         "mesh_quad": Variable(
             ("mesh_quad_index", "mesh_corner"),
             "1",
             "nodes of the outer face, anticlockwise from outside",
             "int32",
-            content="auxiliaryInformation",
+            content=_AUXILIARY,
             comment="Indices along mesh_node.",
         ),
-        "mesh_part": Variable(
-            ("mesh_quad_index",), "1", "part that the face belongs to", "str", content="auxiliaryInformation"
-        ),
+        "mesh_part": Variable(("mesh_quad_index",), "1", "part that the face belongs to", "str", content=_AUXILIARY),
     },
     "natural_frequency": {
         "natural_frequency": Variable(
@@ -172,37 +175,29 @@ SCENE: dict[str, dict[str, Variable]] = {
         ),
     },
     "exact": {
-        "exact_worn_volume": Variable(
-            ("cycle",),
-            "m3",
-            "exact worn volume",
-            content="referenceInformation",
-            comment="NaN where no closed form holds.",
-        ),
+        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", content=_REFERENCE, comment=_NO_FORM),
         "exact_response_amplitude": Variable(
             ("cycle", "response"),
             "m",
             "exact amplitude of the first harmonic of the response",
-            content="referenceInformation",
-            comment="NaN where no closed form holds.",
+            content=_REFERENCE,
+            comment=_NO_FORM,
         ),
     },
 }
 """What `outputs.variables` asks of the scene under one name; the exact answers alone have the axes of the study."""
 
 LOOPS = {
-    "loop_displacement": Variable(
+    name: Variable(
         ("cycle", "contact", "phase", "component"),
-        "m",
-        "relative displacement through a period, positive where it closes",
+        units,
+        f"{meaning} through a period, positive {sign}",
         comment="In the frame of the pair; NaN for pairs that outputs.loops does not name.",
-    ),
-    "loop_force": Variable(
-        ("cycle", "contact", "phase", "component"),
-        "N",
-        "contact force through a period, positive in compression",
-        comment="In the frame of the pair; NaN for pairs that outputs.loops does not name.",
-    ),
+    )
+    for name, units, meaning, sign in (
+        ("loop_displacement", "m", "relative displacement", "where it closes"),
+        ("loop_force", "N", "contact force", "in compression"),
+    )
 }
 """Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
 
@@ -328,15 +323,10 @@ COORDINATES = {
     "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
     "nodal_diameter": Variable((), "1", "nodal diameter"),
     "mode": Variable((), "1", "number of the mode, by frequency"),
-    "contact_x": Variable(
-        ("contact",), "m", "position of the contact pair, x", comment="NaN where the scene does not say."
-    ),
-    "contact_y": Variable(
-        ("contact",), "m", "position of the contact pair, y", comment="NaN where the scene does not say."
-    ),
-    "contact_z": Variable(
-        ("contact",), "m", "position of the contact pair, z", comment="NaN where the scene does not say."
-    ),
+    **{
+        f"contact_{axis}": Variable(("contact",), "m", f"position of the contact pair, {axis}", comment=_UNPLACED)
+        for axis in "xyz"
+    },
     "contact_area": Variable(
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),

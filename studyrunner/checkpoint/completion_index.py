@@ -8,18 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from studyrunner.checkpoint.records import failed_result, pack
+from solver.packing import Packed
+from studyrunner.checkpoint.records import pack
 from studyrunner.checkpoint.shelf import Place
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
-from studyrunner.plan.results import Kept, MarchResult, StartResult, read_start
+from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 
 MOST_OF_OTHERS = 2.0**30
 """Bytes: what other studies have left under the same name is kept up to this size."""
 
 
-class Ledger:
+class CompletionIndex:
     """Every finished history and start state of a plan, in a store that may hold them from earlier runs.
 
     What a task computes does not depend on what was there before: a run that goes on ends with the same numbers.
@@ -38,7 +39,7 @@ class Ledger:
                 self._marches[march.number] = identities.of_march(self._histories[march.number])
 
     def histories(self, march: MarchTask) -> tuple[str, ...]:
-        """What the histories of a march are known by, one for each share."""
+        """What the histories of a march are known by."""
         return self._histories[march.number]
 
     @property
@@ -56,7 +57,7 @@ class Ledger:
         )
 
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
-        """Where the histories of a march are, one for each share; None for those that are not finished."""
+        """Where the histories of a march are; None for those that are not finished."""
         return tuple(self.store.histories.get(key) for key in self._histories[march.number])
 
     def is_finished(self, march: MarchTask) -> bool:
@@ -89,7 +90,7 @@ class Ledger:
         """Start states of a branch that are known and from which there is something to march."""
         keys, needed = self._starts[branch.number], self._needed(branch)
         return [
-            read_start(place, self.store.read_start(key))
+            unpack_start(place, self.store.read_start(key))
             for place, key in enumerate(keys)
             if place in needed and self.store.has_start(key)
         ]
@@ -114,19 +115,19 @@ class Ledger:
 
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
         """A start state has come."""
-        self.store.add_start(self._starts[branch.number][result.position], result.keep())
+        self.store.add_start(self._starts[branch.number][result.position], result.pack())
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """A history has come."""
-        key = self._histories[march.number][result.share]
-        ended = result.share == march.n_results - 1 and result.progress is None
+        key = self._histories[march.number][result.place]
+        ended = result.place == march.n_results - 1 and result.progress is None
         self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
         if result.progress is not None:
             self.store.keep_progress(self.key(march), result.progress)
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """A task says how far it is."""
-        if not isinstance(progress, Kept):
+        if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
         self.store.keep_progress(self.key(task), progress)
 
@@ -137,7 +138,7 @@ class Ledger:
             without_state = {
                 place
                 for place, key in enumerate(keys)
-                if self.store.has_start(key) and read_start(place, self.store.read_start(key)).failed
+                if self.store.has_start(key) and unpack_start(place, self.store.read_start(key)).failed
             }
             for place in without_state:
                 self.store.forget_start(keys[place])
@@ -149,9 +150,21 @@ class Ledger:
                         self.store.forget_history(key)
 
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
-        """The task of this key ends its processes: no other run tries it again. How many points are lost with it.
+        """The task of this key ends its processes: no other run tries it again.
 
-        position: place on a branch that it was on the way to, None for a march. The branch ends before that place.
+        Parameters
+        ----------
+        key
+            Of the task.
+        position
+            Place on a branch that it was on the way to, before which the branch ends; None for a march.
+        outcome, message
+            Of the points that are lost with it.
+
+        Returns
+        -------
+        int
+            Number of these points.
         """
         n_points = 0
         for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
@@ -164,7 +177,7 @@ class Ledger:
                     continue
                 for place, known in enumerate(self.places(march)):
                     if known is None:
-                        n_points += len(march.shares[place].points)
+                        n_points += len(march.histories[place].points)
                         self.add_history(march, failed_result(march, place, outcome, message))
         self.store.flush()
         return n_points

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from studyrunner.plan.results import Kept
+from solver.packing import Packed
 from studyrunner.system.files import open_plain
 
 KEY = "key"
@@ -65,9 +65,21 @@ def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
 
 
 def load_records(path: Path, *, check: bool = True) -> NDArray[np.void]:
-    """Records that stay on the disk until they are used. check: the sum as well.
+    """Records that stay on the disk until they are used.
 
-    Raises ValueError where they are damaged and OSError where they cannot be read.
+    Parameters
+    ----------
+    path
+        A file of records.
+    check
+        Whether all of it is read to see whether its check sum is right.
+
+    Raises
+    ------
+    ValueError
+        Where they are damaged.
+    OSError
+        Where they cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
         kind, n_records = _read_header(file)
@@ -89,7 +101,7 @@ def record_keys(records: NDArray[np.void]) -> list[str]:
     return [_text(key) for key in records[KEY].tolist()]
 
 
-def write_bundle(file: IO[bytes], entries: Mapping[str, Kept]) -> None:
+def write_bundle(file: IO[bytes], entries: Mapping[str, Packed]) -> None:
     """Entries by their key."""
     contents = [_as_bytes(entry) for entry in entries.values()]
     _write_entries(file, list(entries), list(map(len, contents)), contents)
@@ -102,7 +114,7 @@ def load_keys(path: Path) -> list[str]:
         return list(_Contents.of(file).keys)
 
 
-def read_entry(path: Path, place: int) -> Kept:
+def read_entry(path: Path, place: int) -> Packed:
     """An entry of a bundle. Raises ValueError where it is damaged and OSError where it cannot be read."""
     with open_plain(path, LARGEST_PART) as file:
         return _from_bytes(_Contents.of(file).read(file, place))
@@ -162,16 +174,16 @@ def _write_entries(file: IO[bytes], keys: Sequence[str], lengths: Sequence[int],
     summed.end()
 
 
-def _as_bytes(entry: Kept) -> bytes:
+def _as_bytes(entry: Packed) -> bytes:
     buffer = io.BytesIO()
     for array in (np.frombuffer(entry.text.encode(), np.uint8), *entry.arrays):
         npy.write_array(buffer, np.asanyarray(array), allow_pickle=False)
     return buffer.getvalue()
 
 
-def _from_bytes(content: bytes) -> Kept:
+def _from_bytes(content: bytes) -> Packed:
     text, *arrays = _arrays_in(content)
-    return Kept(text.tobytes().decode(), tuple(arrays))
+    return Packed(text.tobytes().decode(), tuple(arrays))
 
 
 def _arrays_in(content: bytes) -> Iterator[NDArray[np.generic]]:

@@ -17,9 +17,9 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.packing import Packed
 from studyrunner.checkpoint.part_files import Rows, merge_bundles, merge_records, write_bundle, write_records
 from studyrunner.checkpoint.shelf import PartFile
-from studyrunner.plan.results import Kept
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 
@@ -34,8 +34,8 @@ class Batch:
     """Entries that are written together, by key. finished: keys of tasks whose progress is of no use after that."""
 
     records: dict[str, NDArray[np.void]] = field(default_factory=dict)
-    starts: dict[str, Kept] = field(default_factory=dict)
-    progress: dict[str, Kept] = field(default_factory=dict)
+    starts: dict[str, Packed] = field(default_factory=dict)
+    progress: dict[str, Packed] = field(default_factory=dict)
     finished: set[str] = field(default_factory=set)
     n_bytes: float = 0.0
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import MarchTask, march_variables
+from studyrunner.plan.tasks import march_variables
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
@@ -43,8 +43,6 @@ def pack(kind: np.dtype[np.void], key: str, result: MarchResult) -> NDArray[np.v
     """Record (1,) of a history that is known by `key`."""
     records = empty_record(kind)
     records[KEY] = key.encode("ascii")
-    for name in KEPT:
-        records[name] = getattr(result, name)
     for name, values in result.values.items():
         records[name] = values
     return records
@@ -63,24 +61,3 @@ def _empty_bytes(kind: np.dtype[np.void]) -> bytes:
         if kind[name].base.kind == "f":
             records[name] = math.nan
     return records.tobytes()
-
-
-def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> MarchResult:
-    """Result of a history that nobody computed to its end."""
-    return MarchResult(
-        points=task.shares[place].points,
-        outcome=outcome,
-        values={},
-        jump_cycle=math.nan,
-        error_estimate=math.nan,
-        newton_iterations=0,
-        run_time=math.nan,
-        branch=0,
-        fold_frequency=math.nan,
-        step_limit=math.nan,
-        oscillates=False,
-        last_cycle=math.nan,
-        largest_wear_depth=math.nan,
-        message=message,
-        share=place,
-    )

@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.packing import Packed
 from studyrunner.checkpoint.part_files import load_records, read_entry
 from studyrunner.checkpoint.part_writer import PROGRESS, RECORDS, STARTS, Batch, Job, Merge, PartWriter, Written
 from studyrunner.checkpoint.shelf import PartFile, Place, Shelf
 from studyrunner.checkpoint.stock import take_stock
 from studyrunner.checkpoint.writer import Writer
-from studyrunner.plan.results import Kept
 from studyrunner.system.files import NotPlainError, sync_folder
 from studyrunner.system.folder_lock import FolderLock
 from studyrunner.user_error import StorageError
@@ -108,7 +108,7 @@ class Store:
             self._waiting.finished.add(task)
         self._count(self.kind.itemsize)
 
-    def add_start(self, key: str, start: Kept) -> None:
+    def add_start(self, key: str, start: Packed) -> None:
         """A start state to be written."""
         self._waiting.starts[key] = start
         self._count(start.n_bytes)
@@ -117,20 +117,20 @@ class Store:
         """Whether a start state is there."""
         return key in self._starts.places or any(key in batch.starts for batch in self._unwritten())
 
-    def read_start(self, key: str) -> Kept:
+    def read_start(self, key: str) -> Packed:
         """A start state that is there."""
         for batch in self._unwritten():
             if key in batch.starts:
                 return batch.starts[key]
         return self._read(self._starts, key)
 
-    def keep_progress(self, key: str, progress: Kept) -> None:
+    def keep_progress(self, key: str, progress: Packed) -> None:
         """How far a task is, to be written in place of what was written of it before."""
         self._waiting.progress[key] = progress
         self._waiting.finished.discard(key)
         self._count(progress.n_bytes)
 
-    def read_progress(self, key: str) -> Kept | None:
+    def read_progress(self, key: str) -> Packed | None:
         """How far a task was; None where that is not known."""
         for batch in self._unwritten():
             if key in batch.progress:
@@ -153,7 +153,10 @@ class Store:
     def tick(self) -> None:
         """Called many times a second: hands over what waits, at once where nothing was written a moment ago.
 
-        Raises StorageError where what was handed over before could not be written.
+        Raises
+        ------
+        StorageError
+            Where what was handed over before could not be written.
         """
         self._take()
         if self._waiting.empty or self._writer.busy:
@@ -305,7 +308,7 @@ class Store:
         self._number += 1
         return self._number
 
-    def _read(self, shelf: Shelf, key: str) -> Kept:
+    def _read(self, shelf: Shelf, key: str) -> Packed:
         number, row = shelf.places[key]
         path = shelf.files[number].path
         try:

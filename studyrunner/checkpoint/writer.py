@@ -41,8 +41,14 @@ class Writer(Generic[Job, Done]):
     def take(self, accept: Callable[[Job, Done], None], refuse: Callable[[Job], None], *, wait: bool = False) -> None:
         """Takes note of the jobs that have ended. Raises what a job raised.
 
-        accept: called with a job and what came of it. refuse: with a job that failed. wait: until there is nothing
-        more to take note of.
+        Parameters
+        ----------
+        accept
+            Called with a job and what came of it.
+        refuse
+            Called with a job that failed.
+        wait
+            Whether to wait until there is nothing more to take note of.
         """
         while True:
             self._something_ended.clear()

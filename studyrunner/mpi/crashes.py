@@ -15,19 +15,13 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.files import NotPlainError, create, open_plain, sync_folder
-
-Keep = Callable[[Kept], None]
-"""Takes note of how far a task is."""
-
-Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]
-"""Does a task: gives its results one by one, and hands over now and then how far it is."""
 
 MOST_DEATHS = 2
 """A task that has ended so many processes is not tried again."""
@@ -72,7 +66,7 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
                 os.pwrite(file.fileno(), text.ljust(_LINE - 1).encode() + b"\n", 0)
 
     def noted(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        wanted = [place for place in task.order if place not in task.known] if isinstance(task, BranchTask) else []
+        wanted = task.order_left if isinstance(task, BranchTask) else ()
         note(" ".join([task.key, *map(str, wanted[:1])]))
         for n_given, result in enumerate(evaluate(task, keep), start=1):
             yield result

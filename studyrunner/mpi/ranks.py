@@ -263,7 +263,10 @@ class TolerantRanks(MpiRanks):
 def start_ranks() -> Ranks:
     """The ranks that the launcher started, or this process alone where there is no launcher.
 
-    Raises LauncherError where the launcher started more processes than the MPI library knows of.
+    Raises
+    ------
+    LauncherError
+        Where the launcher started more processes than the MPI library knows of.
     """
     if not has_launcher():
         return Alone()

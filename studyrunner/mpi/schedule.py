@@ -158,15 +158,35 @@ def serve_tasks(
     take_back: TakeBack[Task] = give_again,
     is_sick: Callable[[int, Result], bool] = lambda *_: False,
 ) -> None:
-    """Rank 0: has all tasks done, its own share by `run`, and hands every result to `take`.
+    """Rank 0: has all tasks done, its own ones by `run`, and hands every result to `take`.
 
-    run: gives the results of a task one by one. take: called in the main thread, in the order in which results arrive;
-        returns the tasks that the result makes possible. costs: learns what tasks take. tick: called many times a
-        second, with what tells the tasks that run, as `Dispatcher.running`. keep: called with how far a task is; never
-        after its last result. tasks: are taken one by one, as there is use for them. take_back: called with a rank that
-        is lost and the tasks that it had. is_sick: whether a result of a rank tells that it should get no more tasks.
-    Raises what a task on this rank raised, and KeyboardInterrupt where another rank was interrupted; an exception on
-    another rank ends that rank's process.
+    An exception on another rank ends that rank's process; one of a task on this rank is raised here.
+
+    Parameters
+    ----------
+    ranks
+        All of them.
+    tasks
+        Are taken one by one, as there is use for them.
+    run
+        Gives the results of a task one by one.
+    take
+        Called in the main thread, in the order in which results arrive; returns the tasks that a result makes possible.
+    costs
+        Learns what tasks take.
+    tick
+        Called many times a second, with what tells the tasks that run, as `Dispatcher.running`.
+    keep
+        Called with how far a task is; never after its last result.
+    take_back
+        Called with a rank that is lost and the tasks that it had.
+    is_sick
+        Whether a result of a rank tells that it should get no more tasks.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Where another rank was interrupted.
     """
     dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
     local = _LocalWorker(run, _seconds_to_progress(ranks))

@@ -37,15 +37,20 @@ def describe_software() -> dict[str, str]:
     }
 
 
-def answer_roll_call(ranks: Ranks) -> None:
+def report_version(ranks: Ranks) -> None:
     """Any other rank: tells rank 0 what it runs."""
     ranks.send((platform.node(), describe_software()), 0)
 
 
-def call_roll(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
-    """Rank 0: raises LauncherError where another rank runs something else, or does not answer within `seconds`.
+def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
+    """Rank 0: compares what the other ranks run with what it runs itself.
 
-    Raises KeyboardInterrupt where another rank was interrupted.
+    Raises
+    ------
+    LauncherError
+        Where another rank runs something else, or does not answer within `seconds`.
+    KeyboardInterrupt
+        Where another rank was interrupted.
     """
     if ranks.size == 1:
         return

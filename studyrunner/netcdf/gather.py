@@ -17,11 +17,12 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.checkpoint.completion_index import Ledger
+from solver.outcome import Outcome
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.records import empty_record, variable_sizes
 from studyrunner.checkpoint.store import Store
-from studyrunner.evaluate import NOT_COMPUTED, endings
+from studyrunner.netcdf.attributes import attributes, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
@@ -31,7 +32,7 @@ from studyrunner.summary.certificates import CertificateTable
 from studyrunner.summary.findings import Findings
 from studyrunner.system.files import replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
+from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_OF_CACHE = 2**16
@@ -77,7 +78,7 @@ class _Entry:
 def gather(
     study: Study,
     facts: SceneFacts,
-    ledger: Ledger,
+    completion: CompletionIndex,
     path: Path,
     of_scene: Sequence[SceneVariable] = (),
     scene: KeptScene | None = None,
@@ -85,20 +86,38 @@ def gather(
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
-    of_scene: what no task computes. scene: what goes into the group of the scene, None for none. Points that are not
-    computed yet say so in their outcome. keep_finished: `path` holds a finished result, and is left as it is where
-    points of this one are missing. Raises StorageError.
+    Points that are not computed yet say so in their outcome.
+
+    Parameters
+    ----------
+    study, facts
+        The study, and what is known of its scene.
+    completion
+        The histories that there are.
+    path
+        The file, which is replaced by a whole one or stays as it was.
+    of_scene
+        What no task computes.
+    scene
+        What goes into the group of the scene, None for none.
+    keep_finished
+        `path` holds a finished result, and is left as it is where points of this one are missing.
+
+    Raises
+    ------
+    StorageError
+        Where the file cannot be written, or a file of the run cannot be read.
     """
-    index, gathered = _read_through(study, facts, ledger)
-    left = gathered.outcomes[NOT_COMPUTED]
+    index, gathered = _read_through(study, facts, completion)
+    left = gathered.outcomes[Outcome.NOT_COMPUTED]
     if left and keep_finished:
         return gathered
     try:
         with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
             file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
-            _write_values(file, study, facts, ledger.store, index)
-            _write_scene(file, study, ledger.store, of_scene)
+            _write_values(file, study, facts, completion.store, index)
+            _write_scene(file, study, completion.store, of_scene)
             _write_coordinates(file, study, facts)
             if scene is not None:
                 write_scene_group(file, scene)
@@ -108,7 +127,7 @@ def gather(
     return gathered
 
 
-def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Index, Gathered]:
+def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[_Index, Gathered]:
     """Reads every file once, piece by piece: where each point is, how it ended, and the table.
 
     A record that is not the one that is asked for, as another run may have changed its file, leaves its points out.
@@ -117,30 +136,31 @@ def _read_through(study: Study, facts: SceneFacts, ledger: Ledger) -> tuple[_Ind
     n_points = math.prod(shape)
     index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
     found: dict[int, list[_Entry]] = {}
-    for march in itertools.chain.from_iterable(ledger.plan.marches):
-        for key, share, place in zip(ledger.histories(march), march.shares, ledger.places(march), strict=True):
+    for march in itertools.chain.from_iterable(completion.plan.marches):
+        keys, places = completion.histories(march), completion.places(march)
+        for key, scaled, place in zip(keys, march.histories, places, strict=True):
             if place is not None:
-                found.setdefault(place[0], []).append(_Entry(place[1], key, share.points))
+                found.setdefault(place[0], []).append(_Entry(place[1], key, scaled.points))
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
     changed: list[str] = []
-    at_once = max(1, int(_BYTES_A_SLAB // ledger.store.kind.itemsize))
+    at_once = max(1, int(_BYTES_A_SLAB // completion.store.kind.itemsize))
     for number, entries in found.items():
         entries.sort(key=lambda entry: entry.row)
         for first in range(0, len(entries), at_once):
-            there, records = _read_entries(ledger.store, number, entries[first : first + at_once])
+            there, records = _read_entries(completion.store, number, entries[first : first + at_once])
             if len(there) < len(entries[first : first + at_once]):
-                changed.append(ledger.store.path(number).name)
+                changed.append(completion.store.path(number).name)
             for outcome, entry in zip(records["outcome"].tolist(), there, strict=True):
                 outcomes[outcome] += len(entry.points)
                 at = np.ravel_multi_index(np.transpose(entry.points), shape)
                 index.file[at], index.row[at], index.key[at] = number, entry.row, entry.key.encode()
             for collected in (table, findings):
                 collected.add([entry.points for entry in there], records)
-    outcomes[NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
+    outcomes[Outcome.NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
     lost = [
-        f"{name} in {ledger.store.folder.name} does not hold any more what this run has written there: its points are"
-        " not computed, the same command goes on"
+        f"{name} in {completion.store.folder.name} does not hold any more what this run has written there:"
+        " its points are not computed, the same command goes on"
         for name in dict.fromkeys(changed)
     ]
     return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))
@@ -173,21 +193,10 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
         dimensions = (*study.dimensions, *entry.dimensions)
         if entry.is_text:
             # of any length, which cannot be compressed
-            file.createVariable(name, str, dimensions).setncatts(_attributes(name, entry))
+            file.createVariable(name, str, dimensions).setncatts(attributes(name, entry))
             continue
-        variable = file.createVariable(
-            name,
-            entry.dtype,
-            dimensions,
-            compression="zlib",
-            complevel=1,
-            shuffle=True,
-            chunksizes=(*slab, *(1 if _one_pair(name, of) else sizes[of] for of in entry.dimensions)),
-            fill_value=math.nan if entry.dtype.startswith("float") else None,
-        )
-        # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
-        variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
-        variable.setncatts(_attributes(name, entry))
+        own = (1 if _one_pair(name, dimension) else sizes[dimension] for dimension in entry.dimensions)
+        variable = _create(file, name, entry, dimensions, (*slab, *own))
         if "contact" in entry.dimensions:
             variable.setncattr("coordinates", _ON_CONTACT)
     if not any("contact" in entry.dimensions for entry in variables.values()):
@@ -204,6 +213,19 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
                 continue
             for place, pair in enumerate(study.outputs.loops):
                 file[name][(*region, slice(None), pair)] = values[..., place, :, :]
+
+
+def _create(
+    file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int]
+) -> netCDF4.Variable[Any]:
+    """A compressed variable with its attributes."""
+    fill = math.nan if entry.dtype.startswith("float") else None
+    options: Any = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": chunks, "fill_value": fill}
+    variable = file.createVariable(name, entry.dtype, dimensions, **options)
+    # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+    variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
+    variable.setncatts(attributes(name, entry))
+    return variable
 
 
 def _one_pair(name: str, dimension: str) -> bool:
@@ -239,7 +261,7 @@ def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np
     """Records of points that follow each other in the file."""
     files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
     missing = empty_record(store.kind)
-    missing["outcome"] = NOT_COMPUTED
+    missing["outcome"] = Outcome.NOT_COMPUTED
     records = np.repeat(missing, last - first)
     order = np.argsort(files, kind="stable")
     bounds = np.flatnonzero(np.diff(files[order], prepend=-2, append=-2))
@@ -268,17 +290,7 @@ def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Se
             _write_whole(file, scene.name, dimensions, scene.values, scene.entry)
             continue
         own = scene.values.shape[len(shape) :]
-        variable = file.createVariable(
-            scene.name,
-            scene.entry.dtype,
-            (*study.dimensions, *dimensions),
-            compression="zlib",
-            complevel=1,
-            shuffle=True,
-            chunksizes=(*slab, *own),
-            fill_value=math.nan,
-        )
-        variable.setncatts(_attributes(scene.name, scene.entry))
+        variable = _create(file, scene.name, scene.entry, (*study.dimensions, *dimensions), (*slab, *own))
         values = np.broadcast_to(scene.values, (*shape, *own))
         for region, _, _ in _slabs(shape, slab):
             variable[region] = values[region]
@@ -296,52 +308,5 @@ def _write_whole(
     texts = values.dtype.kind == "U"
     kind: Any = str if texts else values.dtype
     variable = file.createVariable(name, kind, dimensions)
-    variable.setncatts(_attributes(name, entry))
+    variable.setncatts(attributes(name, entry))
     variable[:] = values.astype(object) if texts else values
-
-
-def _attributes(name: str, entry: Variable) -> dict[str, object]:
-    """Attributes of a variable of the file."""
-    content = "coordinate" if name in COORDINATES else entry.content
-    found: dict[str, object] = {
-        "units": entry.units,
-        "long_name": entry.long_name,
-        "coverage_content_type": content,
-    }
-    if entry.comment:
-        found["comment"] = entry.comment
-    if entry.flags:
-        found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
-        found["flag_meanings"] = " ".join(entry.flags)
-    if name == "outcome":
-        found["flag_values"] = np.array([flag.number for flag in endings()], dtype=entry.dtype)
-        found["flag_meanings"] = " ".join(flag.meaning for flag in endings())
-        found["sentences"] = "\n".join(flag.sentence for flag in endings())
-    if name in ASKED and not entry.dtype.startswith("float"):
-        found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
-    return found
-
-
-def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
-    """Coordinates of the file: name, dimension, values."""
-    found: dict[str, tuple[str, NDArray[np.generic]]] = {
-        name: (name, _labels(values)) for name, values in study.dimensions.items()
-    }
-    found["cycle"] = ("cycle", np.array(study.cycles_kept))
-    found["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
-    found["response"] = ("response", _labels(facts.response_names))
-    if study.outputs.loops:
-        found["phase"] = ("phase", 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES)
-        found["component"] = ("component", _labels(LOOP_COMPONENTS))
-    for column, name in enumerate(("contact_x", "contact_y", "contact_z")):
-        found[name] = ("contact", np.array(facts.position[:, column]))
-    found["contact_area"] = ("contact", np.array(facts.area))
-    found["contact_surface"] = ("contact", _labels(facts.surface))
-    return found
-
-
-def _labels(values: Sequence[object]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every reader of NetCDF knows; all text where one is."""
-    texts = any(isinstance(value, str) for value in values)
-    array = np.array([str(value) for value in values] if texts else values)
-    return array.astype(np.int32) if array.dtype.kind == "i" else array

@@ -17,7 +17,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from studyrunner.plan.sharing import Share
+from studyrunner.plan.sharing import ScaledHistory
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import Study
 
@@ -48,14 +48,15 @@ class Identities:
         return self._lines[branch.number]
 
     def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:
-        """Of the histories of a march, one for each of its shares."""
+        """Of the histories of a march, one after the other."""
         start = self.of_starts(branch)[march.position]
-        own = (*self._wear(march, march.shares[0]), march.scheme if not march.held else "", march.held)
+        own = (*self._wear(march, march.histories[0]), march.scheme if not march.held else "", march.held)
         kept = march.cycles, march.loops
         if kept not in self._kept:
             self._kept[kept] = _digest(self._kind, kept)
         base = ("history", start, self._kept[kept], own, march.largest_depth)
-        return tuple(_digest(*base, place > 0, self._wear(march, share)) for place, share in enumerate(march.shares))
+        wear = (self._wear(march, scaled) for scaled in march.histories)
+        return tuple(_digest(*base, place > 0, each) for place, each in enumerate(wear))
 
     @staticmethod
     def of_march(histories: tuple[str, ...]) -> str:
@@ -67,11 +68,11 @@ class Identities:
         return _digest("branch", self.of_starts(branch))
 
     @staticmethod
-    def _wear(march: MarchTask, share: Share) -> tuple[float, float | None]:
+    def _wear(march: MarchTask, scaled: ScaledHistory) -> tuple[float, float | None]:
         """Wear coefficient and, where it matters, step."""
         of_its_own = march.held or march.scheme == "adaptive"
         of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
-        return share.wear_coefficient, None if of_its_own else share.step
+        return scaled.wear_coefficient, None if of_its_own else scaled.step
 
 
 @cache

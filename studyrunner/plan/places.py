@@ -11,11 +11,11 @@ from studyrunner.variables import COORDINATES
 _SHORT = 1e4
 
 
-def show_percent(share: float) -> str:
+def show_percent(fraction: float) -> str:
     """A relative number in percent: "2.6 %"; more than ten times the whole in short."""
-    if share < 1.0:
-        return f"{100.0 * share:.2g} %"
-    return f"{100.0 * share:.0f} %" if share < 10.0 else f"{100.0 * share:.0e} %"
+    if fraction < 1.0:
+        return f"{100.0 * fraction:.2g} %"
+    return f"{100.0 * fraction:.0f} %" if fraction < 10.0 else f"{100.0 * fraction:.0e} %"
 
 
 def known_to(error: float) -> str:

@@ -14,10 +14,10 @@ from studyrunner.plan.estimate import (
     seconds_an_iteration,
 )
 from studyrunner.plan.tasks import TaskPlan
-from studyrunner.progress import count, format_seconds
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.variables import loop_numbers
 from studyrunner.study.study import AUTO, Study
+from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE
 

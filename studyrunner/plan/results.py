@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from solver.packing import Packed
 from studyrunner.plan.sharing import Index
-
-
-@dataclass(frozen=True)
-class Kept:
-    """Something of the solver in a form that goes into a file: a text that refers to arrays by their place."""
-
-    text: str
-    arrays: tuple[NDArray[np.generic], ...]
-
-    @property
-    def n_bytes(self) -> int:
-        """Size in a file."""
-        return len(self.text) + sum(array.nbytes for array in self.arrays)
+from studyrunner.plan.tasks import BranchTask, MarchTask
 
 
 @dataclass(frozen=True)
@@ -35,7 +22,7 @@ class StartResult:
     """
 
     position: int
-    start: Kept
+    start: Packed
     moves: bool
     n_unknowns: int
     lost: str = ""
@@ -45,40 +32,50 @@ class StartResult:
         """Whether there is no state."""
         return self.n_unknowns == 0
 
-    def keep(self) -> Kept:
+    def pack(self) -> Packed:
         """All but the position, for a file."""
-        return Kept(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
+        return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
 
-def read_start(position: int, kept: Kept) -> StartResult:
-    """What `StartResult.keep` gave."""
-    moves, n_unknowns, text = json.loads(kept.text)
-    return StartResult(position, Kept(text, kept.arrays), moves, n_unknowns)
+def unpack_start(position: int, packed: Packed) -> StartResult:
+    """What `StartResult.pack` gave."""
+    moves, n_unknowns, text = json.loads(packed.text)
+    return StartResult(position, Packed(text, packed.arrays), moves, n_unknowns)
 
 
 @dataclass(frozen=True)
 class MarchResult:
     """One history of a task, and the points that have it.
 
-    values: variable -> array with the dimensions of that variable after the axes; after `last_cycle` NaN, or 0 where
-        the variable is a whole number.
-    share: its place among the shares of the task. progress: how far a march was that was given up for its time.
-    The others are variables of the result without further dimensions, see `studyrunner.variables.KEPT`.
+    values: variables of the result by name: those of `studyrunner.variables.KEPT`, which have no further dimensions,
+        and arrays with the dimensions of the variable after the axes; after `last_cycle` these are NaN, or 0 where the
+        variable is a whole number. What is not there is not known: NaN, 0 or an empty text in the file.
+    place: its own among the histories of the task. progress: how far a march was that was given up for its time.
     """
 
     points: tuple[Index, ...]
-    outcome: int
-    values: Mapping[str, NDArray[np.generic]]
-    jump_cycle: float
-    error_estimate: float
-    newton_iterations: int
-    run_time: float
-    branch: int
-    fold_frequency: float
-    step_limit: float
-    oscillates: bool
-    last_cycle: float
-    largest_wear_depth: float
-    message: str = ""
-    share: int = 0
-    progress: Kept | None = None
+    values: Mapping[str, Any]
+    place: int = 0
+    progress: Packed | None = None
+
+    @property
+    def outcome(self) -> int:
+        """How the computation ended, a number of the result file."""
+        return int(self.values["outcome"])
+
+    @property
+    def message(self) -> str:
+        """What the outcome does not say by itself."""
+        return str(self.values.get("message", ""))
+
+
+Keep = Callable[[Packed], None]
+"""Takes note of how far a task is."""
+
+Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]
+"""Does a task: gives its results one by one, and hands over now and then how far it is."""
+
+
+def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> MarchResult:
+    """Result of a history that nobody computed to its end. place: its own among the histories of the task."""
+    return MarchResult(task.histories[place].points, {"outcome": outcome, "message": message}, place)

@@ -12,7 +12,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from studyrunner.study.study import AUTO, Automatic, Study
+from solver.settings import Automatic
+from studyrunner.study.study import AUTO, Study
 
 Index = tuple[int, ...]
 Choice = tuple[int, int, int]
@@ -32,11 +33,11 @@ _REASONS = {
 
 
 @dataclass(frozen=True)
-class Share:
-    """Points that have one history, at the same cycle counts.
+class ScaledHistory:
+    """A history that a march gives, its slow time scaled, and the points that have it at the same cycle counts.
 
-    wear_coefficient: 1/Pa. step: cycles. points: indices along the dimensions of the study. Where the step does not
-    matter it is that of the first point.
+    wear_coefficient: 1/Pa; its ratio to that of the march scales the slow time. step: cycles; that of the first point
+    where the step does not matter. points: indices along the dimensions of the study.
     """
 
     wear_coefficient: float
@@ -48,11 +49,11 @@ class Share:
 class Alike:
     """Choices whose histories one march computes.
 
-    shares: for each of its histories, the choices that have it; first those of the march itself, which goes farthest.
+    histories: for each of them the choices that have it; first those of the march itself, which goes farthest.
     held: nothing wears, so the state at cycle 0 holds for all cycles.
     """
 
-    shares: tuple[tuple[Choice, ...], ...]
+    histories: tuple[tuple[Choice, ...], ...]
     held: bool = False
 
 
@@ -66,7 +67,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Sharing:
-    """What is computed from each start state of a study: every choice is in one share of one march."""
+    """What is computed from each start state of a study: every choice is in one history of one march."""
 
     marches: tuple[Alike, ...]
     causes: Counter[str]
@@ -80,10 +81,7 @@ class Sharing:
 
 
 def share_histories(study: Study) -> Sharing:
-    """The histories that are computed once, for a reason that the study itself shows.
-
-    With `shortcuts = false` every choice is a march of its own.
-    """
+    """The histories that are computed once, for a reason that the study itself shows; all with `shortcuts = false`."""
     axes, slow_time = study.axes, study.slow_time
     choices = itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme)))
     if not study.solver.shortcuts:
@@ -121,7 +119,7 @@ def share_histories(study: Study) -> Sharing:
         for same in _same_products(study, of_scheme):
             marches.append(Alike(tuple((choice,) for choice in same)))
             causes["equal products"] += len(same) - 1
-    marches.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.shares)))
+    marches.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.histories)))
     return Sharing(tuple(marches), causes)
 
 
@@ -154,19 +152,21 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
         yield from ((choice,) for choice in others if choice not in whole)
 
 
-def march_counts(cycles: Sequence[float], share: Share, march: Share, steps_of_given_length: bool) -> tuple[float, ...]:
-    """Cycle counts of a march at which the states are those of a share of it at `cycles`, ascending.
+def march_counts(
+    cycles: Sequence[float], scaled: ScaledHistory, march: ScaledHistory, steps_of_given_length: bool
+) -> tuple[float, ...]:
+    """Cycle counts of a march at which its states are those of a scaled history at `cycles`, ascending.
 
     A count at the end of a step lies a hair before it, so that it belongs to that step whatever the round-off.
     """
-    if share == march:
+    if scaled == march:
         return tuple(cycles)
     if not steps_of_given_length:
-        ratio = share.wear_coefficient / march.wear_coefficient
+        ratio = scaled.wear_coefficient / march.wear_coefficient
         return tuple(ratio * cycle for cycle in cycles)
     counts = []
     for cycle in cycles:
-        n_steps = cycle / share.step
+        n_steps = cycle / scaled.step
         whole = _whole_number(n_steps)
         counts.append(march.step * (n_steps if whole is None else (1.0 - _SAME) * whole))
     return tuple(counts)

@@ -8,6 +8,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from solver.packing import Packed
+from solver.settings import Automatic, SolverSettings
 from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
@@ -16,19 +18,18 @@ from studyrunner.plan.estimate import (
     iterations_of_march,
     seconds_an_iteration,
 )
-from studyrunner.plan.results import Kept
 from studyrunner.plan.sharing import (
     Alike,
     Choice,
     Index,
     LeftOut,
-    Share,
+    ScaledHistory,
     Sharing,
     march_counts,
     rtol_is_idle,
     share_histories,
 )
-from studyrunner.study.study import AUTO, SOLVER_AXES, Automatic, Study
+from studyrunner.study.study import AUTO, SOLVER_AXES, Study
 from studyrunner.variables import ASKED, CERTIFICATE, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
@@ -36,17 +37,6 @@ BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 
 _NEIGHBOURS = 4  # frequencies whose marches take about as long
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Solver keys of a task."""
-
-    harmonics: int | Automatic
-    samples: int | Automatic
-    tolerance: float
-    rtol: float
-    time_limit: float
 
 
 @dataclass(frozen=True)
@@ -62,11 +52,11 @@ class BranchTask:
     number: int
     excitation_amplitude: float
     sweep: str
-    settings: Settings
+    settings: SolverSettings
     frequencies: tuple[float, ...]
     cost: float
     known: frozenset[int] = frozenset()
-    resume: Kept | None = field(default=None, compare=False, repr=False)
+    resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
 
     @property
@@ -105,7 +95,7 @@ class BranchTask:
 class MarchTask:
     """One wear history from a start state on a branch, and those of other points that are read from it.
 
-    branch, position: number of the branch and place of the frequency in it. shares: its histories, the one that goes
+    branch, position: number of the branch and place of the frequency in it. histories: the one that goes
     farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
     cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
@@ -118,10 +108,10 @@ class MarchTask:
     number: int
     branch: int
     position: int
-    settings: Settings
+    settings: SolverSettings
     scheme: str
     largest_depth: float | None
-    shares: tuple[Share, ...]
+    histories: tuple[ScaledHistory, ...]
     held: bool
     cycles: tuple[float, ...]
     variables: tuple[str, ...]
@@ -129,35 +119,35 @@ class MarchTask:
     cost: float
     n_unknowns: int
     moves: bool = True
-    start: Kept | None = field(default=None, compare=False, repr=False)
-    resume: Kept | None = field(default=None, compare=False, repr=False)
+    start: Packed | None = field(default=None, compare=False, repr=False)
+    resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
 
     @property
     def wear_coefficient(self) -> float:
         """Of the march itself, 1/Pa."""
-        return self.shares[0].wear_coefficient
+        return self.histories[0].wear_coefficient
 
     @property
     def step(self) -> float:
         """Of the march itself, cycles."""
-        return self.shares[0].step
+        return self.histories[0].step
 
     @property
     def points(self) -> tuple[Index, ...]:
         """All points that it gives a history for."""
-        return tuple(itertools.chain.from_iterable(share.points for share in self.shares))
+        return tuple(itertools.chain.from_iterable(scaled.points for scaled in self.histories))
 
     @property
     def n_results(self) -> int:
         """Histories that it gives."""
-        return len(self.shares)
+        return len(self.histories)
 
-    def counts(self, share: Share) -> tuple[float, ...]:
+    def counts(self, scaled: ScaledHistory) -> tuple[float, ...]:
         """Cycle counts of the march that a history is read at, one for each of `cycles`."""
         if self.held:
             return (0.0,) * len(self.cycles)
-        return march_counts(self.cycles, share, self.shares[0], self.scheme != "adaptive")
+        return march_counts(self.cycles, scaled, self.histories[0], self.scheme != "adaptive")
 
     @property
     def opens_others(self) -> bool:
@@ -280,9 +270,9 @@ def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
             yield from ((one,) for one in lines)
 
 
-def _settings(study: Study, line: Index) -> Settings:
+def _settings(study: Study, line: Index) -> SolverSettings:
     harmonics, samples, tolerance, rtol = line[2:]
-    return Settings(
+    return SolverSettings(
         harmonics=study.harmonics[harmonics],
         samples=study.samples[samples],
         tolerance=study.tolerance[tolerance],
@@ -308,8 +298,8 @@ def _marches(
     """Tasks of all points at one frequency of one branch."""
     axes = study.axes
     for alike in sharing.marches:
-        shares = _shares(study, alike, frequency, lines)
-        scheme = axes.scheme[alike.shares[0][0][2]]
+        histories = _histories(study, alike, frequency, lines)
+        scheme = axes.scheme[alike.histories[0][0][2]]
         cycles = 0.0 if alike.held else study.cycles_kept[-1]
         yield MarchTask(
             number=next(numbers),
@@ -318,25 +308,25 @@ def _marches(
             settings=_settings(study, lines[0]),
             scheme=scheme,
             largest_depth=study.slow_time.largest_depth if scheme == "explicit" else None,
-            shares=shares,
+            histories=histories,
             held=alike.held,
             cycles=study.cycles_kept,
             variables=march_variables(study),
             loops=study.outputs.loops,
-            cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, shares[0].step),
+            cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, histories[0].step),
             n_unknowns=n_unknowns,
         )
 
 
-def _shares(study: Study, alike: Alike, frequency: int, lines: tuple[Index, ...]) -> tuple[Share, ...]:
-    """The shares of a march with their points."""
+def _histories(study: Study, alike: Alike, frequency: int, lines: tuple[Index, ...]) -> tuple[ScaledHistory, ...]:
+    """The histories of a march with their points."""
     return tuple(
-        Share(
+        ScaledHistory(
             study.axes.wear_coefficient[choices[0][0]],
             study.axes.step[choices[0][1]],
             tuple(_point(study, frequency, line, choice) for line in lines for choice in choices),
         )
-        for choices in alike.shares
+        for choices in alike.histories
     )
 
 

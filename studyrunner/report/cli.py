@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import studyrunner.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
 
 # isort: split
 import argparse
@@ -98,11 +98,11 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
-        from studyrunner.progress import count, format_seconds
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page.page import write_page
         from studyrunner.report.reading.door import check_numbers, reading_errors
         from studyrunner.report.reading.result import open_result
+        from studyrunner.system.progress import count, format_seconds
 
         result = open_result(options.result)
         with result.dataset, reading_errors(str(options.result)):

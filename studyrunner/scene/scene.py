@@ -50,7 +50,11 @@ def build_study_scene(study: Study) -> ReducedModel:
 
     Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
     may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
-    Raises UserError where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
+
+    Raises
+    ------
+    UserError
+        Where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
     """
     model = _build(study)
     check_outputs(study, model)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_answer, scene_frequencies, scene_has, scene_mesh
-from studies.stuck_modes import stuck_frequencies
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
@@ -72,7 +72,10 @@ def loop_numbers(study: Study) -> int:
 def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
     """All that the study asks of its scene. Natural frequencies of a bundled sector take some seconds.
 
-    Raises UserError where the scene cannot give them.
+    Raises
+    ------
+    UserError
+        Where the scene cannot give them.
     """
     asked = study.outputs.variables
     with _user_errors(study):

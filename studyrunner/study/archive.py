@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studies.sandboxed_read import check_result_readable, check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
-from studies.vetting import is_hdf5, vet_result, vet_scene
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -50,44 +52,45 @@ class Archived:
         return tuple(lines)
 
 
-def read_archived(path: Path, name: str) -> Archived:
-    """Reads the attributes of a result file, called `name` by the user. Raises UserError."""
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5
-
+@contextmanager
+def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
+    """What is wrong with a result file, called `name` by the user, becomes UserError. prefix: of the key at fault."""
     try:
-        vet_scene(path, SCENE_GROUP, _ATTRIBUTES)
-        with open_hdf5(path, LARGEST_RESULT) as file:
-            found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
-            if not found["study"]:
-                remedy = "missing: give a study file (TOML) or a result file of run-study"
-                raise UserError(name, "the attribute study", None, remedy)
-            return Archived(**found, holds_scene=SCENE_GROUP in file)
+        yield
     except SceneError as error:
-        where = "the file" if error.key == "model" else f"the attribute {error.key}"
+        where = "the file" if error.key == "model" else prefix + error.key
         raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
     except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
         raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
 
 
+def read_archived(path: Path, name: str) -> Archived:
+    """Reads the attributes of a result file, called `name` by the user. Raises UserError."""
+    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
+
+    with _user_errors(name, "the attribute "):
+        check_scene_readable(path, SCENE_GROUP, _ATTRIBUTES)
+        with open_hdf5(path, LARGEST_RESULT) as file:
+            found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
+            if not found["study"]:
+                remedy = "missing: give a study file (TOML) or a result file of run-study"
+                raise UserError(name, "the attribute study", None, remedy)
+            return Archived(**found, holds_scene=SCENE_GROUP in file)
+
+
 def check_result_file(path: Path, name: str) -> None:
     """Raises UserError where a result file, called `name` by the user, is none or could do harm to who opens it."""
-    try:
+    with _user_errors(name):
         if not path.exists():
             raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
         if not path.is_file() or not is_hdf5(path):
             raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
-        vet_result(path)
-    except SceneError as error:
-        where = "the file" if error.key == "model" else error.key
-        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+        check_result_readable(path)
 
 
 def _read_text(file: h5py.File, name: str) -> str:
-    from studies.hdf5_guard import read_attribute
+    from studies.guards.hdf5_guard import read_attribute
 
     value = read_attribute(file, name)
     if value is None:

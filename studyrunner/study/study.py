@@ -7,51 +7,43 @@ from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, TypeAdapter, model_validator
 
+from solver.settings import Automatic
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
-    axis_of,
-    number_or,
-    one_of,
-    read_fraction,
-    read_not_negative,
-    read_number,
-    read_positive,
-    read_switch,
-    whole_number,
+    Axis,
+    Fraction,
+    Harmonics,
+    NotNegative,
+    Positive,
+    Samples,
+    Scheme,
+    Sweep,
+    Switch,
+    Text,
+    once,
+    read,
+    whole,
 )
 from studyrunner.user_error import WrongValueError
 from studyrunner.variables import ASKED, KEPT, SCENE
 
-Automatic = Literal["auto"]
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
 
 SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 
-_MOST_HARMONICS, _MOST_SAMPLES = 1000, 100_000
-_MOST_OUTPUTS = 1_000_000
 _MOST_POINTS = 1_000_000
-_MOST_PAIRS = 1_000_000
-
-_read_harmonics = number_or(AUTO, whole_number(1, _MOST_HARMONICS))
-_read_samples = number_or(AUTO, whole_number(4, _MOST_SAMPLES))
-_read_scheme = one_of("implicit", "explicit", "adaptive")
+_N_OUTPUTS = TypeAdapter(Annotated[int, whole(1, 1_000_000)])
+_COUNT = TypeAdapter(NotNegative)
+_PAIR = TypeAdapter(Annotated[int, whole(0, 1_000_000)])
 
 DEFAULT: Final = "default"
 """In a list of variables: those that cost little, which is what a study without such a list asks for."""
-
-PositiveAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_positive))]
-NotNegativeAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_not_negative))]
-HarmonicsAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_harmonics))]
-SamplesAxis = Annotated[tuple[int | Automatic, ...], BeforeValidator(axis_of(_read_samples))]
-FractionAxis = Annotated[tuple[float, ...], BeforeValidator(axis_of(read_fraction))]
-Scheme = Literal["implicit", "explicit", "adaptive"]
-Sweep = Literal["up", "down", "ramp"]
 
 
 def _read_name(value: object) -> str:
@@ -62,16 +54,11 @@ def _read_name(value: object) -> str:
     return value
 
 
-def _read_text(value: object) -> str:
-    if not isinstance(value, str):
-        raise WrongValueError(value, "give a text in quotes")
-    return value
-
-
 def _read_outputs(value: object) -> int | tuple[float, ...]:
     if not isinstance(value, list | tuple):
-        return whole_number(1, _MOST_OUTPUTS)(value)
-    counts = tuple(read_not_negative(item) for item in value)
+        n_outputs: int = read(_N_OUTPUTS, value)
+        return n_outputs
+    counts = tuple(read(_COUNT, item) for item in value)
     if not counts or any(later <= earlier for earlier, later in pairwise(counts)):
         raise WrongValueError(value, "give a number of outputs or an ascending list of cycle counts")
     return counts
@@ -81,24 +68,17 @@ def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
     known = (*ASKED, *SCENE, *KEPT)
-    seen: list[str] = []
     for name in value:
-        if name in seen or (name == DEFAULT and list(value).count(DEFAULT) > 1):
-            raise WrongValueError(name, "give every name once")
-        if name not in known:
+        if name != DEFAULT and name not in known:
             raise WrongValueError(name, f'give "{DEFAULT}" or names out of {", ".join(known)}')
-        seen.append(name)
-    return tuple(name for name in (*ASKED, *SCENE) if name in value)
+    names = once(value)
+    return tuple(name for name in (*ASKED, *SCENE) if name in names)
 
 
 def _read_loops(value: object) -> tuple[int, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of contact indices")
-    pairs = sorted(whole_number(0, _MOST_PAIRS)(item) for item in value)
-    for pair, other in pairwise(pairs):
-        if pair == other:
-            raise WrongValueError(pair, "give every contact index once")
-    return tuple(pairs)
+    return tuple(sorted(once(read(_PAIR, item) for item in value)))
 
 
 class Section(BaseModel):
@@ -111,26 +91,24 @@ class StudySection(Section):
     """[study]: how the study is called."""
 
     name: Annotated[str, BeforeValidator(_read_name)] = Field(description="name of the study and of its result file")
-    title: Annotated[str, BeforeValidator(_read_text)] = Field("", description="goes into the result")
+    title: Text = Field("", description="goes into the result")
 
 
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
-    frequency: PositiveAxis = Field(description="Hz; a number, a list or {start, stop, num}")
-    wear_coefficient: NotNegativeAxis = Field((1.1e-11,), description="1/Pa")
-    excitation_amplitude: PositiveAxis = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
-    step: PositiveAxis = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
-    scheme: Annotated[tuple[Scheme, ...], BeforeValidator(axis_of(_read_scheme))] = Field(
-        ("adaptive",), description="of the wear steps"
-    )
-    sweep: Annotated[tuple[Sweep, ...], BeforeValidator(axis_of(one_of("up", "down", "ramp")))] = Field(
+    frequency: Axis[Positive] = Field(description="Hz; a number, a list or {start, stop, num}")
+    wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa")
+    excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
+    step: Axis[Positive] = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
+    scheme: Axis[Scheme] = Field(("adaptive",), description="of the wear steps")
+    sweep: Axis[Sweep] = Field(
         ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"
     )
-    harmonics: HarmonicsAxis | None = Field(None, description="harmonics above the static one")
-    samples: SamplesAxis | None = Field(None, description="time samples in a period")
-    tolerance: FractionAxis | None = Field(None, description="of the scaled residual")
-    rtol: FractionAxis | None = Field(
+    harmonics: Axis[Harmonics] | None = Field(None, description="harmonics above the static one")
+    samples: Axis[Samples] | None = Field(None, description="time samples in a period")
+    tolerance: Axis[Fraction] | None = Field(None, description="of the scaled residual")
+    rtol: Axis[Fraction] | None = Field(
         None, description="relative error that automatic settings and adaptive steps aim at"
     )
 
@@ -138,13 +116,11 @@ class AxesSection(Section):
 class SlowTimeSection(Section):
     """[slow_time]: how far, and which cycle counts are kept."""
 
-    cycles: Annotated[float, BeforeValidator(read_not_negative)] = Field(
-        100_000.0, description="cycles; 0 for the unworn states only"
-    )
+    cycles: NotNegative = Field(100_000.0, description="cycles; 0 for the unworn states only")
     outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
         101, description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts"
     )
-    largest_depth: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+    largest_depth: Positive | None = Field(
         None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
     )
 
@@ -152,20 +128,14 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: how finely and how exactly. A key that stands under [axes] is not used from here."""
 
-    harmonics: Annotated[int | Automatic, BeforeValidator(_read_harmonics)] = Field(
-        AUTO, description="harmonics above the static one"
-    )
-    samples: Annotated[int | Automatic, BeforeValidator(_read_samples)] = Field(
-        AUTO, description="time samples in a period"
-    )
-    tolerance: Annotated[float, BeforeValidator(read_fraction)] = Field(1e-8, description="of the scaled residual")
-    rtol: Annotated[float, BeforeValidator(read_fraction)] = Field(
-        1e-2, description="relative error that automatic settings and adaptive steps aim at"
-    )
-    shortcuts: Annotated[bool, BeforeValidator(read_switch)] = Field(
+    harmonics: Harmonics = Field(AUTO, description="harmonics above the static one")
+    samples: Samples = Field(AUTO, description="time samples in a period")
+    tolerance: Fraction = Field(1e-8, description="of the scaled residual")
+    rtol: Fraction = Field(1e-2, description="relative error that automatic settings and adaptive steps aim at")
+    shortcuts: Switch = Field(
         True, description="whether points with the same history share one; false: every point is computed on its own"
     )
-    time_limit: Annotated[float, BeforeValidator(read_positive)] | None = Field(
+    time_limit: Positive | None = Field(
         None, description="s, CPU time that a start state or a wear history may take; none unless it is given"
     )
 
@@ -184,9 +154,7 @@ class OutputsSection(Section):
 class SceneFileParameters(Section):
     """[scene] of a scene file: the file says all the rest."""
 
-    friction_coefficient: Annotated[float, BeforeValidator(read_not_negative)] = Field(
-        description="a number, 0 or more"
-    )
+    friction_coefficient: NotNegative = Field(description="a number, 0 or more")
 
 
 class SceneSection(Section):
@@ -197,7 +165,7 @@ class SceneSection(Section):
     is a scene file. offers: names in `outputs.variables` of what this scene can tell and not all can.
     """
 
-    model: Annotated[str, BeforeValidator(_read_text)]
+    model: Text
     parameters: SerializeAsAny[BaseModel]
     path: Path | None = Field(None, exclude=True)
     group: str = Field("", exclude=True)
@@ -284,7 +252,7 @@ class Study(Section):
     @property
     def friction_coefficient(self) -> float:
         """Coulomb's coefficient of the scene."""
-        return read_number(dict(self.scene.parameters)["friction_coefficient"])
+        return float(dict(self.scene.parameters)["friction_coefficient"])
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:

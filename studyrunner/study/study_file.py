@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
-from studies.vetting import is_hdf5, vet_scene
 from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file
@@ -208,7 +208,7 @@ def _find_scene(model: str, source: str, path: Path, archived: Archived | None) 
             raise UserError(source, "scene.model", model, remedy)
     with scene_errors(source, scene_path):
         if not group:
-            vet_scene(scene_path)
+            check_scene_readable(scene_path)
         offers = ("mesh",) if has_mesh(scene_path, group) else ()
     return {"path": scene_path, "group": group, "offers": offers}
 
@@ -227,9 +227,8 @@ def _check(kind: type[Checked], table: Mapping[str, object], source: str, prefix
 
 
 def _user_error(kind: type[BaseModel], details: ErrorDetails, source: str, prefix: str) -> UserError:
-    place = [str(part) for part in details["loc"]]
-    key = ".".join(filter(None, (prefix, *place)))
-    owner, field = _owner(kind, place)
+    owner, names = _owner(kind, [str(part) for part in details["loc"]])
+    key, field = ".".join(filter(None, (prefix, *names))), names[-1] if names else ""
     description = owner.model_fields[field].description if field in owner.model_fields else None
     unit = f" ({description})" if description else ""
     if details["type"] == "extra_forbidden":
@@ -246,14 +245,14 @@ def _user_error(kind: type[BaseModel], details: ErrorDetails, source: str, prefi
     return UserError(source, key, details["input"], message + unit)
 
 
-def _owner(kind: type[BaseModel], place: Sequence[str]) -> tuple[type[BaseModel], str]:
-    """Class that holds the key at `place`, and the key's own name there."""
-    if not place:
-        return kind, ""
-    inner = kind.model_fields[place[0]].annotation if place[0] in kind.model_fields else None
-    if len(place) > 1 and isinstance(inner, type) and issubclass(inner, BaseModel):
-        return _owner(inner, place[1:])
-    return kind, place[0]
+def _owner(kind: type[BaseModel], place: Sequence[str]) -> tuple[type[BaseModel], Sequence[str]]:
+    """Class that holds the key at `place`, and the names that lead to it, without places in a list."""
+    for depth, name in enumerate(place, start=1):
+        inner = kind.model_fields[name].annotation if name in kind.model_fields else None
+        if depth == len(place) or not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            return kind, place[:depth]
+        kind = inner
+    return kind, ()
 
 
 def _nearest(name: str, known: Mapping[str, object] | Sequence[str]) -> str:

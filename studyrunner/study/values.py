@@ -1,132 +1,106 @@
-"""Checks of single values and of axes in a study file: a checked value, or WrongValueError with the remedy."""
+"""Types of the values in a study file: what pydantic accepts, and the sentence that a user reads where it does not."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Hashable, Iterable
+from typing import Annotated, Any, Literal, TypeVar
 
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError, WrapValidator
+
+from solver.settings import Automatic
 from studyrunner.user_error import WrongValueError
 
-T = TypeVar("T")
+T = TypeVar("T", bound=Hashable)
 
-_RANGE_KEYS = ("start", "stop", "num")
 LONGEST_AXIS = 100_000
 """Values of an axis: the effective study, which lists them, is to be read again."""
 
 
-def read_number(value: object) -> float:
-    """A finite number; whole numbers become floats, booleans and text are refused."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise WrongValueError(value, "give a number")
-    try:
-        number = float(value)
-    except OverflowError:
-        raise WrongValueError(value, "give a smaller number") from None
-    if not math.isfinite(number):
-        raise WrongValueError(value, "give a finite number")
-    return number
+def told(remedy: str) -> WrapValidator:
+    """Whatever of a value is refused, the user reads this remedy."""
 
-
-def read_positive(value: object) -> float:
-    """A finite number above 0."""
-    number = read_number(value)
-    if number <= 0.0:
-        raise WrongValueError(value, "give a number above 0")
-    return number
-
-
-def read_not_negative(value: object) -> float:
-    """A finite number that is 0 or more."""
-    number = read_number(value)
-    if number < 0.0:
-        raise WrongValueError(value, "give a number that is 0 or more")
-    return number
-
-
-def read_switch(value: object) -> bool:
-    """Only true or false; numbers and text are refused."""
-    if not isinstance(value, bool):
-        raise WrongValueError(value, "give true or false")
-    return value
-
-
-def read_fraction(value: object) -> float:
-    """A number between 0 and 1, both left out."""
-    number = read_number(value)
-    if not 0.0 < number < 1.0:
-        raise WrongValueError(value, "give a number between 0 and 1")
-    return number
-
-
-def whole_number(smallest: int, largest: int) -> Callable[[object], int]:
-    """Check for a whole number from `smallest` to `largest`; 5.0 and 1e4 are whole numbers, too."""
-
-    def read(value: object) -> int:
-        number = read_number(value)
-        if number != math.floor(number) or number < smallest:
-            raise WrongValueError(value, f"give a whole number of at least {smallest}")
-        if number > largest:
-            raise WrongValueError(value, f"give a whole number of at most {largest}")
-        return int(number)
-
-    return read
-
-
-def one_of(*words: str) -> Callable[[object], str]:
-    """Check for one of a few words."""
-    choice = " or ".join(f'"{word}"' for word in words)
-
-    def read(value: object) -> str:
-        if not isinstance(value, str) or value not in words:
-            raise WrongValueError(value, f"give {choice}")
-        return value
-
-    return read
-
-
-def number_or(word: str, read: Callable[[object], T]) -> Callable[[object], T | str]:
-    """`read`, or the word that stands in place of a number."""
-
-    def read_or_word(value: object) -> T | str:
-        if value == word:
-            return word
+    def check(value: object, accept: Any) -> object:
         try:
-            return read(value)
-        except WrongValueError as error:
-            raise WrongValueError(error.value, f'{error.remedy}, or "{word}"') from None
+            return accept(value)
+        except ValidationError:
+            raise WrongValueError(value, remedy) from None
 
-    return read_or_word
-
-
-def axis_of(read: Callable[[object], T]) -> Callable[[object], tuple[T, ...]]:
-    """Check for an axis: one value, a list of them or {start, stop, num}, at least one value and each once.
-
-    The values keep the order in which they are given. {start, stop, num} is what numpy.linspace gives.
-    """
-
-    def read_axis(value: object) -> tuple[T, ...]:
-        if isinstance(value, dict):
-            value = _read_range(value)
-        values = tuple(read(item) for item in value) if isinstance(value, list | tuple) else (read(value),)
-        if not values:
-            raise WrongValueError(value, "give at least one value")
-        seen: set[T] = set()
-        for item in values:
-            if item in seen:
-                raise WrongValueError(item, "give every value of an axis once")
-            seen.add(item)
-        return values
-
-    return read_axis
+    return WrapValidator(check)
 
 
-def _read_range(table: dict[str, object]) -> list[float]:
-    if sorted(table) != sorted(_RANGE_KEYS):
+def words(*known: str) -> WrapValidator:
+    """One of a few words."""
+    return told("give " + " or ".join(f'"{word}"' for word in known))
+
+
+def whole(smallest: int, largest: int, *, or_auto: bool = False) -> WrapValidator:
+    """A whole number between two; 5.0 and 1e4 are whole numbers, too, true and "5" are not."""
+    number = TypeAdapter(Annotated[int, Field(ge=smallest, le=largest)])
+
+    def check(value: object, _: Any) -> object:
+        try:
+            if or_auto and value == "auto":
+                return value
+            return number.validate_python(None if isinstance(value, bool | str) else value, strict=False)
+        except ValidationError:
+            otherwise = ', or "auto"' if or_auto else ""
+            remedy = f"give a whole number, at least {smallest} and at most {largest}{otherwise}"
+            raise WrongValueError(value, remedy) from None
+
+    return WrapValidator(check)
+
+
+def _spread(value: object) -> tuple[object, ...]:
+    """The values of an axis: one, a list of them or {start, stop, num}, which is what numpy.linspace gives."""
+    if isinstance(value, dict):
+        return _spread_range(value)
+    if not isinstance(value, list | tuple):
+        return (value,)
+    if not value:
+        raise WrongValueError(value, "give at least one value")
+    return tuple(value)
+
+
+def _spread_range(table: dict[str, object]) -> tuple[float, ...]:
+    if table.keys() != {"start", "stop", "num"}:
         raise WrongValueError(table, "give a number, a list or {start, stop, num}")
-    start, stop = read_number(table["start"]), read_number(table["stop"])
-    num = whole_number(1, LONGEST_AXIS)(table["num"])
+    start, stop, num = read(_NUMBER, table["start"]), read(_NUMBER, table["stop"]), read(_LENGTH, table["num"])
     if num == 1:
-        return [start]
+        return (start,)
     width = (stop - start) / (num - 1)
-    return [position * width + start for position in range(num - 1)] + [stop]
+    return (*(position * width + start for position in range(num - 1)), stop)
+
+
+def read(kind: TypeAdapter[Any], value: object) -> Any:
+    """The value as this type has it. Raises the WrongValueError of the check that refuses it."""
+    try:
+        return kind.validate_python(value, strict=True)
+    except ValidationError as error:
+        raise error.errors()[0]["ctx"]["error"] from None
+
+
+def once(values: Iterable[T]) -> tuple[T, ...]:
+    """The values in their order. Raises WrongValueError where one of them comes twice."""
+    seen: dict[T, None] = {}
+    for value in values:
+        if value in seen:
+            raise WrongValueError(value, "give every value once")
+        seen[value] = None
+    return tuple(seen)
+
+
+Number = Annotated[float, Field(allow_inf_nan=False), told("give a finite number")]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), told("give a finite number above 0")]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), told("give a finite number that is 0 or more")]
+Fraction = Annotated[float, Field(gt=0, lt=1), told("give a number between 0 and 1")]
+Switch = Annotated[bool, told("give true or false")]
+Text = Annotated[str, told("give a text in quotes")]
+Harmonics = Annotated[int | Automatic, whole(1, 1000, or_auto=True)]
+Samples = Annotated[int | Automatic, whole(4, 100_000, or_auto=True)]
+Scheme = Annotated[Literal["implicit", "explicit", "adaptive"], words("implicit", "explicit", "adaptive")]
+Sweep = Annotated[Literal["up", "down", "ramp"], words("up", "down", "ramp")]
+Axis = Annotated[tuple[T, ...], BeforeValidator(_spread), AfterValidator(once)]
+"""Values of an axis in the order in which they are given, at least one and each once."""
+
+_NUMBER = TypeAdapter(Number)
+_LENGTH = TypeAdapter(Annotated[int, whole(1, LONGEST_AXIS)])

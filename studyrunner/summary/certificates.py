@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import COMPLETE
+from solver.outcome import COMPLETE
 from studyrunner.plan.sharing import Index
-from studyrunner.progress import count
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.small_wear import SmallWear
 from studyrunner.summary.worn_volumes import WornVolumes
+from studyrunner.system.progress import count
 from studyrunner.variables import CERTIFICATE, COORDINATES
 
 _NOT_OF_A_SWEEP = ("wear_coefficient", "step", "scheme")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import COMPLETE, CONVERGED, INACCURATE, NOT_COMPUTED, endings
+from solver.outcome import COMPLETE, Outcome
 from studyrunner.plan.places import describe_point, describe_reach
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
@@ -43,7 +43,7 @@ class Findings:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        for row in np.flatnonzero(records["outcome"] != CONVERGED).tolist():
+        for row in np.flatnonzero(records["outcome"] != Outcome.CONVERGED).tolist():
             outcome = int(records["outcome"][row])
             self._ended.setdefault(outcome, _Ended()).add(points[row], self._say(records[row]))
 
@@ -53,14 +53,12 @@ class Findings:
         outcomes: points by number; those that are not computed are in no record.
         """
         lines: list[str] = []
-        present = [ending for ending in endings() if ending.number != CONVERGED and outcomes.get(ending.number, 0)]
+        present = [ending for ending in Outcome if ending != Outcome.CONVERGED and outcomes.get(ending, 0)]
         most = max(1, MOST_NAMED // max(1, len(present)))
         for ending in present:
-            lines.append(
-                f"{outcomes[ending.number]} x {ending.meaning}: {ending.sentence}{self._remark(ending.number)}"
-            )
-            ended = self._ended.get(ending.number)
-            if ended is None or ending.number == NOT_COMPUTED:
+            lines.append(f"{outcomes[ending]} x {ending.meaning}: {ending.sentence}{self._remark(ending)}")
+            ended = self._ended.get(ending)
+            if ended is None or ending == Outcome.NOT_COMPUTED:
                 continue
             for point, said in ended.first[:most]:
                 text = ": ".join(filter(None, (describe_point(self._study, point), said)))
@@ -81,7 +79,7 @@ class Findings:
 
     def _remark(self, number: int) -> str:
         """Where a travelling wave has no nodal diameters for more harmonics, more of them are no use of the solver."""
-        if number != INACCURATE or self._largest_harmonics is None:
+        if number != Outcome.INACCURATE or self._largest_harmonics is None:
             return ""
         return (
             f" The scene holds the nodal diameters of {self._largest_harmonics} harmonics: one that holds more allows"

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import NOT_COMPUTED, endings
+from solver.outcome import Outcome
 from studyrunner.plan.places import describe_value
 from studyrunner.plan.sharing import Index
 from studyrunner.study.study import Study
@@ -54,11 +54,11 @@ class OutcomeTable:
         return list(zip(labels, texts, strict=True))
 
     def _cell(self, row: int, column: int, each: int) -> str:
-        found = {ending: self._counts[row, column, ending.number] for ending in endings()}
+        found = {ending: self._counts[row, column, ending] for ending in Outcome}
         missing = each - sum(found.values())
         texts = [
-            f"{number + (missing if ending.number == NOT_COMPUTED else 0)} {ending.meaning}"
+            f"{number + (missing if ending == Outcome.NOT_COMPUTED else 0)} {ending.meaning}"
             for ending, number in found.items()
-            if number + (missing if ending.number == NOT_COMPUTED else 0)
+            if number + (missing if ending == Outcome.NOT_COMPUTED else 0)
         ]
         return ", ".join(texts)

@@ -33,9 +33,9 @@ class SmallWear:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        shares = records["largest_wear_depth"] / self._spacing
-        self._n_beyond += sum(len(points[row]) for row in np.flatnonzero(shares > SMALL).tolist())
-        known = np.nan_to_num(shares, nan=-1.0)
+        ratios = records["largest_wear_depth"] / self._spacing
+        self._n_beyond += sum(len(points[row]) for row in np.flatnonzero(ratios > SMALL).tolist())
+        known = np.nan_to_num(ratios, nan=-1.0)
         largest = float(known.max(initial=-1.0))
         if largest >= 0.0:
             point = min(min(points[row]) for row in np.flatnonzero(known == largest).tolist())
@@ -46,14 +46,14 @@ class SmallWear:
         """One line: the largest depth over the distance between pairs; where that is not small, where and why."""
         if self._worst is None:
             return "nothing was computed"
-        share, point = self._worst
-        if share <= SMALL:
-            return f"depth over pair spacing at most {share:.2g}"
+        ratio, point = self._worst
+        if ratio <= SMALL:
+            return f"depth over pair spacing at most {ratio:.2g}"
         where = describe_point(self._study, point)
         at = f" at {where}" if where else ""
         all_of_them = f", above {SMALL:g} at {self._n_beyond} points" if self._n_beyond > 1 else ""
         remedy = "is wear_coefficient in 1/Pa? If it is, take fewer cycles"
-        return f"NOT MET: depth over pair spacing ({self._spacing:.2g} m) is {share:.2g}{at}{all_of_them}: {remedy}"
+        return f"NOT MET: depth over pair spacing ({self._spacing:.2g} m) is {ratio:.2g}{at}{all_of_them}: {remedy}"
 
 
 def pair_spacing(facts: SceneFacts) -> float:

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.evaluate import COMPLETE
+from solver.outcome import COMPLETE
 from studyrunner.plan.places import describe_point, show_percent
 from studyrunner.plan.sharing import Index
-from studyrunner.progress import count
 from studyrunner.study.study import AUTO, Study
+from studyrunner.system.progress import count
 
 _OF_STATES = 0.5
-"""Share of the error of a worn volume from which on that of the wear rate is what it comes from."""
+"""Fraction of the error of a worn volume from which on that of the wear rate is what it comes from."""
 
 
 class WornVolumes:

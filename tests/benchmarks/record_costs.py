@@ -12,12 +12,12 @@ from __future__ import annotations
 import sys
 import time
 
-from studyrunner.course import start_marches
 from studyrunner.evaluate import build_evaluator
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
+from studyrunner.task_progress import start_marches
 
 STUDY = (
     "axes.frequency={start = 209.5, stop = 213.5, num = 100}",

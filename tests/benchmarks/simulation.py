@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `studyrunner.plan.costs` and `studyrunner.run.Course`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `studyrunner.plan.costs`, `studyrunner.task_progress`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studyrunner.course import Course
 from studyrunner.mpi.dispatch import Assignment, Dispatcher
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.task_progress import TaskProgress
 
 Task = BranchTask | MarchTask
 
@@ -31,8 +31,8 @@ class Overheads:
     latency: float = 1e-3
 
 
-class MemoryLedger:
-    """Takes the place of `Ledger`, without a disk: nothing is there from an earlier run."""
+class MemoryIndex:
+    """Takes the place of `CompletionIndex`, without a disk: nothing is there from an earlier run."""
 
     n_points_finished = 0
 
@@ -102,8 +102,8 @@ def replay(
     started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s.
     """
     clock = 0.0
-    course = Course(MemoryLedger(plan))
-    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, course.costs, lambda: clock)
+    progress = TaskProgress(MemoryIndex(plan))
+    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, progress.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, StartResult | MarchResult]] = []
     queues: list[list[tuple[float, Assignment[Task]]]] = [[] for _ in range(n_ranks)]
@@ -160,16 +160,15 @@ def replay(
             computing[rank] = False
             if queues[rank]:
                 begin(rank)
-        dispatcher.add(course.take(task, result))
+        dispatcher.add(progress.take(task, result))
         dispatcher.watch()
         hand_out()
         last_end = clock
-    return Replay(n_ranks, work, last_end, longest_way, plan.n_points - course.n_points)
+    return Replay(n_ranks, work, last_end, longest_way, plan.n_points - progress.n_points)
 
 
 def _history(task: MarchTask) -> MarchResult:
-    nan = float("nan")
-    return MarchResult(task.points, 0, {}, nan, nan, 0, 0.0, 0, nan, float("inf"), False, nan, nan)
+    return MarchResult(task.points, {"outcome": 0})
 
 
 def lognormal(rng: np.random.Generator, spread: float) -> float:

@@ -28,14 +28,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner import progress, run
+from solver.packing import Packed
+from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.mpi.launcher import launcher_rank
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
-from tests.studyrunner.fakes import fake_branch, fake_evaluate
+from studyrunner.system import progress
+from tests.studyrunner.fakes import changed, fake_branch, fake_evaluate
 
 BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)
 """Goes with every start state: larger than what MPI sends off at once."""
@@ -51,7 +53,7 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
     n_steps = int(os.environ.get("FAKE_STEPS", "0"))
     crash, _, in_branch = os.environ.get("FAKE_CRASH", "").partition(" ")
 
-    def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         if isinstance(task, BranchTask):
             left = [position for position in task.order if position not in task.known]
             for place, started in enumerate(fake_branch(replace(task, known=frozenset()))):
@@ -68,13 +70,13 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
                     left.remove(started.position)
                     yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
                 if n_steps:
-                    keep(Kept("branch", (np.array([place + 1.0]),)))
+                    keep(Packed("branch", (np.array([place + 1.0]),)))
                 if "FAKE_PATIENCE" in os.environ:
                     wait_until(Path(f"branch{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
         else:
             yield from march(task, keep)
 
-    def march(task: MarchTask, keep: Callable[[Kept], None]) -> Iterator[MarchResult]:
+    def march(task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
         if crash and not in_branch and task.position == 1:
             end_process(crash)
         if launcher_rank() == failing:
@@ -90,8 +92,8 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
             if "FAKE_SECONDS" in os.environ and not n_steps:
                 for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
                     with Path(name).open("a", encoding="utf-8") as file:
-                        file.write(f"{result.run_time}\n")
-            yield replace(result, error_estimate=carried)
+                        file.write(f"{result.values['run_time']}\n")
+            yield changed(result, error_estimate=carried)
 
     return evaluate
 
@@ -105,7 +107,7 @@ def gone_on_from(task: BranchTask | MarchTask) -> int:
     return int(task.resume.arrays[0][0])
 
 
-def walk(task: MarchTask, n_steps: int, seconds: float, keep: Callable[[Kept], None]) -> float:
+def walk(task: MarchTask, n_steps: int, seconds: float, keep: Keep) -> float:
     """A number that depends on every bit of what is carried from step to step."""
     first = gone_on_from(task)
     carried = 0.1 + 0.01 * (task.number % 50) if task.resume is None else float(task.resume.arrays[0][1])
@@ -113,7 +115,7 @@ def walk(task: MarchTask, n_steps: int, seconds: float, keep: Callable[[Kept], N
         carried = 3.99 * carried * (1.0 - carried)
         time.sleep(seconds)
         note_step()
-        keep(Kept("march", (np.array([step + 1.0, carried]),)))
+        keep(Packed("march", (np.array([step + 1.0, carried]),)))
     return carried
 
 

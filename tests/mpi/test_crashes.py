@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.evaluate import CRASHED
+from solver.outcome import Outcome
 from tests.mpi.launching import CHEAP, FAKED, Running, results, run_to_end
 
 STUDY = [
@@ -43,7 +43,7 @@ def test_a_march_that_crashes_is_one_bad_point(how: str, n_ranks: int, whole: xr
     assert (first.said.count(said), second.said.count(said)) == (0, 1)
     assert run_to_end(n_ranks, STUDY, tmp_path, crash).status == 3
     found = results(tmp_path / "out.nc").squeeze()
-    assert found.outcome.values.tolist() == [0, CRASHED, 0, 0, 0]
+    assert found.outcome.values.tolist() == [0, Outcome.CRASHED, 0, 0, 0]
     assert str(found.message.values[1]).startswith(MESSAGES[how])
     assert found.worn_volume.isnull().all("cycle").values.tolist() == [False, True, False, False, False]
     # not tried again, unless asked for: then it crashes again, and once the reason is gone it does not
@@ -81,7 +81,7 @@ def test_crashes_are_counted_until_the_run_starts_over(tmp_path: Path) -> None:
         assert run_to_end(0, [*STUDY, *arguments], tmp_path, crash).status == -signal.SIGABRT
     # the last of them was at the task of the one before, which is in both studies
     assert run_to_end(0, STUDY, tmp_path, crash).status == 3
-    assert (results(tmp_path / "out.nc").outcome == CRASHED).sum() == 1
+    assert (results(tmp_path / "out.nc").outcome == Outcome.CRASHED).sum() == 1
 
 
 def is_at_a_task(folder: Path, n_ranks: int) -> bool:
@@ -101,7 +101,7 @@ def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
         assert run_to_end(0, STUDY, tmp_path, crash).status == -signal.SIGSEGV
     assert run_to_end(0, STUDY, tmp_path, crash).status == 3
     found = results(tmp_path / "out.nc").squeeze()
-    assert found.outcome.values.tolist() == [0, 0, 0, CRASHED, CRASHED]
+    assert found.outcome.values.tolist() == [0, 0, 0, Outcome.CRASHED, Outcome.CRASHED]
     assert run_to_end(0, [*STUDY, "--retry-failed"], tmp_path).status == 0
     assert (results(tmp_path / "out.nc").outcome == 0).all()
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner.evaluate import NOT_COMPUTED
+from solver.outcome import Outcome
 from tests.mpi.launching import CHEAP, FAKED, Ended, Running, results, run_to_end
 
 AT_ONCE = 4  # runs side by side: they sleep as long as they compute
@@ -185,9 +185,9 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks: int, whole: xr
         assert ended.status == 130, ended.said
         assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
         assert "Traceback" not in ended.said
-        n_left = int((left.outcome == NOT_COMPUTED).sum())
+        n_left = int((left.outcome == Outcome.NOT_COMPUTED).sum())
         assert f"holds {N_POINTS - n_left} of {N_POINTS} points" in ended.said
-        there = left.outcome != NOT_COMPUTED
+        there = left.outcome != Outcome.NOT_COMPUTED
         for name in set(left.data_vars) - {"message", "outcome"}:
             xr.testing.assert_equal(left[name].where(there), whole[name].where(there))
         n_partial += 0 < n_left < N_POINTS
@@ -211,7 +211,7 @@ def test_a_rank_that_is_ended_ends_the_run_in_good_order(tmp_path: Path) -> None
     assert ended.status == 130
     assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
     assert ended.seconds < 10.0
-    assert (results(tmp_path / "out.nc").outcome == NOT_COMPUTED).any()
+    assert (results(tmp_path / "out.nc").outcome == Outcome.NOT_COMPUTED).any()
 
 
 @pytest.mark.parametrize("pause", [0.02, 0.1, 0.3])
@@ -230,4 +230,4 @@ def test_rank_0_hears_of_its_end_from_another_rank_first(pause: float, tmp_path:
     ended = run_to_end(2, [*study.arguments, "-o", "out.nc"], tmp_path, study.environment, terminate_both)
     assert ended.status == 130
     assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
-    assert (results(tmp_path / "out.nc").outcome == NOT_COMPUTED).any()
+    assert (results(tmp_path / "out.nc").outcome == Outcome.NOT_COMPUTED).any()

@@ -19,9 +19,9 @@ STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, s
 OTHER_VERSION = """\
 import os, runpy, sys
 sys.path.insert(0, {root!r})
-from studyrunner import roll_call
+from studyrunner.mpi import version_check
 if os.environ["PMI_RANK"] == "1":
-    roll_call.{change}
+    version_check.{change}
 sys.argv = [{faked!r}, *sys.argv[1:]]
 runpy.run_path({faked!r}, run_name="__main__")
 """
@@ -80,16 +80,16 @@ def test_no_launcher_in_a_job_of_several_processes(tmp_path: Path) -> None:
     [
         ("_version = lambda package: '0.0.1'", ["rank 1 on ", "runs fretwear 0.0.1, rank 0 on "]),
         ("_SOURCES = ('solver',)", ["runs source of run-study "]),
-        ("answer_roll_call = lambda ranks: None", ["rank 1 has not said within 1 s what it runs"]),
+        ("report_version = lambda ranks: None", ["rank 1 has not said within 1 s what it runs"]),
     ],
     ids=["another version", "another source", "one that does not answer"],
 )
 def test_ranks_with_different_software(change: str, said: list[str], tmp_path: Path) -> None:
     program = tmp_path / "other.py"
     program.write_text(OTHER_VERSION.format(root=str(ROOT), faked=FAKED, change=change), encoding="utf-8")
-    if "answer" in change:
-        change = "call_roll.__defaults__ = (1.0,)"
-        lines = program.read_text(encoding="utf-8").replace("sys.argv =", f"roll_call.{change}\nsys.argv =")
+    if "report" in change:
+        change = "check_versions.__defaults__ = (1.0,)"
+        lines = program.read_text(encoding="utf-8").replace("sys.argv =", f"version_check.{change}\nsys.argv =")
         program.write_text(lines, encoding="utf-8")
     done = run([*launcher(3), sys.executable, str(program), *STUDY], tmp_path)
     assert_refused(done, *said, "install the same software for all ranks")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner.evaluate import NOT_COMPUTED
+from solver.outcome import Outcome
 from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Running, launcher, run_to_end
 
 GRID = [
@@ -132,7 +132,7 @@ def test_an_interrupted_run_ends_at_once(n_ranks: int, number: signal.Signals, t
     assert len(ended.said.splitlines()) < 9
     assert sorted(path.name for path in tmp_path.glob("*out.nc*")) == ["out.nc", "out.nc.parts"]
     with xr.open_dataset(tmp_path / "out.nc") as result:
-        assert (result.outcome == NOT_COMPUTED).any()
+        assert (result.outcome == Outcome.NOT_COMPUTED).any()
 
 
 @pytest.mark.parametrize("n_ranks", [0, 2])

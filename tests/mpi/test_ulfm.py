@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studyrunner.evaluate import CRASHED, NOT_COMPUTED
+from solver.outcome import Outcome
 from studyrunner.mpi import ranks
 from tests.mpi.conftest import OpenMpi
 from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Ended, Running, results, watch_to_end
@@ -125,7 +125,7 @@ def test_a_run_that_is_ended_from_outside_leaves_what_there_is(
     assert done.said.count("run-study: interrupted: out.nc holds ") == 1
     assert done.seconds < 10.0
     left = results(tmp_path / "out.nc").outcome
-    assert 0 < int((left == NOT_COMPUTED).sum()) < left.size
+    assert 0 < int((left == Outcome.NOT_COMPUTED).sum()) < left.size
     assert run_and_kill(open_mpi, tmp_path).status == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
 
@@ -157,7 +157,7 @@ def test_a_march_that_crashes_takes_two_ranks_with_it(open_mpi: OpenMpi, tmp_pat
     assert done.status == 3, done.said
     assert done.said.count(" is lost, which had 1 task: ") == 2
     found = results(tmp_path / "out.nc").squeeze()
-    assert found.outcome.values.tolist() == [0, CRASHED, 0]
+    assert found.outcome.values.tolist() == [0, Outcome.CRASHED, 0]
     assert str(found.message.values[1]).startswith("Aborted (run_faked.py, line ")
 
 
@@ -165,7 +165,7 @@ def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi: OpenMpi, tmp_pat
     """The library waits for it for ever, the others for some minutes."""
     assert ranks._SECONDS_TO_START <= 120.0
     program = (
-        "import os; from studyrunner import ranks; ranks._SECONDS_TO_START = 2.0;"
+        "import os; from studyrunner.mpi import ranks; ranks._SECONDS_TO_START = 2.0;"
         "os.environ['OMPI_COMM_WORLD_RANK'] == '2' and os.kill(os.getpid(), 9); ranks.start_ranks()"
     )
     done = subprocess.run(

@@ -9,13 +9,12 @@ import pytest
 from scipy import linalg
 
 from solver.model import ReducedModel
-from studies.scene_answers import N_MODES
+from studies.scene_answers import N_MODES, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
 from studies.scenes.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from studies.scenes.finite_element.surface import outer_faces
-from studies.stuck_modes import stuck_frequencies
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
 
 AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])  # Hz, 20-node elements, nodal diameter 0, glued

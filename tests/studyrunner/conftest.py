@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies import vetting
+from studies import sandboxed_read
 from tests.studyrunner.faked_runs import Solver
 from tests.studyrunner.reading_process import ReadingProcess, reading_process
 
@@ -16,7 +16,7 @@ from tests.studyrunner.reading_process import ReadingProcess, reading_process
 def reader() -> Iterator[ReadingProcess]:
     """Stands for the new process that reads each file otherwise."""
     with reading_process() as process, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(vetting, "run_reader", process.read)
+        patch.setattr(sandboxed_read, "run_sandbox", process.read)
         yield process
 
 

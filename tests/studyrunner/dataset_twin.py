@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.evaluate import endings
-from studyrunner.netcdf.gather import coordinates
+from solver.outcome import Outcome
+from studyrunner.netcdf.attributes import coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.results import MarchResult
 from studyrunner.scene.scene import SceneFacts
@@ -47,7 +47,7 @@ def build_dataset(
             for name in loops:
                 arrays[name][point][:, list(study.outputs.loops)] = result.values[name]
             for name in KEPT:
-                arrays[name][point] = getattr(result, name)
+                arrays[name][point] = result.values[name]
     dataset = xr.Dataset(
         {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
         coords={
@@ -78,10 +78,9 @@ def build_dataset(
         if name in asked and not entry.dtype.startswith("float"):
             failed = "0 where there is no result, see last_cycle."
             dataset[name].attrs["comment"] = f"{entry.comment} {failed}" if entry.comment else failed
-    flags = endings()
-    dataset["outcome"].attrs["flag_values"] = np.array([flag.number for flag in flags], dtype=np.int8)
-    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in flags)
-    dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in flags)
+    dataset["outcome"].attrs["flag_values"] = np.array(list(Outcome), dtype=np.int8)
+    dataset["outcome"].attrs["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
+    dataset["outcome"].attrs["sentences"] = "\n".join(flag.sentence for flag in Outcome)
     return dataset
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from studyrunner import run
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
@@ -37,7 +37,7 @@ class Solver:
 
         monkeypatch.setattr(run, "build_evaluator", build_fake)
 
-    def evaluate(self, model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
         self.tasks.append(task)
         for result in fake_evaluate(task, keep, describe_scene(model)):
             self.n_results += 1

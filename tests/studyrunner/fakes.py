@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studyrunner.checkpoint.completion_index import Ledger
+from solver.packing import Packed
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.course import start_marches
 from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.task_progress import start_marches
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(
     n_displacements=6,
@@ -31,13 +32,13 @@ FACTS = SceneFacts(
 )
 
 
-def no_keep(progress: Kept) -> None:
+def no_keep(progress: Packed) -> None:
     """Progress that nobody keeps."""
 
 
 def fake_evaluate(
     task: BranchTask | MarchTask,
-    keep: Callable[[Kept], None] = no_keep,
+    keep: Keep = no_keep,
     facts: SceneFacts = FACTS,
     seconds: float = 0.0,
 ) -> Iterator[StartResult | MarchResult]:
@@ -56,15 +57,15 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
     for position in task.order:
         if position not in task.known:
             start = (task.frequencies[position], task.excitation_amplitude, task.sweep == "up", *settings)
-            yield StartResult(position, Kept("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
+            yield StartResult(position, Packed("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
 
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
-    """A history whose values tell the share of the task."""
+    """A history whose values tell which of the task it is."""
     assert task.start is not None
-    share = task.shares[place]
+    scaled = task.histories[place]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
-    fingerprint += share.wear_coefficient * 1e9 + share.step * 1e-4 + 0.5 * (task.scheme == "implicit")
+    fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (task.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
@@ -80,22 +81,27 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
         if ASKED[name].flags:
             values[name] = values[name] >= 0.0
         values[name] = values[name].astype(ASKED[name].dtype)
-    return MarchResult(
-        points=share.points,
-        outcome=0,
-        values=values,
-        jump_cycle=np.nan,
-        error_estimate=0.01,
-        newton_iterations=round(fingerprint),
-        run_time=pause,
-        branch=0,
-        fold_frequency=np.nan,
-        step_limit=np.inf,
-        oscillates=False,
-        last_cycle=task.cycles[-1],
-        largest_wear_depth=1e-6,
-        share=place,
-    )
+    totals = {
+        "outcome": 0,
+        "jump_cycle": np.nan,
+        "error_estimate": 0.01,
+        "newton_iterations": round(fingerprint),
+        "run_time": pause,
+        "branch": 0,
+        "fold_frequency": np.nan,
+        "step_limit": np.inf,
+        "oscillates": False,
+        "last_cycle": task.cycles[-1],
+        "largest_wear_depth": 1e-6,
+        "message": "",
+    }
+    return MarchResult(scaled.points, {**values, **totals}, place)
+
+
+def changed(result: MarchResult, **values: object) -> MarchResult:
+    """The result with other values of some variables."""
+    assert values.keys() <= result.values.keys()
+    return replace(result, values={**result.values, **values})
 
 
 def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
@@ -106,43 +112,50 @@ def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
                 yield task, fake_march(task, place=place)
 
 
+def totals_of(result: MarchResult, *names: str) -> list[float]:
+    """Values of some variables without further dimensions."""
+    return [result.values[name] for name in names]
+
+
 def without_values(result: MarchResult, outcome: int) -> MarchResult:
     """The result as it is where there is no state: NaN, or 0 where the variable is a whole number."""
     values = {
-        name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0) for name, array in result.values.items()
+        name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0)
+        for name, array in result.values.items()
+        if name not in KEPT
     }
     nothing = dict.fromkeys(("last_cycle", "error_estimate", "largest_wear_depth"), np.nan)
-    return replace(result, outcome=outcome, values=values, **nothing)
+    return changed(result, outcome=outcome, **values, **nothing)
 
 
-def open_ledger(
+def open_completion(
     study: Study, plan: TaskPlan, folder: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
-) -> Ledger:
+) -> CompletionIndex:
     """What is in the folder of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    ledger = Ledger(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
+    completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
     if fresh:
-        ledger.forget_all()
-    return ledger
+        completion.forget_all()
+    return completion
 
 
-def fake_ledger(
+def fake_completion(
     study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path, facts: SceneFacts = FACTS
-) -> Ledger:
+) -> CompletionIndex:
     """The folder of a run that had these results and no others, some in a file."""
     marches = march_of_points(plan)
-    ledger = open_ledger(study, plan, folder, facts, fresh=True)
+    completion = open_completion(study, plan, folder, facts, fresh=True)
     for place, result in enumerate(results):
-        ledger.add_history(marches[result.points], result)
+        completion.add_history(marches[result.points], result)
         if place % 3 == 0:
-            ledger.store.flush()
-    ledger.store.flush()
-    return ledger
+            completion.store.flush()
+    completion.store.flush()
+    return completion
 
 
 def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:
     """The march of each history, which is known by its points."""
-    return {share.points: task for line in plan.marches for task in line for share in task.shares}
+    return {scaled.points: task for line in plan.marches for task in line for scaled in task.histories}
 
 
 def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:

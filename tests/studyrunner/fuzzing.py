@@ -20,7 +20,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from studies import vetting
+from studies import sandboxed_read
 from studyrunner import cli
 from studyrunner.report.drawing import Drawing, style
 from studyrunner.user_error import UserError
@@ -195,8 +195,8 @@ def run(folder: Path, seed: int, numbers: Sequence[int], kinds: Mapping[str, flo
         largest, waited = max(largest, found.largest), waited + found.waited
         return found.status, found.said
 
-    vetting.run_reader = read
-    vetting.LONGEST = 1
+    sandboxed_read.run_sandbox = read
+    sandboxed_read.LONGEST = 1
     whole = {name: Path(name).read_bytes() for name in ("study", "scene.h5", "result", "drawn") if Path(name).exists()}
     commands = _commands()
     painted, Drawing.save = Drawing.save, _lay_out  # type: ignore[method-assign]

@@ -1,7 +1,7 @@
 """One process that reads files of unknown origin for many tests: each in a fork of it, with the limits of a new one.
 
-A new process is what `studies.vetting` starts; most of what it takes is its start. This one has loaded what that one
-loads, and nothing else, when it forks.
+A new process is what `studies.sandboxed_read` starts; most of what it takes is its start. This one has loaded what that
+one loads, and nothing else, when it forks.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies import vetting
+from studies import sandboxed_read
 from tests.studyrunner.own_time import seconds_waited
 
 
@@ -30,7 +30,7 @@ class Reading:
 
 
 class ReadingProcess:
-    """What stands for `studies.vetting.run_reader`. waited: s for a processor, all readings together."""
+    """What stands for `studies.sandboxed_read.run_sandbox`. waited: s for a processor, all readings together."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.waited = 0.0
@@ -61,7 +61,7 @@ def reading_process() -> Iterator[ReadingProcess]:
 
 
 def read_in_a_fork(arguments: Sequence[str], own: int = 0) -> Reading:
-    """As the main function of `studies.vetting`, in a copy of this process.
+    """As the main function of `studies.sandboxed_read`, in a copy of this process.
 
     own: bytes of address space that this process has more than a new one, and that are none of the file's.
     """
@@ -73,8 +73,8 @@ def read_in_a_fork(arguments: Sequence[str], own: int = 0) -> Reading:
         for stream in (0, 1, 2):
             os.dup2(nothing, stream)
         with contextlib.suppress(BaseException):
-            vetting.LARGEST_MEMORY += own
-            status, said = vetting.read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
+            sandboxed_read.LARGEST_MEMORY += own
+            status, said = sandboxed_read.read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
             os.write(send, said.encode())
             os._exit(status)
         os._exit(99)
@@ -91,7 +91,7 @@ def read_in_a_fork(arguments: Sequence[str], own: int = 0) -> Reading:
 def main() -> None:
     """Reads a file for every line of its input."""
     # loaded as a process of its own does it, before there are limits
-    import studies.netcdf_guard
+    import studies.guards.netcdf_guard
     import studies.scene_file  # noqa: F401
 
     for line in sys.stdin:

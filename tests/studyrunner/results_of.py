@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study import Study
-from tests.studyrunner.fakes import FACTS, fake_histories
+from tests.studyrunner.fakes import FACTS, changed, fake_histories
 
 Batch = tuple[list[tuple[Index, ...]], NDArray[np.void]]
 
@@ -27,9 +26,8 @@ def results_of(study: Study, **given: Callable[[Index], object]) -> list[MarchRe
         # of states that are exact
         for name in ("response_error", "wear_rate_error"):
             values[name] = np.zeros(len(study.cycles_kept))
-        values |= {name: np.asarray(say(min(result.points))) for name, say in given.items() if name in values}
-        fields = {name: say(min(result.points)) for name, say in given.items() if name not in values}
-        results.append(replace(result, values=values, **fields))
+        values |= {name: say(min(result.points)) for name, say in given.items()}
+        results.append(changed(result, **values))
     return results
 
 

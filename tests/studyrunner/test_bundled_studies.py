@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import COMPLETE
 from studyrunner.cli import main
-from studyrunner.evaluate import COMPLETE
 from studyrunner.study.study_file import bundled_studies
 
 SMALL = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.certificates import CertificateTable
 from studyrunner.variables import CERTIFICATE
-from tests.studyrunner.fakes import FACTS, fake_histories, without_values
+from tests.studyrunner.fakes import FACTS, changed, fake_histories, without_values
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -40,7 +39,7 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
         for values in drawn.values():
             values[rng.random(values.size) < 0.3] = np.nan
         stable = np.ones(len(study.cycles_kept), dtype=np.int8)
-        results.append(replace(result, values={**result.values, **drawn, "stable": stable}))
+        results.append(changed(result, **drawn, stable=stable))
     return study, results
 
 
@@ -92,7 +91,7 @@ def test_worst_of_all_converged_points_and_where(name: str) -> None:
 def test_order_of_the_results_does_not_matter() -> None:
     study, results = study_with_results()
     for place, jump in ((3, 700.0), (5, 700.0), (9, 900.0)):
-        results[place] = replace(results[place], jump_cycle=jump, fold_frequency=150.0 + place, oscillates=True)
+        results[place] = changed(results[place], jump_cycle=jump, fold_frequency=150.0 + place, oscillates=True)
     forwards = summarise_certificates(study, results)
     assert summarise_certificates(study, results[::-1]) == forwards
     shuffled = [results[place] for place in np.random.default_rng(1).permutation(len(results))]
@@ -112,39 +111,39 @@ def test_points_of_one_sweep_share_its_fold() -> None:
     study, results = study_with_results()
     sweep, harmonics = 5, 6
     folded = [
-        replace(result, fold_frequency=157.5, branch=1)
+        changed(result, fold_frequency=157.5, branch=1)
         if any((point[0], point[sweep], point[harmonics]) == (0, 1, 1) for point in result.points)
         else result
         for result in results
     ]
-    assert sum(not np.isnan(result.fold_frequency) for result in folded) > 1
+    assert sum(not np.isnan(result.values["fold_frequency"]) for result in folded) > 1
     assert table_of(study, folded)["folds in the sweeps"] == "1, at 157.5 Hz"
-    both = [replace(result, fold_frequency=140.0) if result.points[0][sweep] == 0 else result for result in folded]
+    both = [changed(result, fold_frequency=140.0) if result.points[0][sweep] == 0 else result for result in folded]
     assert table_of(study, both)["folds in the sweeps"] == "7, at 140 Hz, 157.5 Hz"
 
 
 def test_jumps_oscillation_and_unstable_states_are_counted() -> None:
     study, results = study_with_results(("axes.frequency=[150, 160]", "axes.scheme=implicit", "slow_time.outputs=3"))
-    results[0] = replace(results[0], jump_cycle=900.0)
-    results[1] = replace(results[1], jump_cycle=800.0, oscillates=True)
+    results[0] = changed(results[0], jump_cycle=900.0)
+    results[1] = changed(results[1], jump_cycle=800.0, oscillates=True)
     table = table_of(study, results)
     assert table["jumps while wearing"] == "2, the first at cycle 800 at frequency 160 Hz"
     assert table["oscillating wear rate"].startswith("1, the first at frequency 160 Hz: use a smaller step")
-    results[0] = replace(results[0], values={**results[0].values, "stable": np.array([1, 0, 1], dtype=np.int8)})
+    results[0] = changed(results[0], stable=np.array([1, 0, 1], dtype=np.int8))
     assert table_of(study, results)["unstable states"].startswith("1, the first at frequency 150 Hz")
 
 
 def test_explicit_steps_beyond_their_limit_are_counted() -> None:
     overrides = ("axes.frequency=150", "axes.step=[100, 1000, 1e6]", "axes.scheme=['implicit', 'explicit']")
     study, results = study_with_results((*overrides, "slow_time.cycles=5000"))
-    limited = [replace(result, step_limit=500.0) for result in results]
+    limited = [changed(result, step_limit=500.0) for result in results]
     found = table_of(study, limited)["explicit steps too long"]
     assert found == "2, the first at step 1000, scheme explicit: longer than step_limit"
     # No step is longer than all cycles.
-    limited = [replace(result, step_limit=5000.0) for result in results]
+    limited = [changed(result, step_limit=5000.0) for result in results]
     assert table_of(study, limited)["explicit steps too long"] == "none"
     study, results = study_with_results((*overrides, "slow_time.largest_depth=1e-6"))
-    limited = [replace(result, step_limit=500.0) for result in results]
+    limited = [changed(result, step_limit=500.0) for result in results]
     assert table_of(study, limited)["explicit steps too long"] == "none"
 
 
@@ -158,7 +157,6 @@ def test_no_point_was_computed() -> None:
 def test_estimates_that_were_not_made() -> None:
     study, (result,) = study_with_results(("axes.frequency=150", "axes.scheme=implicit", "slow_time.outputs=2"))
     missing = np.full(2, np.nan)
-    values = {**result.values, "response_error": missing, "residual": np.array([np.nan, 3e-9])}
-    table = table_of(study, [replace(result, values=values)])
+    table = table_of(study, [changed(result, response_error=missing, residual=np.array([np.nan, 3e-9]))])
     assert table["estimated error of the response"] == "not estimated"
     assert table["scaled residual"] == "3.0e-09 at cycle 20000"

@@ -7,15 +7,14 @@ import itertools
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.evaluate import NOT_COMPUTED, endings
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.gather import Gathered
 from studyrunner.netcdf.output import parts_folder
@@ -25,7 +24,15 @@ from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger, fake_march, fake_starts, without_values
+from tests.studyrunner.fakes import (
+    FACTS,
+    changed,
+    fake_completion,
+    fake_histories,
+    fake_march,
+    fake_starts,
+    without_values,
+)
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -49,9 +56,9 @@ def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gather
     """The file of a run of the study with these results."""
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
-    ledger = fake_ledger(study, plan, results, parts_folder(path))
-    with contextlib.closing(ledger.store):
-        return gather.gather(study, FACTS, ledger, path)
+    completion = fake_completion(study, plan, results, parts_folder(path))
+    with contextlib.closing(completion.store):
+        return gather.gather(study, FACTS, completion, path)
 
 
 @pytest.fixture
@@ -130,17 +137,17 @@ def test_every_point_is_where_it_belongs(opened: xr.Dataset) -> None:
     there = opened.sel(frequency=160.0, scheme="explicit", harmonics=3).squeeze()
     assert there.wear_depth.dims == ("cycle", "contact")
     assert np.array_equal(there.wear_depth, expected.values["wear_depth"])
-    assert there.newton_iterations == expected.newton_iterations
+    assert there.newton_iterations == expected.values["newton_iterations"]
 
 
 def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
     attributes = opened.outcome.attrs
     assert opened.outcome.dtype == np.int8
     assert attributes["flag_values"].dtype == np.int8
-    assert attributes["flag_values"].tolist() == [ending.number for ending in endings()]
+    assert attributes["flag_values"].tolist() == list(Outcome)
     assert attributes["flag_meanings"].split()[0] == "converged"
-    assert len(attributes["flag_meanings"].split()) == len(endings())
-    assert attributes["sentences"].splitlines() == [ending.sentence for ending in endings()]
+    assert len(attributes["flag_meanings"].split()) == len(Outcome)
+    assert attributes["sentences"].splitlines() == [ending.sentence for ending in Outcome]
 
 
 def test_whole_numbers_stay_whole(opened: xr.Dataset) -> None:
@@ -160,7 +167,7 @@ def test_flags(name: str, meanings: str, opened: xr.Dataset) -> None:
 def test_scalars_are_those_of_the_task(tmp_path: Path) -> None:
     results = fake_results()
     special = {"branch": 3, "fold_frequency": 155.5, "step_limit": 12.0, "oscillates": True}
-    results[1] = replace(results[1], **special)
+    results[1] = changed(results[1], **special)
     write(results, tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         for name, value in special.items():
@@ -268,16 +275,16 @@ def test_slabs_are_all_points_in_the_order_of_the_file(shape: tuple[int, ...], n
 def test_outcomes_are_counted(tmp_path: Path) -> None:
     results = fake_results()
     results[0] = without_values(results[0], 6)
-    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, NOT_COMPUTED: 0}
+    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, Outcome.NOT_COMPUTED: 0}
 
 
 @pytest.mark.parametrize("n_left", [1, 7, 8])
 def test_points_that_are_not_computed_say_so(n_left: int, tmp_path: Path) -> None:
     results = fake_results()
-    assert write(results[n_left:], tmp_path / "out.nc").outcomes[NOT_COMPUTED] == n_left
+    assert write(results[n_left:], tmp_path / "out.nc").outcomes[Outcome.NOT_COMPUTED] == n_left
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         left = {point for result in results[:n_left] for point in result.points}
-        assert {tuple(place) for place in np.argwhere(opened.outcome.values == NOT_COMPUTED).tolist()} == left
+        assert {tuple(place) for place in np.argwhere(opened.outcome.values == Outcome.NOT_COMPUTED).tolist()} == left
         for name in set(CONTRACT) - {"outcome", "message"}:
             for point in left:
                 there = opened[name].values[point]
@@ -289,8 +296,8 @@ def test_points_that_are_not_computed_say_so(n_left: int, tmp_path: Path) -> Non
 
 def test_of_two_records_of_a_point_the_later_one_stands(tmp_path: Path) -> None:
     results = fake_results()
-    later = replace(results[0], error_estimate=0.75)
-    assert write([*results, later], tmp_path / "out.nc").outcomes == {0: 8, NOT_COMPUTED: 0}
+    later = changed(results[0], error_estimate=0.75)
+    assert write([*results, later], tmp_path / "out.nc").outcomes == {0: 8, Outcome.NOT_COMPUTED: 0}
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = later.points
         assert opened.error_estimate.values[point] == 0.75
@@ -298,7 +305,7 @@ def test_of_two_records_of_a_point_the_later_one_stands(tmp_path: Path) -> None:
 
 def test_messages_stand_beside_their_points(tmp_path: Path) -> None:
     results = fake_results()
-    results[2] = replace(without_values(results[2], 11), message="ZeroDivisionError: an § error (a.py, line 3)")
+    results[2] = changed(without_values(results[2], 11), message="ZeroDivisionError: an § error (a.py, line 3)")
     write(results, tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = results[2].points
@@ -330,9 +337,9 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    ledger = fake_ledger(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
-    with contextlib.closing(ledger.store):
-        gather.gather(study, FACTS, ledger, tmp_path / "dovetail.nc")
+    completion = fake_completion(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
+    with contextlib.closing(completion.store):
+        gather.gather(study, FACTS, completion, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
 

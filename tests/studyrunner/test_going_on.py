@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
+from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.mpi import schedule
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 from tests.studyrunner.fakes import fake_branch
@@ -40,7 +41,7 @@ def whole(solver: Solver) -> xr.Dataset:
 
 def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
     """Points that are there are right, the others hold nothing; how many are there."""
-    left = found.outcome == NOT_COMPUTED
+    left = found.outcome == Outcome.NOT_COMPUTED
     for name in set(found.data_vars) - {"outcome", "message", "exact_worn_volume", "exact_response_amplitude"}:
         for point in np.argwhere(left.values):
             there = found[name].values[tuple(point)]
@@ -222,10 +223,10 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.01)
     evaluate = solver.evaluate
 
-    def slow(model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def slow(model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
         if isinstance(task, MarchTask) and task.resume is None:
             time.sleep(0.02)
-            keep(Kept("half of it", (np.array([task.number]),)))
+            keep(Packed("half of it", (np.array([task.number]),)))
             raise KeyboardInterrupt
         yield from evaluate(model, task, keep)
 
@@ -234,7 +235,7 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert [main(TWO_WAYS) for _ in range(9)] == [130] * 8 + [0]
     marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
     assert len(marches) == 8
-    assert all(task.resume == Kept("half of it", (np.array([task.number]),)) for task in marches)
+    assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(load(), expected)
     assert not list(Path("out.nc.parts").glob("*.progress"))
 
@@ -245,7 +246,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     own, ended = solver.evaluate, False
 
-    def resuming(model: object, task: Task, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def resuming(model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
         nonlocal ended
         if isinstance(task, MarchTask):
             yield from own(model, task, keep)
@@ -257,7 +258,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
                 if place == 1 and not ended:
                     ended = True
                     raise KeyboardInterrupt
-                keep(Kept("branch", (np.array(place + 1),)))
+                keep(Packed("branch", (np.array(place + 1),)))
 
     monkeypatch.setattr(solver, "evaluate", resuming)
     assert main(TWO_WAYS) == 130

@@ -40,9 +40,9 @@ def hashes(scene: str = FACTS.digest, **changes: str) -> dict[tuple[float, ...],
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         starts = found.of_starts(branch)
         for march in line:
-            for share, history in zip(march.shares, found.of_histories(branch, march), strict=True):
+            for scaled, history in zip(march.histories, found.of_histories(branch, march), strict=True):
                 where = (branch.frequencies[march.position], branch.excitation_amplitude)
-                points[(*where, share.wear_coefficient, share.step)] = (starts[march.position], history)
+                points[(*where, scaled.wear_coefficient, scaled.step)] = (starts[march.position], history)
     return points
 
 

@@ -9,8 +9,8 @@ import h5py
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.cli import main
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.netcdf.provenance import POINTS_LEFT
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
@@ -53,7 +53,7 @@ def test_an_unfinished_result_is_replaced_by_any(solver: Solver) -> None:
     solver.disturb = interrupt
     assert main(APART) == 130
     with xr.open_dataset("out.nc") as result:
-        n_left = int((result.outcome == NOT_COMPUTED).sum())
+        n_left = int((result.outcome == Outcome.NOT_COMPUTED).sum())
         assert 0 < n_left <= N_POINTS
         assert result.attrs[POINTS_LEFT] == n_left
     solver.begin_again()

@@ -18,7 +18,7 @@ from studyrunner.netcdf import gather
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import FACTS, fake_march, fake_starts, open_ledger, without_values
+from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
@@ -32,26 +32,25 @@ def wide(n_contact: int) -> SceneFacts:
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[[int, str], Path]:
-    def write_file(n_contact: int, loops: str) -> Path:
+    def write_file(n_contact: int, asked: str) -> Path:
         facts = wide(n_contact)
-        study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={loops}", "outputs.variables=['worn_volume']"))
+        study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={asked}", "outputs.variables=['worn_volume']"))
         plan = build_tasks(study, facts.n_displacements)
-        ledger = open_ledger(study, plan, tmp_path / "parts", facts, fresh=True)
+        completion = open_completion(study, plan, tmp_path / "parts", facts, fresh=True)
         for task in fake_starts(plan, 0):
             result = fake_march(task, facts)
             if task.position == 1:
                 result = without_values(result, 6)
                 # noise does not shrink: what is on the disk is what was written
             else:
-                values = {name: np.random.default_rng(1).normal(size=at.shape) for name, at in result.values.items()}
-                result = replace(
-                    result, values={**result.values, **{n: values[n] for n in variables.LOOPS if n in values}}
-                )
-            ledger.add_history(task, result)
-        ledger.store.flush()
+                loops = {name: result.values[name].shape for name in variables.LOOPS if name in result.values}
+                noise = {name: np.random.default_rng(1).normal(size=shape) for name, shape in loops.items()}
+                result = changed(result, **noise)
+            completion.add_history(task, result)
+        completion.store.flush()
         path = tmp_path / f"{n_contact}.nc"
-        with contextlib.closing(ledger.store):
-            gather.gather(study, facts, ledger, path)
+        with contextlib.closing(completion.store):
+            gather.gather(study, facts, completion, path)
         return path
 
     return write_file

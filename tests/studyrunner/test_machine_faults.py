@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from solver.outcome import describe_error
+from solver.outcome import Outcome, describe_error
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -77,8 +76,8 @@ def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) 
     solver.disturb = failing(FAULTS[0], 2, kind)
     assert main(SMALL) == 3
     outcomes = set(load().outcome.values.flat)
-    assert NOT_COMPUTED in outcomes
-    assert outcomes <= {0, NOT_COMPUTED}
+    assert Outcome.NOT_COMPUTED in outcomes
+    assert outcomes <= {0, Outcome.NOT_COMPUTED}
     # the same command goes on, and nothing of it is left
     solver.begin_again()
     assert main(SMALL) == 0
@@ -162,7 +161,7 @@ def test_a_task_that_broke_off_teaches_nothing_of_those_like_it(
 
 
 KERNELS = """
-from studyrunner.machine_faults import guard_kernel_cache
+from studyrunner.system.machine_faults import guard_kernel_cache
 guard_kernel_cache()
 guard_kernel_cache()
 import kernel

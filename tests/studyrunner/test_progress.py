@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from studyrunner import progress, run
+from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.progress import RunProgress, Standing
 from studyrunner.scene.scene import describe_scene
+from studyrunner.system import progress
+from studyrunner.system.progress import ProgressDisplay, Standing
 from tests.studyrunner.fakes import fake_evaluate
 
 LINE = re.compile(
@@ -39,7 +40,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     found = Clock()
-    monkeypatch.setattr("studyrunner.progress.time.monotonic", found)
+    monkeypatch.setattr("studyrunner.system.progress.time.monotonic", found)
     return found
 
 
@@ -50,7 +51,7 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
         looks.append(clock.now)
         return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("marching")
         shown.begin_tasks()
         for tenth in range(36_000):
@@ -67,7 +68,7 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
 
 
 def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("finding the natural frequencies")
         clock.now += 300.0
         shown.begin_tasks()
@@ -78,10 +79,10 @@ def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.
 
 
 def test_all_is_done_at_the_end_only() -> None:
-    assert Standing(3, 4, 0.0, ()).share(50.0) == 0.99
-    assert Standing(4, 4, 0.0, ()).share(50.0) == 1.0
+    assert Standing(3, 4, 0.0, ()).fraction(50.0) == 0.99
+    assert Standing(4, 4, 0.0, ()).fraction(50.0) == 1.0
     assert Standing(4, 4, 0.0, ()).describe(50.0) == "4 of 4 points, 100 %"
-    assert Standing(0, 4, 0.0, ()).share(0.0) < 0.01
+    assert Standing(0, 4, 0.0, ()).fraction(0.0) < 0.01
 
 
 def test_of_many_tasks_some_are_named() -> None:
@@ -102,7 +103,7 @@ def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, caps
         return Standing(5, 20, 30.0, ("210 Hz implicit",))
 
     monkeypatch.setattr(progress, "Console", lambda **_: Console(file=screen, force_terminal=True, width=160))
-    with RunProgress() as shown:
+    with ProgressDisplay() as shown:
         shown.say("marching")
         shown.begin_tasks()
         for _ in range(1000):
@@ -123,7 +124,7 @@ def build_slow(model: object, friction_coefficient: float) -> Callable[..., Iter
     """The stand-in for the solver; each start state and each march takes a while."""
     facts = describe_scene(model)
 
-    def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         for result in fake_evaluate(task, keep, facts):
             time.sleep(0.15)
             yield result

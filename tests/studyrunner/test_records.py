@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from studyrunner.checkpoint.part_files import KEY
-from studyrunner.checkpoint.records import empty_record, failed_result, pack, record_type
+from studyrunner.checkpoint.records import empty_record, pack, record_type
+from studyrunner.plan.results import failed_result
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import KEPT
@@ -25,16 +26,15 @@ OVERRIDES = (
 def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
     study = read_study("sdof_slider", (*OVERRIDES, *more))
     pairs = list(fake_histories(build_tasks(study, FACTS.n_displacements)))
-    assert [(task.number, result.share) for task, result in pairs] == [
-        (march, share) for march in (0, 1, 3, 2) for share in range(2)
+    assert [(task.number, result.place) for task, result in pairs] == [
+        (march, place) for march in (0, 1, 3, 2) for place in range(2)
     ]
     kind = record_type(study, FACTS)
     for task, result in pairs:
         (record,) = pack(kind, "f" * 32, result)
         assert record[KEY] == b"f" * 32
-        for name in KEPT:
-            np.testing.assert_equal(record[name], getattr(result, name))
-        for name in task.variables:
+        assert result.values.keys() == {*KEPT, *task.variables}
+        for name in result.values:
             np.testing.assert_equal(record[name], result.values[name])
 
 
@@ -43,7 +43,7 @@ def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None
     kind = record_type(study, FACTS)
     task = build_tasks(study, FACTS.n_displacements).marches[0][0]
     failed = failed_result(task, 1, 11, "what went wrong")
-    assert (failed.points, failed.share) == (task.shares[1].points, 1)
+    assert (failed.points, failed.place) == (task.histories[1].points, 1)
     (record,) = pack(kind, "0" * 32, failed)
     assert (record["outcome"], record["message"]) == (11, "what went wrong")
     (nothing,) = empty_record(kind)

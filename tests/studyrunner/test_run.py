@@ -18,14 +18,14 @@ from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main
-from studyrunner.evaluate import _solver_settings, build_result
-from studyrunner.plan.results import Kept, MarchResult, StartResult
+from studyrunner.evaluate import build_result
+from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
-from studyrunner.progress import format_seconds
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
+from studyrunner.system.progress import format_seconds
 from studyrunner.variables import ASKED
-from tests.studyrunner.fakes import fake_evaluate, without_values
+from tests.studyrunner.fakes import changed, fake_evaluate, totals_of, without_values
 from tests.studyrunner.histories import history
 
 SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axes.scheme=implicit", "-o", "out.nc"]
@@ -43,7 +43,7 @@ def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, March
     def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
         facts = describe_scene(model)
 
-        def evaluate(task: BranchTask | MarchTask, keep: Callable[[Kept], None]) -> Iterator[StartResult | MarchResult]:
+        def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
             for result in fake_evaluate(task, keep, facts):
                 yield result if isinstance(result, StartResult) else change(task, result)
 
@@ -88,7 +88,7 @@ def test_points_above_rtol_are_computed_points(
     def above(task: MarchTask, result: MarchResult) -> MarchResult:
         if task.position != 1:
             return result
-        return replace(result, outcome=int(outcome), error_estimate=0.15, message=message)
+        return changed(result, outcome=int(outcome), error_estimate=0.15, message=message)
 
     use_fake(monkeypatch, above)
     assert main(SMALL) == 0
@@ -116,7 +116,7 @@ def test_unexpected_failure_keeps_the_old_file(
     earlier = (folder / "out.nc").read_bytes()
     shutil.rmtree(folder / "out.nc.parts")
     with monkeypatch.context() as broken:
-        broken.setattr(run.Course, "take", fail)
+        broken.setattr(run.TaskProgress, "take", fail)
         assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_bytes() == earlier
@@ -165,7 +165,7 @@ def test_certificates_and_branch_are_those_of_the_history() -> None:
     assert np.isnan(result.values["wear_rate_error"]).all()
     assert result.values["harmonics_used"].tolist() == [4, 5]
     assert result.values["stable"].tolist() == [True, False]
-    assert (result.branch, result.fold_frequency, result.step_limit, result.oscillates) == (2, 101.5, 250.0, True)
+    assert totals_of(result, "branch", "fold_frequency", "step_limit", "oscillates") == [2, 101.5, 250.0, True]
 
 
 def test_unworn_certificates_hold_for_all_cycles() -> None:
@@ -189,15 +189,15 @@ def ended_at(last: float, at: WearHistory, outcome: Outcome = Outcome.CERTIFICAT
 def test_what_was_computed_of_a_point_that_failed_is_kept() -> None:
     failed = ended_at(50.0, history([0.0, 40.0, 80.0, 1e5]))
     result = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), failed)
-    assert (result.outcome, result.last_cycle, result.error_estimate) == (7, 50.0, 0.03)
-    for name, values in result.values.items():
-        if name != "wear_rate_error":
-            there = np.isfinite(values) if ASKED[name].dtype == "float64" else values != 0
-            assert there[:2].all() or name == "stable", name
-            assert not there[2:].any(), name
+    assert totals_of(result, "outcome", "last_cycle", "error_estimate") == [7, 50.0, 0.03]
+    for name in ASKED.keys() - {"wear_rate_error"}:
+        values = result.values[name]
+        there = np.isfinite(values) if ASKED[name].dtype == "float64" else values != 0
+        assert there[:2].all() or name == "stable", name
+        assert not there[2:].any(), name
     assert result.values["worn_volume"][:2].tolist() == [0.0, 1.0]
-    assert result.largest_wear_depth == 1.0
-    assert (result.branch, result.fold_frequency, result.newton_iterations) == (2, 101.5, 7)
+    assert result.values["largest_wear_depth"] == 1.0
+    assert totals_of(result, "branch", "fold_frequency", "newton_iterations") == [2, 101.5, 7]
     assert result.message == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
 
 
@@ -205,8 +205,9 @@ def test_a_point_without_a_state_holds_no_numbers() -> None:
     nothing = ended_at(-1.0, history([0.0, 1e5]), Outcome.START_FAILED)
     result = build_result(march_task("slow_time.outputs=2"), replace(nothing, last_cycle=np.nan))
     assert result.outcome == 2
-    assert np.isnan([result.last_cycle, result.error_estimate, result.largest_wear_depth]).all()
-    for name, values in result.values.items():
+    assert np.isnan(totals_of(result, "last_cycle", "error_estimate", "largest_wear_depth")).all()
+    for name in ASKED:
+        values = result.values[name]
         empty = np.isnan(values) if ASKED[name].dtype == "float64" else values == 0
         assert empty.all(), name
     assert result.message == ""
@@ -219,7 +220,7 @@ def test_states_above_rtol_are_kept_and_the_message_says_from_when_on_and_how_fa
     )
     result = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), found)
     assert result.values["worn_volume"].tolist() == [0.0, 1.0, 2.0, 3.0]
-    assert (result.outcome, result.last_cycle) == (6, 20000.0)
+    assert totals_of(result, "outcome", "last_cycle") == [6, 20000.0]
     assert result.message == "from cycle 40 on the wear rate is known to 2.6 % only"
     said = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), replace(found, message="what it says"))
     assert said.message == "what it says"
@@ -242,14 +243,14 @@ def test_loops_are_read_at_the_counts_of_a_point() -> None:
 
 def test_settings_go_to_the_solver_as_they_are() -> None:
     task = march_task("solver.harmonics=auto", "solver.samples=32", "solver.tolerance=1e-9", "solver.rtol=1e-3")
-    assert _solver_settings(task.settings) == SolverSettings("auto", 32, 1e-9, 1e-3)
+    assert task.settings == SolverSettings("auto", 32, 1e-9, 1e-3)
 
 
 def test_response_is_amplitude_and_phase() -> None:
     result = build_result(march_task("slow_time.outputs=2"), history([0.0, 1e5]))
     assert result.values["response_amplitude"].tolist() == [[1.0], [2.0]]
     assert np.allclose(result.values["response_phase"], np.pi / 2)
-    assert (result.newton_iterations, result.run_time) == (7, 0.5)
+    assert totals_of(result, "newton_iterations", "run_time") == [7, 0.5]
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(3.4, "3 s"), (90.0, "1.5 min"), (7200.0, "2.0 h")])

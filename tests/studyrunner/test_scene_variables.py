@@ -20,7 +20,7 @@ from studyrunner.scene.scene import build_study_scene
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_histories, fake_ledger
+from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories
 
 SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")
 EXACT = "outputs.variables=['default', 'exact']"
@@ -41,9 +41,9 @@ def test_the_file_is_the_one_of_the_plain_twin(
     of_scene += build_scene_variables(mesh, build_study_scene(mesh))
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
-    ledger = fake_ledger(study, plan, results, parts_folder(tmp_path / "out.nc"))
-    with contextlib.closing(ledger.store):
-        gathered = gather.gather(study, FACTS, ledger, tmp_path / "out.nc", of_scene)
+    completion = fake_completion(study, plan, results, parts_folder(tmp_path / "out.nc"))
+    with contextlib.closing(completion.store):
+        gathered = gather.gather(study, FACTS, completion, tmp_path / "out.nc", of_scene)
     twin_set = build_dataset(study, FACTS, results, gathered.certificates, of_scene)
     write_dataset(twin_set, tmp_path / "twin.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from studies.sandboxed_read import check_result_readable, check_scene_readable
 from studies.scene_error import SceneError
-from studies.vetting import vet_result, vet_scene
 from studyrunner.cli import main
 from tests.mpi.launching import PATIENCE, launcher
 
@@ -73,11 +73,11 @@ def test_the_process_that_reads(hostile: Path, monkeypatch: pytest.MonkeyPatch) 
     # as in a notebook, or a script, that stands in the folder
     monkeypatch.chdir(hostile)
     monkeypatch.syspath_prepend("")
-    vet_scene(Path("scene.h5"))
-    vet_result(Path("result.nc"))
+    check_scene_readable(Path("scene.h5"))
+    check_result_readable(Path("result.nc"))
     Path("scene.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     with pytest.raises(SceneError, match="damaged"):
-        vet_scene(Path("scene.h5"))
+        check_scene_readable(Path("scene.h5"))
     assert not (hostile.parent / "taken").exists()
 
 
@@ -125,7 +125,7 @@ def test_the_style_of_figures_is_the_reports_own(hostile: Path) -> None:
 
 def test_folders_of_python_path_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the current folder is left out, and not where the project lies in it."""
-    from studies.search_path import search_path
+    from studies.guards.search_path import search_path
 
     monkeypatch.syspath_prepend(str(tmp_path))
     assert str(tmp_path) in search_path()

@@ -18,12 +18,13 @@ from solver.packing import pack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution
 from studyrunner.evaluate import build_result, march
-from studyrunner.plan.results import Kept, MarchResult
-from studyrunner.plan.sharing import Share, march_counts, share_histories
+from studyrunner.plan.results import MarchResult
+from studyrunner.plan.sharing import ScaledHistory, march_counts, share_histories
 from studyrunner.plan.tasks import MarchTask, build_tasks
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import no_keep
+from studyrunner.variables import KEPT
+from tests.studyrunner.fakes import no_keep, totals_of
 from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
@@ -74,7 +75,7 @@ def test_histories_are_shared_where_they_are_the_same(
     march_of = {
         choice: number
         for number, found in enumerate(sharing.marches)
-        for choice in itertools.chain.from_iterable(found.shares)
+        for choice in itertools.chain.from_iterable(found.histories)
     }
     choices = list(itertools.product(*(range(len(axis)) for axis in (wears, steps, schemes))))
     assert sorted(march_of) == choices
@@ -83,9 +84,9 @@ def test_histories_are_shared_where_they_are_the_same(
         assert (march_of[one] == march_of[other]) == alike(study, *exact, one, other)
     assert sum(item.n_points for item in sharing.left_out(1, len(choices))) == len(choices) - len(sharing.marches)
     for found in sharing.marches:
-        by_share = [{study.axes.wear_coefficient[wear] for wear, _, _ in share} for share in found.shares]
-        assert all(len(of_one) == 1 for of_one in by_share)
-        descending = [min(of_one) for of_one in by_share]
+        by_history = [{study.axes.wear_coefficient[wear] for wear, _, _ in scaled} for scaled in found.histories]
+        assert all(len(of_one) == 1 for of_one in by_history)
+        descending = [min(of_one) for of_one in by_history]
         assert descending == sorted(descending, reverse=True)
         assert found.held == (descending[0] == 0.0)
 
@@ -128,8 +129,9 @@ def test_what_is_left_out_has_a_reason(overrides: tuple[str, ...], expected: dic
 def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
     faster: int, slower: int, step: float, whole: list[int]
 ) -> None:
-    """For the march, whose counts are sums of its steps, and for its shares, whose cycle counts have round-off."""
-    own, other = Share(1e-12 * faster, step, ((0,),)), Share(1e-12 * slower, step * faster / slower, ((1,),))
+    """For the march, whose counts are sums of its steps, and for its histories, whose cycle counts have round-off."""
+    own = ScaledHistory(1e-12 * faster, step, ((0,),))
+    other = ScaledHistory(1e-12 * slower, step * faster / slower, ((1,),))
     cycles = tuple(n * other.step for n in sorted(set(whole)))
     counts = march_counts(cycles, other, own, steps_of_given_length=True)
     for n, count in zip(sorted(set(whole)), counts, strict=True):
@@ -139,7 +141,7 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
 
 
 def test_counts_of_other_wear_coefficients_are_as_many_times_larger() -> None:
-    own, other = Share(1e-11, 100.0, ((0,),)), Share(2.5e-12, 400.0, ((1,),))
+    own, other = ScaledHistory(1e-11, 100.0, ((0,),)), ScaledHistory(2.5e-12, 400.0, ((1,),))
     for steps_of_given_length in (False, True):
         counts = march_counts((0.0, 10.0, 130.0), other, own, steps_of_given_length)
         assert counts == pytest.approx((0.0, 2.5, 32.5), rel=1e-15)
@@ -176,33 +178,32 @@ def shared_task(*overrides: str) -> MarchTask:
     study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2", *overrides)
     ((task,),) = build_tasks(study, 2).marches
     start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
-    packed = pack(start)
-    return replace(task, start=Kept(packed.text, packed.arrays))
+    return replace(task, start=pack(start))
 
 
-def test_each_share_has_its_own_counts_and_rates_back() -> None:
+def test_each_history_has_its_own_counts_and_rates_back() -> None:
     task = shared_task()
     found = [build_result(task, history(COUNTS), place) for place in range(3)]
-    assert [result.share for result in found] == [0, 1, 2]
-    assert [result.points for result in found] == [share.points for share in task.shares]
+    assert [result.place for result in found] == [0, 1, 2]
+    assert [result.points for result in found] == [scaled.points for scaled in task.histories]
     assert [{point[1] for point in result.points} for result in found] == [{1}, {2}, {0}]
     assert all(len(result.points) == 2 for result in found)
     assert [result.values["worn_volume"].tolist() for result in found] == [[0.0, 4.0], [0.0, 2.0], [0.0, 1.0]]
     assert [result.values["harmonics_used"].tolist() for result in found] == [[3, 7], [3, 5], [3, 4]]
     np.testing.assert_allclose([result.values["wear_rate"][-1] for result in found], [4.0, 0.4 * 2.0, 0.2 * 1.0])
-    np.testing.assert_allclose([result.step_limit for result in found], [250.0, 250.0 / 0.4, 250.0 / 0.2])
-    assert all((result.newton_iterations, result.run_time, result.branch) == (7, 0.5, 2) for result in found)
+    np.testing.assert_allclose([result.values["step_limit"] for result in found], [250.0, 250.0 / 0.4, 250.0 / 0.2])
+    assert all(totals_of(result, "newton_iterations", "run_time", "branch") == [7, 0.5, 2] for result in found)
 
 
 @pytest.mark.parametrize(("jump", "expected"), [(1.0, [1, 2.5, 5]), (2.0, [2, 5, np.nan]), (9.0, [9, np.nan, np.nan])])
-def test_a_share_does_not_know_of_jumps_after_its_last_count(jump: float, expected: list[float]) -> None:
+def test_a_scaled_history_does_not_know_of_jumps_after_its_last_count(jump: float, expected: list[float]) -> None:
     jumped = replace(history(COUNTS), jump_cycle=jump)
-    found = [build_result(shared_task(), jumped, place).jump_cycle for place in range(3)]
+    found = [build_result(shared_task(), jumped, place).values["jump_cycle"] for place in range(3)]
     np.testing.assert_allclose(found, expected)
 
 
-def test_the_error_of_a_share_is_that_at_its_own_end() -> None:
-    found = [build_result(shared_task(), history(COUNTS), place).error_estimate for place in range(3)]
+def test_the_error_of_a_scaled_history_is_that_at_its_own_end() -> None:
+    found = [build_result(shared_task(), history(COUNTS), place).values["error_estimate"] for place in range(3)]
     np.testing.assert_allclose(found, [0.12, 0.06, 0.03])
 
 
@@ -216,18 +217,18 @@ def test_the_error_of_a_share_is_that_at_its_own_end() -> None:
         (1.5, [4, 4, 4], [1.5, 3.75, 7.5]),
     ],
 )
-def test_shares_of_a_march_that_ended_early_are_shares_all_the_same(
+def test_histories_of_a_march_that_ended_early_are_results_all_the_same(
     last: float, outcomes: list[int], lasts: list[float]
 ) -> None:
-    """Cycles 0 and 10 of the shares are 0, 10; 0, 4; 0, 2 cycles of the march."""
+    """Cycles 0 and 10 of the histories are 0, 10; 0, 4; 0, 2 cycles of the march."""
     ended = replace(history(COUNTS, Outcome.MARCH_FAILED), last_cycle=last, message="at cycle 9")
     found = [build_result(shared_task(), ended, place) for place in range(3)]
     assert [result.outcome for result in found] == outcomes
-    np.testing.assert_allclose([result.last_cycle for result in found], lasts)
+    np.testing.assert_allclose([result.values["last_cycle"] for result in found], lasts)
     for place, result in enumerate(found):
         there = np.isfinite(result.values["worn_volume"]).tolist()
-        assert there == [True, last >= shared_task().counts(shared_task().shares[place])[-1]]
-        assert result.error_estimate == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
+        assert there == [True, last >= shared_task().counts(shared_task().histories[place])[-1]]
+        assert result.values["error_estimate"] == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
     # the message of the march counts its own cycles
     assert found[0].message == "at cycle 9"
     assert all(result.message == "" for result in found if result.outcome == 0)
@@ -246,7 +247,7 @@ def test_shares_of_a_march_that_ended_early_are_shares_all_the_same(
         ([True, True, True, True, True], Outcome.MARCH_FAILED, "3", [4, 0, 0]),
     ],
 )
-def test_a_share_is_above_rtol_by_its_own_states(
+def test_a_scaled_history_is_above_rtol_by_its_own_states(
     above: list[bool], ended: Outcome, harmonics: str, expected: list[int]
 ) -> None:
     rates = np.where(above, 0.02, 0.005)
@@ -255,15 +256,15 @@ def test_a_share_is_above_rtol_by_its_own_states(
     assert [build_result(task, found, place).outcome for place in range(3)] == expected
 
 
-def test_a_share_says_from_which_of_its_own_cycles_on() -> None:
+def test_a_scaled_history_says_from_which_of_its_own_cycles_on() -> None:
     rates = np.array([0.005, 0.005, 0.04, 0.04, 0.03])
     found = replace(history(COUNTS, Outcome.INACCURATE), wear_rate_error=rates, message="of the march")
     messages = [build_result(shared_task(), found, place).message for place in range(3)]
-    # 4 cycles of the march are 10 of the share
+    # 4 cycles of the march are 10 of the scaled history
     assert messages == ["of the march", "from cycle 10 on the wear rate is known to 4 % only", ""]
 
 
-def test_a_share_is_sensitive_by_its_own_last_count() -> None:
+def test_a_scaled_history_is_sensitive_by_its_own_last_count() -> None:
     errors = np.array([0.0, 0.2, 0.7, 0.4, 0.9])
     found = replace(history(COUNTS, Outcome.SENSITIVE), worn_volume_error=errors, message="of the march")
     results = [build_result(shared_task(), found, place) for place in range(3)]
@@ -297,7 +298,7 @@ def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [result.values["worn_volume"][-1] for result in found] == [3.0, 2.0, 1.0]
 
 
-def test_a_march_that_fails_is_not_done_again_for_its_shares(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_march_that_fails_is_not_done_again_for_its_histories(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail_late(at: WearHistory, wear: float) -> WearHistory:
         return replace(at, outcome=Outcome.MARCH_FAILED, last_cycle=3.0, oscillates=False)
 
@@ -312,16 +313,16 @@ def test_what_oscillates_late_does_not_where_it_ends_before(monkeypatch: pytest.
 
     found, calls = marched(monkeypatch, oscillate_late)
     assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0]), (4e-12, [0.0, 10.0]), (2e-12, [0.0, 10.0])]
-    assert [result.oscillates for result in found] == [True, False, False]
-    assert [result.share for result in found] == [0, 1, 2]
+    assert [result.values["oscillates"] for result in found] == [True, False, False]
+    assert [result.place for result in found] == [0, 1, 2]
     for result in found[1:]:
         assert result.values["worn_volume"].tolist() == result.values["wear_rate"].tolist() == [0.0, 1.0]
-        assert result.step_limit == 250.0
+        assert result.values["step_limit"] == 250.0
 
 
 def test_only_what_is_asked_for_and_the_certificates_are_sent() -> None:
     study = study_of("outputs.variables=['worn_volume']", "slow_time.outputs=2", "axes.scheme=implicit")
     ((task,),) = build_tasks(study, 2).marches
     sent = build_result(task, history([0.0, 20000.0])).values
-    assert tuple(sent) == task.variables
+    assert sent.keys() == {*task.variables, *KEPT}
     assert not {"wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_amplitude"} & set(sent)

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver.packing import Packed
 from studyrunner.checkpoint import part_writer, stock
 from studyrunner.checkpoint import store as store_module
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.shelf import FILES_A_MERGE
 from studyrunner.checkpoint.store import SECONDS_A_FILE, SECONDS_A_PROGRESS, Store
 from studyrunner.mpi.crashes import count_crashes, forget_crashes, read_tally
-from studyrunner.plan.results import Kept
 from studyrunner.system import folder_lock
 from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.user_error import StorageError
@@ -40,8 +40,8 @@ def record(number: int, kind: np.dtype[np.void] = KIND) -> np.ndarray:
     return found
 
 
-def kept(number: int) -> Kept:
-    return Kept(f"é state {number}", (np.arange(3.0) + number, np.full((2, 2), number * 1j)))
+def kept(number: int) -> Packed:
+    return Packed(f"é state {number}", (np.arange(3.0) + number, np.full((2, 2), number * 1j)))
 
 
 def fill(folder: Path, numbers: range = range(4), kind: np.dtype[np.void] = KIND) -> None:
@@ -81,7 +81,7 @@ def settle(store: Store) -> None:
     store.close()
 
 
-def assert_same(found: Kept, expected: Kept) -> None:
+def assert_same(found: Packed, expected: Packed) -> None:
     assert found.text == expected.text
     for one, other in zip(found.arrays, expected.arrays, strict=True):
         np.testing.assert_array_equal(one, other, strict=True)
@@ -567,7 +567,7 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from studyrunner.store import Store
+from studyrunner.checkpoint.store import Store
 store = Store(Path(sys.argv[1]), np.dtype([("key", "S32")]))
 print("locked", flush=True)
 time.sleep(float(sys.argv[2]))

@@ -9,13 +9,14 @@ from collections.abc import Sequence
 
 import pytest
 
+from solver.settings import SolverSettings
 from studyrunner.cli import main
-from studyrunner.course import start_marches
 from studyrunner.plan.estimate import AUTOMATIC_HARMONICS
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import Settings, TaskPlan, build_tasks
+from studyrunner.plan.tasks import TaskPlan, build_tasks
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
+from studyrunner.task_progress import start_marches
 from studyrunner.variables import CERTIFICATE
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
@@ -81,7 +82,7 @@ def test_the_plan_tells_ramps_from_branches(sweeps: str, said: str, capsys: pyte
 def test_points_know_their_task() -> None:
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
-    assert any(len(task.shares) > 1 for task in plan.marches[0])
+    assert any(len(task.histories) > 1 for task in plan.marches[0])
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         for task in line:
             assert task.branch == branch.number
@@ -93,11 +94,11 @@ def test_points_know_their_task() -> None:
                 assert values["excitation_amplitude"] == branch.excitation_amplitude
                 assert values["sweep"] == branch.sweep
                 assert values["harmonics"] == task.settings.harmonics == branch.settings.harmonics
-                (share,) = (share for share in task.shares if point in share.points)
-                assert values["wear_coefficient"] == share.wear_coefficient
+                (scaled,) = (scaled for scaled in task.histories if point in scaled.points)
+                assert values["wear_coefficient"] == scaled.wear_coefficient
                 if not task.held:
                     assert values["scheme"] == task.scheme
-                    assert values["step"] == share.step or task.scheme == "adaptive"
+                    assert values["step"] == scaled.step or task.scheme == "adaptive"
 
 
 def test_nothing_wears_without_a_wear_coefficient() -> None:
@@ -168,7 +169,7 @@ def test_marches_are_found_by_their_start_state() -> None:
 def test_automatic_settings_are_those_of_the_task_and_estimated_for_the_plan() -> None:
     study, plan = plan_of("axes.frequency=150", "axes.harmonics=[3, 'auto']", "axes.rtol=[1e-2, 1e-3]")
     assert [branch.settings for branch in plan.branches] == [
-        Settings(harmonics, "auto", 1e-8, rtol, math.inf)
+        SolverSettings(harmonics, "auto", 1e-8, rtol, math.inf)
         for harmonics, rtol in itertools.product((3, "auto"), (1e-2, 1e-3))
     ]
     assert plan.n_unknowns == 2 * (2 * AUTOMATIC_HARMONICS + 1)

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
-from studyrunner.evaluate import NOT_COMPUTED
 from studyrunner.system import folder_lock
 from tests.studyrunner.faked_runs import Solver, Task
 from tests.studyrunner.test_store import KIND, assert_same, kept, key, names, record, records_of
@@ -177,7 +177,7 @@ def test_a_record_that_is_not_the_one_asked_for_is_no_result(
     assert "does not hold any more what this run has written there: its points are not computed" in said
     with xr.open_dataset("out.nc") as result:
         found = result.load().drop_vars("run_time")
-    there = found.outcome != NOT_COMPUTED
+    there = found.outcome != Outcome.NOT_COMPUTED
     assert not bool(there.all())
     xr.testing.assert_equal(found.worn_volume.where(there), expected.worn_volume.where(there))
     time.sleep(0.01)

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from studyrunner.progress import count
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, new_panels, set_from_zero
 from studyrunner.report.reading.flanks import LONE, Flank, find_flanks
 from studyrunner.report.reading.frequency_course import cell_edges
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.system.progress import count
 
 _MOST_SERIES = 4
 _MOST_PROFILES = 5

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.progress import count
 from studyrunner.report.drawing import Table
 from studyrunner.report.figures.response import folds
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import show_cycles, show_number
+from studyrunner.system.progress import count
 
 _MOST_ROWS = 20
 

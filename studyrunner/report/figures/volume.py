@@ -11,7 +11,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from studyrunner.progress import count
 from studyrunner.report.drawing import (
     Drawing,
     Missing,
@@ -26,6 +25,7 @@ from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_c
 from studyrunner.report.reading.frequency_course import Course, cell_edges, find_course
 from studyrunner.report.reading.result import Choice, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.system.progress import count
 
 _MOST_LINES = 6
 _MOST_MAPS = 4

@@ -8,12 +8,12 @@ from html import escape
 
 import numpy as np
 
-from studyrunner.progress import count
 from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page.data import PageData
 from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Result, units_of
 from studyrunner.report.reading.units import show_cycles, show_number
+from studyrunner.system.progress import count
 
 _MOST_VALUES = 12
 

@@ -12,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from studyrunner.progress import count
 from studyrunner.report.drawing import Drawing, Missing, Table, line_style, new_panels, style
 from studyrunner.report.precision.errors import QUANTITIES, RESOLVED, Measured, Point, Precision
 from studyrunner.report.precision.settings import Setting
 from studyrunner.report.precision.tables import NAMES, how_known, list_precision, reference_words
 from studyrunner.report.reading.result import as_sentences
+from studyrunner.system.progress import count
 
 NOT_COMPARED = (
     "The file does not compare numerical settings: give scheme or step under [axes], or keys of [solver], several"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from studyrunner.progress import count
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.units import show_cycles
+from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
 

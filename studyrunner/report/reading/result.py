@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.progress import count
 from studyrunner.report.reading.door import check_dataset, read_study, reading_errors
 from studyrunner.report.reading.units import show_cycles, show_number
+from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 

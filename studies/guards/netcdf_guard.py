@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import netCDF4
 
-from studies.hdf5_guard import (
+from studies.guards.hdf5_guard import (
     LARGEST_RESULT,
     LARGEST_TEXT,
     check_dataset,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from studyrunner.course import Course
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import BranchTask, TaskPlan, build_tasks
 from studyrunner.study.study_file import read_study
+from studyrunner.task_progress import TaskProgress
 from tests.benchmarks.scheduling import SHAPES, replay_shape
-from tests.benchmarks.simulation import MemoryLedger, Overheads, replay
+from tests.benchmarks.simulation import MemoryIndex, Overheads, replay
 from tests.studyrunner.fakes import fake_branch, fake_march
 
 
@@ -20,54 +20,54 @@ def plan_of() -> TaskPlan:
 
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     plan = plan_of()
-    course = Course(MemoryLedger(plan))
-    assert course.look(()).seconds_left == pytest.approx(plan.cost)
+    progress = TaskProgress(MemoryIndex(plan))
+    assert progress.look(()).seconds_left == pytest.approx(plan.cost)
     marches = []
     for branch in plan.branches:
         for started in fake_branch(branch):
-            course.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
-            marches.extend(course.take(branch, started))
-    assert course.n_starts_left == 0
+            progress.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
+            marches.extend(progress.take(branch, started))
+    assert progress.n_starts_left == 0
     for number, task in enumerate(marches, start=1):
-        course.costs.learn(task.kin, task.cost, 2.0 * task.cost)
-        course.take(task, fake_march(task))
+        progress.costs.learn(task.kin, task.cost, 2.0 * task.cost)
+        progress.take(task, fake_march(task))
         left = 2.0 * sum(march.cost for march in marches[number:])
         if number > 8:
-            assert course.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
-    assert course.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
-    assert course.look(()).n_done == course.look(()).n_points == plan.n_points
+            assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
+    assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
+    assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
 
 
 def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
     plan = plan_of()
-    course = Course(MemoryLedger(plan))
+    progress = TaskProgress(MemoryIndex(plan))
     up, down = plan.branches
-    (march, *_) = course.take(up, next(iter(fake_branch(up))))
-    all_of_it = course.look(()).seconds_left
+    (march, *_) = progress.take(up, next(iter(fake_branch(up))))
+    all_of_it = progress.look(()).seconds_left
     expected = march.cost
-    half = course.look([(march, 1, 0.5 * expected)])
+    half = progress.look([(march, 1, 0.5 * expected)])
     assert half.seconds_left == pytest.approx(all_of_it - 0.5 * expected)
-    both = course.look([(march, 1, 0.5 * expected), (down, down.n_results - 2, 0.0)])
+    both = progress.look([(march, 1, 0.5 * expected), (down, down.n_results - 2, 0.0)])
     assert both.seconds_left == pytest.approx(0.5 * half.seconds_left)
     assert half.running == ("1 Hz implicit",)
     # a sweep down that has given two states is on the way to the third
     assert both.running[1] == f"sweep down to {down.frequencies[-3]:.6g} Hz"
     # what is late is not over at once
-    late = course.look([(march, 1, 1e6)])
+    late = progress.look([(march, 1, 1e6)])
     assert late.seconds_left >= 1e6
 
 
 def test_finished_marches_are_kept_with_their_results() -> None:
     plan = plan_of()
-    ledger = MemoryLedger(plan)
-    course = Course(ledger)
+    completion = MemoryIndex(plan)
+    progress = TaskProgress(completion)
     for branch in plan.branches:
         for started in fake_branch(branch):
-            for task in course.take(branch, started):
-                course.take(task, fake_march(task))
-    kept = [(task.number, result.points) for task, result in ledger.histories]
+            for task in progress.take(branch, started):
+                progress.take(task, fake_march(task))
+    kept = [(task.number, result.points) for task, result in completion.histories]
     assert sorted(kept) == [(task.number, task.points) for line in plan.marches for task in line]
-    assert [(branch.number, start.position) for branch, start in ledger.starts] == [
+    assert [(branch.number, start.position) for branch, start in completion.starts] == [
         (branch.number, position) for branch in plan.branches for position in branch.order
     ]
 

@@ -6,9 +6,9 @@ import os
 import sys
 
 # The rule itself has to come from beside this package, and not from a folder `studies` in the current one.
-sys.path.insert(0, os.path.realpath(os.path.join(__file__, "..", "..")))  # noqa: PTH118
+sys.path.insert(0, os.path.realpath(os.path.join(__file__, "..", "..", "..")))  # noqa: PTH118
 
-from studies.search_path import search_path
+from studies.guards.search_path import search_path
 
 del sys.path[0]
 sys.path[:] = search_path()

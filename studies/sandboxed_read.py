@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from studies.guards.search_path import search_path
 from studies.scene_error import SceneError
-from studies.search_path import search_path
 
 LARGEST_MEMORY = 2**30
 """Bytes of address space for reading a file."""
@@ -29,7 +29,11 @@ LONGEST = 2
 _BYTES_A_SECOND = 2**25
 _REFUSED = 3
 _WHOLE_RESULT = "*"
-_START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from studies.vetting import main; main(sys.argv[2:])"
+_START = """\
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from studies.sandboxed_read import main
+main(sys.argv[2:])"""
 _WALL_SECONDS = 60.0  # a folder on the network may be slow, which is no fault of the file
 
 
@@ -39,21 +43,30 @@ def is_hdf5(path: Path) -> bool:
         return file.read(8) == b"\x89HDF\r\n\x1a\n"
 
 
-def vet_scene(path: Path, group: str = "", attributes: Sequence[str] = ()) -> None:
+def check_scene_readable(path: Path, group: str = "", attributes: Sequence[str] = ()) -> None:
     """Raises SceneError where reading all of a scene fails, would crash, or take too long or too much memory.
 
-    attributes: of the file, which are read as well. Whether the numbers make a model is not found here.
+    Whether the numbers make a model is not found here.
+
+    Parameters
+    ----------
+    path
+        A scene file, or one that holds a scene.
+    group
+        Where the scene stands in a file that holds more than one.
+    attributes
+        Of the file, which are read as well.
     """
-    _vet(path, [group, *attributes])
+    _check(path, [group, *attributes])
 
 
-def vet_result(path: Path) -> None:
+def check_result_readable(path: Path) -> None:
     """Raises SceneError where a result file would do harm to a program that opens it."""
-    _vet(path, [_WHOLE_RESULT])
+    _check(path, [_WHOLE_RESULT])
 
 
-def _vet(path: Path, what: Sequence[str]) -> None:
-    status, said = run_reader([str(path.absolute()), *what])
+def _check(path: Path, what: Sequence[str]) -> None:
+    status, said = run_sandbox([str(path.absolute()), *what])
     if status == _REFUSED:
         raise SceneError(*json.loads(said))
     if status != 0:
@@ -61,7 +74,7 @@ def _vet(path: Path, what: Sequence[str]) -> None:
         raise SceneError("model", found, "write the scene file again")
 
 
-def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
+def run_sandbox(arguments: Sequence[str]) -> tuple[int, str]:
     """Exit status of the process that reads a file, and what it says."""
     # one thread: the memory that others set aside counts, too
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -86,11 +99,11 @@ def run_reader(arguments: Sequence[str]) -> tuple[int, str]:
 def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
     """Reads all of a scene; exit status and what is said. This process can do nothing else afterwards."""
     # loaded before there are limits, as it is no fault of the file how long that takes
-    from studies.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
+    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
     from studies.scene_file import read_through
 
     if group == _WHOLE_RESULT:
-        from studies.netcdf_guard import read_result_through
+        from studies.guards.netcdf_guard import read_result_through
 
     seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
     if path.is_file():

@@ -35,15 +35,15 @@ class Standing:
     seconds_left: float
     running: tuple[str, ...]
 
-    def share(self, elapsed: float) -> float:
-        """Share of the time that is over after so many seconds; all of it only where every point is done."""
+    def fraction(self, elapsed: float) -> float:
+        """Fraction of the time that is over after so many seconds; all of it only where every point is done."""
         if self.n_done == self.n_points:
             return 1.0
         return min(elapsed / max(elapsed + self.seconds_left, 1e-9), 0.99)
 
     def describe(self, elapsed: float) -> str:
         """Points and percent that are done, the time left, and what runs, in one line."""
-        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * self.share(elapsed):.0f} %"]
+        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * self.fraction(elapsed):.0f} %"]
         if self.n_done < self.n_points:
             parts.append(f"about {format_seconds(self.seconds_left)} left")
         if self.running:
@@ -53,7 +53,7 @@ class Standing:
         return ", ".join(parts)
 
 
-class RunProgress:
+class ProgressDisplay:
     """What the user sees while a study runs. Only rank 0 has one."""
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ class RunProgress:
                 self._next_picture = elapsed + _SECONDS_A_PICTURE
                 standing = look()
                 text = standing.describe(since)
-                self._bar.update(self._bar_task, completed=standing.share(since), description=text)
+                self._bar.update(self._bar_task, completed=standing.fraction(since), description=text)
         elif elapsed >= self._next_line:
             self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
             print(f"{self._clock()} {look().describe(since)}", file=sys.stderr, flush=True)

@@ -6,7 +6,7 @@ import os
 import sys
 
 # in the words of os: pathlib would be loaded from where it is not known yet
-_OWN = os.path.realpath(os.path.join(__file__, "..", ".."))  # noqa: PTH118
+_OWN = os.path.realpath(os.path.join(__file__, "..", "..", ".."))  # noqa: PTH118
 _PYTHONS = os.path.realpath(os.path.join(os.__file__, ".."))  # noqa: PTH118
 
 

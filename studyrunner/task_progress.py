@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from studyrunner.checkpoint.completion_index import Ledger
-from studyrunner.evaluate import CRASHED, NOT_COMPUTED
+from solver.outcome import Outcome
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mpi.crashes import MOST_DEATHS, Crash
 from studyrunner.plan.costs import LearnedCosts
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
-from studyrunner.progress import Standing
+from studyrunner.system.progress import Standing
 
 _TRIES_AGAIN = 1
 """So often a task that a fault of the machine has ended is done again by itself."""
@@ -20,35 +20,35 @@ _TRIES_AGAIN = 1
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
-_LATE = 1.0  # a task that takes longer than expected goes on for such a share of the time that it has taken
+_LATE = 1.0  # a task that takes longer than expected goes on for such a fraction of the time that it has taken
 
 
-class Course:
+class TaskProgress:
     """How far the tasks of a study are, and what their results make possible.
 
     A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
     order. n_crashes: by the key of a task, how many processes it has ended in earlier runs.
     """
 
-    def __init__(self, ledger: Ledger, n_crashes: Mapping[str, int] | None = None) -> None:
+    def __init__(self, completion: CompletionIndex, n_crashes: Mapping[str, int] | None = None) -> None:
         self.costs = LearnedCosts()
-        self.branches = ledger.branches_left()
-        self.n_points = ledger.n_points_finished
+        self.branches = completion.branches_left()
+        self.n_points = completion.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
-        self._ledger = ledger
+        self._completion = completion
         self._n_lost: Counter[str] = Counter(n_crashes)
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[int] = Counter()
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
-        lines = ledger.plan.marches
-        self._left[MARCHES] = sum(march.cost for line in lines for march in line if not ledger.is_finished(march))
+        lines = completion.plan.marches
+        self._left[MARCHES] = sum(march.cost for line in lines for march in line if not completion.is_finished(march))
 
     def begin(self) -> Iterator[BranchTask | MarchTask]:
         """The tasks that are possible from the start."""
         yield from self.branches
-        for branch in self._ledger.plan.branches:
-            for result in self._ledger.known_starts(branch):
+        for branch in self._completion.plan.branches:
+            for result in self._completion.known_starts(branch):
                 yield from self._start(branch, result)
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
@@ -57,13 +57,13 @@ class Course:
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
             last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
-            place = result.position if isinstance(result, StartResult) else result.share
+            place = result.position if isinstance(result, StartResult) else result.place
             return self._try_again(task) if place == last else ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
-            self._ledger.add_start(task, result)
+            self._completion.add_start(task, result)
             return self._start(task, result)
         if isinstance(task, MarchTask) and isinstance(result, MarchResult):
-            self._ledger.add_history(task, result)
+            self._completion.add_history(task, result)
             self.n_points += len(result.points)
             self._n_given[task.number] += len(result.points)
         return ()
@@ -73,7 +73,7 @@ class Course:
         self._n_faults[task.key] += 1
         if self._n_faults[task.key] > _TRIES_AGAIN:
             return ()
-        again = self._ledger.renew(task)
+        again = self._completion.renew(task)
         if isinstance(again, BranchTask):
             again = replace(again, cost=task.cost * again.n_results / task.n_results)
             self.n_starts_left += again.n_results
@@ -98,14 +98,15 @@ class Course:
         at = next((key for key in keys if key in crashes), next(iter(keys), ""))
         self._n_lost[at] += 1
         for task, n_left in lost:
-            again = self._ledger.renew(task)
+            again = self._completion.renew(task)
             crash = None
             if task.key == at and self._n_lost[at] >= MOST_DEATHS:
                 position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
                 unknown = Crash(task.key, position, f"{MOST_DEATHS} ranks were lost while they were at it")
                 crash = crashes.get(at, unknown)
             if crash is not None:
-                self.n_points += self._ledger.take_as_failed(crash.key, crash.position, CRASHED, crash.message)
+                ended = crash.key, crash.position, Outcome.CRASHED, crash.message
+                self.n_points += self._completion.take_as_failed(*ended)
             if isinstance(again, BranchTask):
                 if crash is not None and crash.position is not None:
                     behind = again.order[again.order.index(crash.position) :]
@@ -119,13 +120,13 @@ class Course:
             else:
                 # it gives all of its histories again
                 n_given = task.n_results - n_left
-                self.n_points -= sum(len(share.points) for share in again.shares[:n_given])
+                self.n_points -= sum(len(scaled.points) for scaled in again.histories[:n_given])
                 self._left[task.kind] += task.cost * n_given / task.n_results
                 left.append(again)
         return left
 
     def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
-        planned = self._ledger.marches_from(branch.number, result.position)
+        planned = self._completion.marches_from(branch.number, result.position)
         new = start_marches(planned, result)
         for before, march in zip(planned, new, strict=True):
             self._left[MARCHES] -= before.cost
@@ -145,7 +146,7 @@ class Course:
             longest = max(longest, still)
         return Standing(
             n_done=self.n_points,
-            n_points=self._ledger.plan.n_points,
+            n_points=self._completion.plan.n_points,
             seconds_left=max(longest, left / max(1, len(running))),
             running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
         )
@@ -156,14 +157,14 @@ class Course:
             place = task.order_left[task.n_results - n_left]
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             return f"{how} to {task.frequencies[place]:.6g} Hz"
-        return f"{self._ledger.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
+        return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
 
 
 def fault_of(result: StartResult | MarchResult) -> str:
     """The fault of the machine that a rank sends in place of a result; nothing where it is one."""
     if isinstance(result, StartResult):
         return result.lost
-    return result.message if result.outcome == NOT_COMPUTED else ""
+    return result.message if result.outcome == Outcome.NOT_COMPUTED else ""
 
 
 def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:
@@ -174,8 +175,6 @@ def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[M
     tasks = []
     for task in planned:
         n_unknowns = started.n_unknowns or task.n_unknowns
-        share = n_unknowns / task.n_unknowns
-        share *= 1.0 if started.moves else _COST_AT_REST
-        cost = task.cost * share
+        cost = task.cost * (n_unknowns / task.n_unknowns * (1.0 if started.moves else _COST_AT_REST))
         tasks.append(replace(task, start=started.start, cost=cost, n_unknowns=n_unknowns, moves=started.moves))
     return tuple(tasks)

@@ -2,7 +2,8 @@
 
 Nothing out of the file is followed: external, soft and user-defined links, external storage and virtual datasets are
 refused, and so are types other than numbers and text, filters that need a plug-in, and sizes that the file itself does
-not account for. What the library makes of damaged bytes is found out by a process of its own, see `studies.vetting`.
+not account for. What the library makes of damaged bytes is found out by a process of its own, see
+`studies.sandboxed_read`.
 """
 
 from __future__ import annotations
@@ -44,7 +45,12 @@ _FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 def open_hdf5(path: Path, largest: int = LARGEST_FILE) -> h5py.File:
     """The file, of at most `largest` bytes, open for reading.
 
-    Raises SceneError where it is none, OSError where it is missing or not readable.
+    Raises
+    ------
+    SceneError
+        Where it is none.
+    OSError
+        Where it is missing or not readable.
     """
     with path.open("rb"):  # says why, where h5py only says that a file cannot be opened
         pass
@@ -66,7 +72,12 @@ def find_group(file: h5py.File, name: str) -> h5py.Group:
 def find_datasets(group: h5py.Group, file_size: int) -> dict[str, h5py.Dataset]:
     """Datasets below a group by name with the groups above, each of them safe to be read.
 
-    Those that only give a dimension its name, and named types, are left out. Raises SceneError.
+    Those that only give a dimension its name, and named types, are left out.
+
+    Raises
+    ------
+    SceneError
+        Where one of them is not what it says, or all together are too large.
     """
     walked = walk(group)
     found = {key: item for key, item in walked if isinstance(item, h5py.Dataset) and not only_names_a_dimension(item)}
@@ -145,9 +156,21 @@ def read_attribute(group: h5py.Group, name: str) -> NDArray[np.generic] | None:
 
 
 def walk(group: h5py.Group, prefix: str = "", seen: list[int] | None = None) -> Iterator[tuple[str, h5py.HLObject]]:
-    """All groups and datasets below a group by name with the groups above; no link is followed. Raises SceneError.
+    """All groups and datasets below a group by name with the groups above; no link is followed.
 
-    prefix, seen: of the groups above, and how many objects were met on the way.
+    Parameters
+    ----------
+    group
+        The group, or the file.
+    prefix
+        Names of the groups above, each with a slash behind it.
+    seen
+        How many objects were met on the way, counted on.
+
+    Raises
+    ------
+    SceneError
+        Where there are too many objects, or one is neither group nor dataset.
     """
     seen = [0] if seen is None else seen
     for name in group:

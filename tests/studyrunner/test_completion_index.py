@@ -1,0 +1,274 @@
+"""What of a study is left to do after an earlier run: by the tasks that are asked for."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.outcome import COMPLETE
+from solver.packing import Packed
+from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
+from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.study.study_file import read_study
+from studyrunner.task_progress import TaskProgress
+from tests.studyrunner.fakes import FACTS, changed, fake_branch, fake_march, open_completion, without_values
+
+BASE = (
+    "axes.frequency=[100, 110, 120]",
+    "axes.sweep=['up', 'down']",
+    "axes.scheme=['implicit']",
+    "axes.wear_coefficient=[5e-12, 1e-11]",
+    "slow_time.outputs=3",
+)
+
+
+@contextlib.contextmanager
+def completion_of(folder: Path, *overrides: str) -> Iterator[CompletionIndex]:
+    study = read_study("sdof_slider", (*BASE, *overrides))
+    completion = open_completion(study, build_tasks(study, FACTS.n_displacements), folder)
+    with contextlib.closing(completion.store):
+        yield completion
+
+
+def compute(completion: CompletionIndex, n_tasks: int = 1000, failing: frozenset[int] = frozenset()) -> tuple[int, int]:
+    """Does what is left as a run does, up to a number of tasks; how many start states and marches it computed.
+
+    failing: numbers of marches that fail.
+    """
+    progress = TaskProgress(completion)
+    waiting: list[BranchTask | MarchTask] = list(progress.begin())
+    n_starts = n_marches = 0
+    while waiting and n_starts + n_marches < n_tasks:
+        task = waiting.pop(0)
+        if isinstance(task, BranchTask):
+            for start in fake_branch(task):
+                waiting.extend(progress.take(task, start))
+                n_starts += 1
+        else:
+            n_marches += 1
+            for place in range(task.n_results):
+                result = fake_march(task, place=place)
+                if task.number in failing:
+                    result = changed(without_values(result, 4), message="why")
+                waiting.extend(progress.take(task, result))
+    completion.store.flush()
+    return n_starts, n_marches
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "out.nc.parts"
+
+
+@pytest.fixture
+def finished(folder: Path) -> Path:
+    """The folder of a study that is finished: 2 branches of 3 start states, 2 marches from each."""
+    with completion_of(folder) as completion:
+        assert compute(completion) == (6, 12)
+    return folder
+
+
+def test_what_is_finished_is_not_computed_again(finished: Path) -> None:
+    with completion_of(finished) as completion:
+        assert completion.n_points_finished == 12
+        assert compute(completion) == (0, 0)
+
+
+@pytest.mark.parametrize("n_tasks", [1, 3, 4, 6, 7, 11, 15, 17])
+def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks: int, folder: Path) -> None:
+    with completion_of(folder) as completion:
+        first = compute(completion, n_tasks)
+    with completion_of(folder) as completion:
+        assert completion.n_points_finished == first[1]
+        second = compute(completion)
+    assert first[1] + second[1] == 12
+    # a branch gives all its states in one task here
+    assert first[0] + second[0] == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ("axes.wear_coefficient=[5e-12, 1e-11, 2e-11]", (0, 6)),
+        ("axes.wear_coefficient=[1e-11]", (0, 0)),
+        ("axes.step=[2000]", (0, 12)),
+        ("slow_time.outputs=4", (0, 12)),
+        ("outputs.variables=['worn_volume']", (0, 12)),
+        ("axes.sweep=['up']", (0, 0)),
+        ("axes.excitation_amplitude=[11]", (6, 12)),
+        # a state knows nothing of the other frequencies
+        ("axes.frequency=[90, 100, 110, 120]", (2, 4)),
+        ("axes.frequency=[100, 110, 115, 120]", (2, 4)),
+        ("axes.frequency=[100, 110, 120, 130]", (2, 4)),
+        ("axes.frequency=[110, 120]", (0, 0)),
+        ("axes.sweep=['up', 'ramp']", (3, 6)),
+        ("solver.time_limit=100", (0, 0)),
+        ("solver.tolerance=1e-9", (6, 12)),
+    ],
+)
+def test_a_changed_study_computes_only_what_changed(change: str, expected: tuple[int, int], finished: Path) -> None:
+    with completion_of(finished, change) as completion:
+        assert compute(completion) == expected
+    with completion_of(finished, change) as completion:
+        assert compute(completion) == (0, 0)
+    # and what it was before is still there, until a run of the changed one is finished
+    with completion_of(finished) as completion:
+        assert compute(completion) == (0, 0)
+
+
+def test_points_that_failed_are_tried_again_where_asked_for_only(folder: Path) -> None:
+    with completion_of(folder) as completion:
+        compute(completion, failing=frozenset({2, 7}))
+    with completion_of(folder) as completion:
+        assert compute(completion) == (0, 0)
+        completion.forget_failed(COMPLETE)
+        assert completion.n_points_finished == 10
+        assert compute(completion) == (0, 2)
+    with completion_of(folder) as completion:
+        completion.forget_failed(COMPLETE)
+        assert compute(completion) == (0, 0)
+
+
+def test_points_that_are_not_to_tolerance_have_not_failed(folder: Path) -> None:
+    with completion_of(folder) as completion:
+        compute(completion, failing=frozenset({2, 7}))
+        completion.forget_failed([*COMPLETE, 4])
+        assert completion.n_points_finished == 12
+
+
+def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder: Path) -> None:
+    """What comes behind it on its branch does not depend on it."""
+    with completion_of(folder) as completion:
+        down = completion.plan.branches[1]
+        for branch in completion.plan.branches:
+            for start in fake_branch(branch):
+                failed = branch is down and start.position == 1
+                completion.add_start(branch, replace(start, n_unknowns=0) if failed else start)
+        completion.keep(down, Packed("progress", (np.zeros(1),)))
+        compute(completion)
+        assert completion.n_points_finished == 12
+        completion.forget_failed(COMPLETE)
+        assert completion.n_points_finished == 10
+        (left,) = completion.branches_left()
+        assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
+        assert compute(completion) == (1, 2)
+
+
+def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
+    with completion_of(folder) as completion:
+        compute(completion, 5)
+        (march, *_) = [m for line in completion.plan.marches for m in line if not completion.is_finished(m)]
+        n_before = completion.n_points_finished
+        assert completion.take_as_failed(completion.key(march), None, 12, "Segmentation fault") == 1
+        assert completion.take_as_failed(completion.key(march), None, 12, "Segmentation fault") == 0
+        assert completion.take_as_failed("0" * 32, None, 12, "of another study") == 0
+        assert completion.n_points_finished == n_before + 1
+        (place,) = completion.places(march)
+        assert place is not None
+        record = completion.store.read(place[0])[place[1]]
+        assert (record["outcome"], record["message"]) == (12, "Segmentation fault")
+        assert np.isnan(record["worn_volume"]).all()
+    with completion_of(folder) as completion:
+        n_marches = compute(completion)[1]
+        assert n_marches == 12 - n_before - 1
+        completion.forget_failed(COMPLETE)
+        assert compute(completion) == (0, 1)
+
+
+def test_of_a_march_that_crashed_later_histories_alone_are_lost(folder: Path) -> None:
+    with completion_of(folder, "axes.scheme=adaptive", "axes.sweep=up") as completion:
+        branch = completion.plan.branches[0]
+        (march, *_) = TaskProgress(completion).take(branch, next(iter(fake_branch(branch))))
+        assert march.n_results == 2
+        completion.add_history(march, fake_march(march))
+        completion.store.flush()
+        kept = completion.places(march)[0]
+        assert kept is not None
+        assert completion.take_as_failed(march.key, None, 12, "") == 1
+        assert completion.places(march)[0] == kept
+        assert completion.is_finished(march)
+
+
+@pytest.mark.parametrize(("number", "position", "lost"), [(0, 1, {1, 2}), (1, 1, {0, 1}), (0, 0, {0, 1, 2})])
+def test_a_branch_that_ended_its_process_ends_there(number: int, position: int, lost: set[int], folder: Path) -> None:
+    with completion_of(folder) as completion:
+        branch = completion.plan.branches[number]
+        ended = completion.take_as_failed(completion.key(branch), position, 12, "why")
+        assert ended == 2 * len(lost)
+        marches = [march for line in completion.plan.marches for march in line]
+        lost_marches = {(m.branch, m.position) for m in marches if completion.is_finished(m)}
+        assert lost_marches == {(number, place) for place in lost}
+        assert completion.take_as_failed(completion.key(branch), 99, 12, "no such place") == 0
+        n_starts, n_marches = compute(completion)
+        assert (n_starts, n_marches) == (6 - len(lost), 12 - 2 * len(lost))
+
+
+def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished: Path) -> None:
+    with completion_of(finished) as completion:
+        branch = completion.plan.branches[0]
+        for place in range(3):
+            completion.store.forget_start(completion._starts[0][place])
+        (march,) = [m for m in completion.plan.marches_from(0, 1) if m.wear_coefficient == 1e-11]
+        completion.store.forget_history(completion._histories[march.number][0])
+        (left,) = completion.branches_left()
+        assert left == replace(branch, known=frozenset({0, 2}))
+        assert left.n_results == 1
+        assert compute(completion) == (1, 1)
+
+
+def test_tasks_know_their_keys_and_their_progress(folder: Path) -> None:
+    with completion_of(folder) as completion:
+        branch, march = completion.plan.branches[0], completion.plan.marches[0][3]
+        completion.keep(branch, Packed("branch", ()))
+        completion.keep(march, Packed("march", ()))
+        with pytest.raises(TypeError, match="no progress"):
+            completion.keep(march, "anything")
+    with completion_of(folder) as completion:
+        first, second = completion.branches_left()
+        assert (first.key, first.resume) == (completion.key(branch), Packed("branch", ()))
+        assert (second.key, second.resume) == (completion.key(completion.plan.branches[1]), None)
+        found = completion.marches_from(0, march.position)
+        assert [task.key for task in found] == [completion.key(task) for task in found]
+        assert [task.resume for task in found] == [
+            None if t.number != march.number else Packed("march", ()) for t in found
+        ]
+
+
+@pytest.mark.parametrize(("most", "expected"), [(MOST_OF_OTHERS, (0, 0)), (0.0, (6, 12)), (1.0, (6, 12))])
+def test_what_another_study_has_left_stays_up_to_a_size(most: float, expected: tuple[int, int], finished: Path) -> None:
+    other = "axes.excitation_amplitude=11"
+    with completion_of(finished, other) as completion:
+        assert compute(completion) == (6, 12)
+        completion.prune(most)
+        assert completion.n_points_finished == 12
+    with completion_of(finished, other) as completion:
+        assert compute(completion) == (0, 0)
+    with completion_of(finished) as completion:
+        assert compute(completion) == expected
+
+
+def test_what_stands_in_one_file_with_another_study_goes_alone(finished: Path) -> None:
+    """A study and a larger one share files once these are put together."""
+    with completion_of(finished, "axes.wear_coefficient=[1e-11]") as completion:
+        assert completion.n_points_finished == 6
+        completion.prune(0.0)
+    with completion_of(finished) as completion:
+        assert completion.n_points_finished == 6
+
+
+def test_a_study_that_starts_over_leaves_those_of_others(finished: Path) -> None:
+    other = "axes.wear_coefficient=[5e-12, 1e-11, 2e-11]"
+    with completion_of(finished, other) as completion:
+        assert compute(completion) == (0, 6)
+    with completion_of(finished) as completion:
+        completion.forget_all()
+    with completion_of(finished) as completion:
+        assert completion.n_points_finished == 0
+        assert not any(branch.known for branch in completion.branches_left())
+    with completion_of(finished, other) as completion:
+        assert completion.n_points_finished == 6
