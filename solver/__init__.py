@@ -1,9 +1,64 @@
 """One case: a joint that vibrates and wears. Arrays in, frozen results out; no files, no MPI, no xarray, no study.
 
+For use in Python, from this package itself:
+
+- `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
+- `frequency_response`: the unworn joint over frequency, a `FrequencyResponse`;
+- `march_wear`: its wear over the cycles at one frequency, a `WearHistory`;
+- `SolverSettings` says how finely and how exactly, `Outcome` how a computation ended.
+
 The rooms, from the ground up: `structure` (Fourier basis, condensation, penalty), `contact` (Coulomb friction and
 unilateral contact through a period), `harmonic_balance` (the DLFT balance and its Jacobian), `newton` (iteration,
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
 transient), `accuracy` (harmonic levels, refinement, error estimates, certificate), `results`, `loading_history` (the
-unworn states of a sweep or a ramp), `wear` (the march on slow time). On the ground: `model`, `settings`, `outcome`,
-`clock`, `packing`.
+unworn states of a sweep or a ramp), `wear` (the march on slow time). On top: `forced_response`, `wear_history`. On the
+ground: `model`, `model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. The equations in one convention,
+where the print of the paper is wrong, and what was measured: `PHYSICS.md`.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from solver.forced_response import FrequencyResponse, frequency_response
+    from solver.model import ReducedModel
+    from solver.model_from_matrices import build_model
+    from solver.outcome import Outcome
+    from solver.results.history import WearHistory
+    from solver.settings import SolverSettings
+    from solver.wear_history import march_wear
+
+__all__ = [
+    "FrequencyResponse",
+    "Outcome",
+    "ReducedModel",
+    "SolverSettings",
+    "WearHistory",
+    "build_model",
+    "frequency_response",
+    "march_wear",
+]
+
+# Loaded when first asked for: rooms import each other through this package, and numba takes a while to load.
+_PLACES = {
+    "FrequencyResponse": "forced_response",
+    "Outcome": "outcome",
+    "ReducedModel": "model",
+    "SolverSettings": "settings",
+    "WearHistory": "results.history",
+    "build_model": "model_from_matrices",
+    "frequency_response": "forced_response",
+    "march_wear": "wear_history",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,1 +1,36 @@
-"""Many cases: study files, tasks on MPI ranks, result files and the command line."""
+"""Many cases: study files, tasks on MPI ranks, result files and the command line.
+
+For use in Python, from this package itself:
+
+- `read_study`: a checked `Study` from a file or by the name of a bundled one;
+- `run_study`: runs it in this process and gives its result as an `xarray.Dataset`;
+- `open_result`: that of a result file, with the accessor `fretwear`;
+- `UserError`, `StorageError`: what they raise, in one sentence.
+
+The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `plan` (tasks, and what they
+are known by), `mpi` (ranks, and which of them does which task), `checkpoint` (the folder of what is finished),
+`summary` (the last lines of a run), `netcdf` (the result file), `report` (figures and page from result files), `system`
+(files, signals, streams). On top: `api`, `cli`, `run`, `course`, `evaluate`, `accessor`. On the ground: `variables`,
+`progress`, `user_error`, `search_path`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from studyrunner.api import StorageError, Study, UserError, open_result, read_study, run_study
+
+__all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
+
+
+# Loaded when first asked for: the commands import this package before numpy may be loaded.
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.api"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

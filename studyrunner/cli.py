@@ -260,7 +260,7 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, run_study
+    from studyrunner.run import Interrupted, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
@@ -275,7 +275,7 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
         with progress:
             if ranks.size == 1 and (announced := job_size()) > 1:
                 progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
-            summary = run_study(
+            summary = serve_study(
                 ranks,
                 study,
                 model,

@@ -76,7 +76,7 @@ class RunSummary:
     written: bool
 
 
-def run_study(
+def serve_study(
     ranks: Ranks,
     study: Study,
     model: ReducedModel,

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 BUNDLED = ("dovetail_sector", "sdof_slider", "two_masses", "vibro_impact")
 
+AUTOMATIC_HARMONICS_OF_A_WAVE = 13
+"""Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""
+
 
 def scene_parameters(model: str) -> type[BaseModel]:
     """Class of the parameters of a bundled scene: frozen, unknown keys forbidden, units in the descriptions.

@@ -101,10 +101,10 @@ def _report(options: Options) -> int:
         from studyrunner.report.gallery import draw_report
         from studyrunner.report.page.page import write_page
         from studyrunner.report.reading.door import check_numbers, reading_errors
-        from studyrunner.report.reading.result import open_result
+        from studyrunner.report.reading.result import open_for_report
         from studyrunner.system.progress import count, format_seconds
 
-        result = open_result(options.result)
+        result = open_for_report(options.result)
         with result.dataset, reading_errors(str(options.result)):
             check_numbers(result.dataset, str(options.result))
             _make_folder(options.folder)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene_error import SceneError
-from studies.scenes import build_scene
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.variables import build_mesh, check_outputs
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import AUTO, Study
@@ -20,10 +20,6 @@ from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-
-
-AUTOMATIC_HARMONICS_OF_A_WAVE = 13
-"""Harmonics whose nodal diameters a bundled cyclic scene is built with where their number is automatic."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
@@ -31,12 +32,28 @@ _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
 _SECTIONS = tuple(name for name in Study.model_fields if name not in ("source", "folder", "archived"))
 
 
-def read_study(argument: str, overrides: Sequence[str] = ()) -> Study:
-    """The study that `argument` names: a path of a TOML file or of a result file, or the name of a bundled study.
+def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
+    """Read and check a study.
 
-    overrides: texts KEY=VALUE; KEY is dotted, VALUE is TOML or a bare word.
-    Raises UserError.
+    Parameters
+    ----------
+    study
+        Path of a TOML file or of a result file, or the name of a bundled study.
+    overrides
+        Values of keys by their dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`; numpy
+        arrays and tuples stand for lists. Or texts KEY=VALUE; VALUE is TOML or a bare word.
+
+    Returns
+    -------
+    Study
+        Every default filled in.
+
+    Raises
+    ------
+    UserError
+        Where there is no such study or something in it is wrong: one line that says what would be right.
     """
+    argument = str(study)
     path = _study_path(argument)
     archived = None
     try:
@@ -48,8 +65,12 @@ def read_study(argument: str, overrides: Sequence[str] = ()) -> Study:
             table = read_toml_file(path, argument)
     except OSError as error:
         raise UserError(argument, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    for text in overrides:
-        _override(table, text)
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            _set_key(table, key, _plain(value), "overrides", key)
+    else:
+        for text in [overrides] if isinstance(overrides, str) else overrides:
+            _override(table, text)
     return check_study(table, argument, path, archived)
 
 
@@ -122,15 +143,20 @@ def _study_path(argument: str) -> Path:
 
 def _override(table: Table, text: str) -> None:
     key, equals, value_text = text.partition("=")
-    names = key.strip().split(".")
-    if not equals or not all(names):
+    if not equals or not all(key.strip().split(".")):
         raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
     value = _override_value(key.strip(), value_text.strip())
+    _set_key(table, key.strip(), value, "command line", f"--set {key.strip()}")
+
+
+def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> None:
+    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
+    names = key.split(".")
     place: Table = table
     for name in names[:-1]:
         inner = place.setdefault(name, {})
         if not isinstance(inner, dict):
-            raise UserError("command line", f"--set {key.strip()}", value, f"{name} holds a value and no keys")
+            raise UserError(source, shown, value, f"{name} holds a value and no keys")
         place = inner
     place[names[-1]] = value
     other = {"axes": "solver", "solver": "axes"}.get(names[0])
@@ -148,6 +174,17 @@ def _override_value(key: str, text: str) -> object:
     if set(parsed) != {"value"}:
         raise UserError("command line", f"--set {key}", text, "give one TOML value")
     return parsed["value"]
+
+
+def _plain(value: object) -> object:
+    """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    return str(value) if isinstance(value, Path) else value
 
 
 def _section(table: Mapping[str, object], name: str) -> Table:

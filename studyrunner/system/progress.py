@@ -123,6 +123,23 @@ class ProgressDisplay:
         return f"[{format_seconds(self.seconds):>7}]"
 
 
+class SilentProgress(ProgressDisplay):
+    """Nobody sees how far it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._bar = None
+
+    def say(self, doing: str) -> None:
+        """Nothing."""
+
+    def note(self, happened: str) -> None:
+        """Nothing."""
+
+    def tick(self, look: Callable[[], Standing]) -> None:
+        """Nothing."""
+
+
 def format_seconds(seconds: float) -> str:
     """A time as a person says it."""
     if seconds < 60.0:

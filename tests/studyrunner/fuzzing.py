@@ -117,10 +117,10 @@ def address_space() -> int:
 def ask(path: Path) -> int:
     """Opens a result and asks it all that there is to ask; what it does not hold it says by ValueError or KeyError."""
     from studyrunner.accessor import join_results
-    from studyrunner.report.reading.result import open_result
+    from studyrunner.report.reading.result import open_for_report
 
     try:
-        dataset = open_result(path).dataset
+        dataset = open_for_report(path).dataset
     except UserError as error:
         print(f"reader: {error}", file=sys.stderr)
         return 2

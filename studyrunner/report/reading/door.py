@@ -69,7 +69,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
         {str(name): _clean(value, _limit(str(name))) for name, value in dataset.attrs.items()},
     )
     checked.set_close(dataset.close)
-    read_study(checked.attrs, source)
+    study_tables(checked.attrs, source)
     return checked
 
 
@@ -102,7 +102,7 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
         raise
 
 
-def read_study(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
+def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
     """The effective study that a file carries, by table; empty where it is no TOML.
 
     Numbers are such that they can be counted with, texts are cleaned, and what is nested deeply is left out. Raises

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.door import check_dataset, read_study, reading_errors
+from studyrunner.report.reading.door import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_number
 from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
@@ -142,7 +142,7 @@ class Result:
     def study(self) -> dict[str, dict[str, object]]:
         """The effective study that the file carries, by table; empty where it has none that can be read."""
         try:
-            return read_study(self.dataset.attrs)
+            return study_tables(self.dataset.attrs)
         except UserError:
             return {}
 
@@ -329,14 +329,21 @@ def as_sentences(*parts: str) -> str:
     return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
 
 
-def open_result(path: Path | str) -> Result:
-    """Open a result file, once a process of its own has read it without harm; variables are read when they are needed.
+def open_for_report(path: Path | str) -> Result:
+    """Open a result file as the report reads it; variables are read when they are needed.
 
     Raises
     ------
     UserError
         Where there is no such file or it is no result of `run-study`.
     """
+    opened = open_vetted(path)
+    with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
+        return Result(Path(path), check_dataset(opened, str(path)))
+
+
+def open_vetted(path: Path | str) -> xr.Dataset:
+    """Open a file as it is, once a process of its own has read it without harm. Raises UserError."""
     # the report itself knows nothing of studies and scenes
     from studyrunner.study.archive import check_result_file
 
@@ -346,5 +353,4 @@ def open_result(path: Path | str) -> Result:
     check_result_file(path, source)
     with reading_errors(source, every=True), warnings.catch_warnings(action="ignore"):
         # the same file as before, whatever its name looks like
-        opened = xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
-        return Result(path, check_dataset(opened, source))
+        return xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)

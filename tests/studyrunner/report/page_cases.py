@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result, open_result
+from studyrunner.report.reading.result import Result, open_for_report
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 FAILED = 4
@@ -93,4 +93,4 @@ def _with_loops(
 def as_result(dataset: xr.Dataset, path: Path) -> Result:
     """The dataset, written to a file and opened as the report does it."""
     dataset.to_netcdf(path)
-    return open_result(path)
+    return open_for_report(path)

@@ -14,7 +14,7 @@ import pytest
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.report.reading.door import check_numbers
-from studyrunner.report.reading.result import open_result
+from studyrunner.report.reading.result import open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import ReadingProcess
@@ -144,7 +144,7 @@ def test_refused_in_a_sentence(
     assert len(line) < 1000
     assert not (folder / "out-report").exists()
     with pytest.raises(UserError, match="give"):
-        check_numbers(open_result("out.nc").dataset, "out.nc")
+        check_numbers(open_for_report("out.nc").dataset, "out.nc")
 
 
 def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,7 +179,7 @@ def test_long_names_are_cut(folder: Path) -> None:
 def test_what_is_not_known_stays_outside(folder: Path) -> None:
     with h5py.File("out.nc", "r+") as file:
         file.create_dataset("evil", data=np.ones(3))
-    result = open_result("out.nc")
+    result = open_for_report("out.nc")
     with result.dataset:
         assert "evil" not in result.dataset.variables
         assert "worn_volume" in result.dataset.variables

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report.reading.result import Result, as_sentences, open_result
+from studyrunner.report.reading.result import Result, as_sentences, open_for_report
 from studyrunner.report.reading.units import Scale, scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result, with_variables
@@ -18,7 +18,7 @@ def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     path = tmp_path / "made.nc"
     made = make_result()
     made.dataset.to_netcdf(path)
-    result = open_result(path)
+    result = open_for_report(path)
     assert not result.dataset["worn_volume"].variable._in_memory
     assert result.axes == made.axes
     assert result.title == "Made up"
@@ -50,7 +50,7 @@ def test_what_is_no_result_file_is_refused_in_one_line(tmp_path: Path, content: 
     elif isinstance(content, xr.Dataset):
         content.to_netcdf(path)
     with pytest.raises(UserError) as caught:
-        open_result(path)
+        open_for_report(path)
     assert remedy in str(caught.value)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -1,0 +1,152 @@
+"""A reduced model from matrices and contact pairs in Python, for use without scene files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, ReducedModel
+
+_SYMMETRIC = 1e-8  # relative to the largest entry: round-off of a matrix that was reduced or read from a text file
+
+
+def build_model(
+    mass: ArrayLike,
+    damping: ArrayLike | None,
+    stiffness: ArrayLike,
+    contact_dofs: ArrayLike,
+    area: ArrayLike,
+    *,
+    load_harmonic: ArrayLike,
+    load_static: ArrayLike | None = None,
+    response: ArrayLike | None = None,
+    gap: ArrayLike = 0.0,
+    normal_load: ArrayLike = 0.0,
+    position: ArrayLike | None = None,
+    surface: Sequence[str] | None = None,
+    response_names: Sequence[str] | None = None,
+) -> ReducedModel:
+    """A structure `M x'' + C x' + K x + (contact forces) = load` and the contact pairs on it.
+
+    The displacements x hold the *relative* displacements of the pairs themselves (blade minus disk, the closing one
+    positive when the pair closes), as after a change of coordinates and a reduction to `[u_rel | other]`.
+
+    Parameters
+    ----------
+    mass, damping, stiffness
+        (n, n), kg, N s/m, N/m; symmetric. damping: None for none.
+    contact_dofs
+        (n_contact, 3) int: index in x of the closing, the first and the second tangential relative displacement of each
+        pair; -1 where the pair has none.
+    area
+        (n_contact,) or one number for all, m2: the weight alpha of Eq. (7).
+    load_harmonic, load_static
+        (n,), N. The harmonic one per unit excitation amplitude, complex: load(t) = Re(F exp(i omega t)). The static one
+        is 0 if not given.
+    response
+        What is reported: indices (n_response,) of x, or a matrix (n_response, n); all of x if not given.
+    gap, normal_load
+        (n_contact,) or one number. Initial gap, m; constant normal force of pairs without a closing displacement, N,
+        compression positive.
+    position, surface, response_names
+        (n_contact, 3), m, and a label for each pair; a name for each response. They have no part in the results.
+
+    Raises
+    ------
+    ValueError
+        Where shapes do not fit, a number is not finite, a matrix is not symmetric, an area is not positive, or an index
+        is out of range or used twice.
+    """
+    k = _matrix("stiffness", stiffness)
+    n = len(k)
+    dofs = _pairs(contact_dofs, n)
+    n_contact = len(dofs)
+    rows = np.eye(n) if response is None else _response(response, n)
+    linear = LinearModel(
+        mass=_matrix("mass", mass, n),
+        damping=np.zeros((n, n)) if damping is None else _matrix("damping", damping, n),
+        stiffness=k,
+        load_static=_numbers("load_static", 0.0 if load_static is None else load_static, (n,)),
+        load_harmonic=_load(load_harmonic, n),
+        response=rows,
+    )
+    areas = _numbers("area", area, (n_contact,))
+    if (areas <= 0.0).any():
+        raise ValueError("area: give a positive area, m2, to every contact pair")
+    contact = ContactInterface(
+        dofs=dofs,
+        area=areas,
+        gap=_numbers("gap", gap, (n_contact,)),
+        normal_load=_numbers("normal_load", normal_load, (n_contact,)),
+        position=np.full((n_contact, 3), np.nan)
+        if position is None
+        else _numbers("position", position, (n_contact, 3)),
+        surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
+    )
+    default_names = tuple(f"response {index}" for index in range(len(rows)))
+    names = _names("response_names", default_names if response_names is None else response_names, len(rows))
+    return ReducedModel(linear={0: linear}, contact=contact, response_names=names)
+
+
+def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """A copy as floating numbers; one number stands for a vector of them."""
+    found = np.array(given, np.float64)
+    if found.ndim == 0:
+        found = np.full(shape, found)
+    _check(name, found.shape == shape, f"give shape {shape} instead of {found.shape}")
+    _check(name, bool(np.isfinite(found).all()), "give finite numbers")
+    return found
+
+
+def _matrix(name: str, given: ArrayLike, n: int | None = None) -> FloatArray:
+    found = np.array(given, np.float64)
+    size = (len(found) if found.ndim else 0) if n is None else n
+    _check(name, found.shape == (size, size) and size > 0, f"give a square matrix instead of shape {found.shape}")
+    found = _numbers(name, found, (size, size))
+    asymmetry = float(np.abs(found - found.T).max())
+    _check(name, asymmetry <= _SYMMETRIC * float(np.abs(found).max()), "give a symmetric matrix")
+    return found
+
+
+def _pairs(given: ArrayLike, n: int) -> IntArray:
+    found = np.array(given)
+    name = "contact_dofs"
+    _check(
+        name, found.ndim == 2 and found.shape[1:] == (3,) and len(found) > 0, "give a row of 3 indices for each pair"
+    )
+    _check(name, found.dtype.kind in "iu", "give whole numbers")
+    _check(name, bool(((found >= -1) & (found < n)).all()), f"give -1 or an index from 0 to {n - 1}")
+    used = found[found >= 0]
+    _check(name, len(np.unique(used)) == used.size, "give each displacement to one pair only")
+    _check(name, bool((found >= 0).any(axis=1).all()), "give every pair a displacement")
+    return found.astype(np.int64)
+
+
+def _load(given: ArrayLike, n: int) -> ComplexArray:
+    found = np.array(given, np.complex128)
+    _check("load_harmonic", found.shape == (n,), f"give shape ({n},) instead of {found.shape}")
+    _check("load_harmonic", bool(np.isfinite(found).all()), "give finite numbers")
+    return found
+
+
+def _response(given: ArrayLike, n: int) -> FloatArray:
+    found = np.array(given)
+    if found.ndim == 2:
+        return _numbers("response", found, (len(found), n))
+    _check("response", found.ndim == 1 and found.dtype.kind in "iu", f"give indices, or a matrix (n_response, {n})")
+    _check("response", bool(((found >= 0) & (found < n)).all()), f"give indices from 0 to {n - 1}")
+    rows: FloatArray = np.eye(n)[found]
+    return rows
+
+
+def _names(name: str, given: Sequence[str], number: int) -> tuple[str, ...]:
+    found = tuple(str(each) for each in given)
+    _check(name, len(found) == number and not isinstance(given, str), f"give {number} texts")
+    return found
+
+
+def _check(name: str, right: bool, remedy: str) -> None:
+    if not right:
+        raise ValueError(f"{name}: {remedy}")

@@ -1,0 +1,81 @@
+"""The wear of one joint over the cycles: one wear history from a model in Python."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.forced_response import check_case, check_numbers
+from solver.loading_history.origin import Sweep
+from solver.loading_history.start_states import follow_branch
+from solver.model import ReducedModel
+from solver.results.history import WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear as march_from_start
+
+
+def march_wear(
+    model: ReducedModel,
+    frequency: float,
+    excitation_amplitude: float,
+    friction_coefficient: float,
+    wear_coefficient: float,
+    cycles: ArrayLike,
+    *,
+    scheme: Scheme = "adaptive",
+    step: float | None = None,
+    sweep: Sweep = "up",
+    settings: SolverSettings | None = None,
+) -> WearHistory:
+    """Wear history of a joint that vibrates at one frequency, from its unworn state on.
+
+    A computation that fails is no exception: `outcome` and `message` of the history say why and how far it came.
+
+    Parameters
+    ----------
+    model
+        As `build_model`, `studies.build_scene` and `studies.read_scene` give it.
+    frequency
+        Hz.
+    excitation_amplitude
+        N, multiplies the unit harmonic load of the model.
+    friction_coefficient
+        Of all pairs.
+    wear_coefficient
+        k_w of Eq. (2), 1/Pa.
+    cycles
+        Ascending cycle counts at which the history is reported, or the last one alone; the march ends there. It begins
+        at 0, which is put in front where it is missing.
+    scheme, step
+        "adaptive" chooses its own steps, by `settings.rtol`; "implicit" and "explicit" take steps of `step` cycles,
+        Eqs. (23), (24).
+    sweep
+        How the unworn state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
+    settings
+        The defaults of `SolverSettings` if not given.
+
+    Raises
+    ------
+    ValueError
+        Where a number is out of its range, counts do not ascend, a scheme of a given step has none, or the model does
+        not hold the nodal diameters that the harmonics need.
+    """
+    settings = SolverSettings() if settings is None else settings
+    check_case(model, excitation_amplitude, friction_coefficient, settings)
+    frequencies = check_numbers("frequency", frequency, above=0.0)
+    if frequencies.size != 1:
+        raise ValueError("frequency: give one number")
+    check_numbers("wear_coefficient", wear_coefficient, least=0.0)
+    counts = check_numbers("cycles", cycles, least=0.0)
+    if (np.diff(counts) <= 0.0).any():
+        raise ValueError("cycles: give ascending counts")
+    if scheme != "adaptive":
+        if step is None:
+            raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
+        check_numbers("step", step, above=0.0)
+    counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
+    _, start = next(follow_branch(model, friction_coefficient, excitation_amplitude, frequencies, sweep, settings))
+    length = counts[-1] if step is None else step
+    return march_from_start(
+        model, friction_coefficient, start, wear_coefficient, float(length), scheme, counts, settings
+    )

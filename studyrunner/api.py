@@ -1,0 +1,126 @@
+"""Studies in Python: read one, run it in this process, open a result. For use as `studyrunner.run_study` and so on."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
+from studyrunner.mpi.launcher import launcher_size
+from studyrunner.mpi.ranks import Alone
+from studyrunner.netcdf.output import check_output
+from studyrunner.report.reading.door import check_dataset, reading_errors
+from studyrunner.report.reading.result import open_vetted
+from studyrunner.run import Interrupted, serve_study
+from studyrunner.scene.scene import build_study_scene
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import read_study
+from studyrunner.system.progress import ProgressDisplay, SilentProgress
+from studyrunner.user_error import StorageError, UserError
+
+__all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
+
+
+def run_study(
+    study: Study | str | Path,
+    output: str | Path | None = None,
+    *,
+    overrides: Sequence[str] | Mapping[str, object] = (),
+    fresh: bool = False,
+    retry_failed: bool = False,
+    prune: bool = False,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Run a study in this process, as the command `run-study` does, and open its result.
+
+    What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
+    goes on where it was when it is called again, from here or by the command; what it needs for that is in the folder
+    `<output>.parts`. This process computes alone, one point after the other and with one thread of the linear algebra,
+    so that the numbers are those of the command to the last bit. For several processes give
+    `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
+
+    Parameters
+    ----------
+    study
+        As `read_study` gives it, or what it reads: a path, or the name of a bundled study.
+    output
+        The result file; `<name of the study>.nc` in the current folder if not given.
+    overrides
+        As in `read_study`, where the study is not read yet.
+    fresh
+        Start over: forget what an earlier run of this study has left.
+    retry_failed
+        Compute points that failed in an earlier run once more.
+    prune
+        Remove what other studies have left in the folder, once this is finished.
+    progress
+        Whether stderr tells how far the run is.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `open_result` gives it. Points that failed are no exception: `outcome` and `message` say why.
+
+    Raises
+    ------
+    UserError
+        Where something in the study or the scene is wrong, the output cannot be written or another run is at work
+        there, or a launcher has started several processes: each would compute all of it. Nothing is computed then.
+    StorageError
+        Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
+    KeyboardInterrupt
+        After Ctrl-C; the file holds the points that were computed until then, and the same call goes on.
+    """
+    if (announced := launcher_size()) > 1:
+        remedy = "call it in one process, or give `mpiexec run-study`: here each process would compute all of it"
+        raise UserError("run_study", "processes", announced, remedy)
+    if not isinstance(study, Study):
+        study = read_study(study, overrides)
+    elif overrides:
+        raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
+    target = _check_output(Path(f"{study.study.name}.nc" if output is None else output), study)
+    try:
+        # the scene as well: with two threads its matrices differ in the last bits, and start states with them
+        with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
+            model = build_study_scene(study)
+            serve_study(Alone(), study, model, target, shown, fresh=fresh, retry_failed=retry_failed, prune=prune)
+    except Interrupted as ended:
+        summary = ended.summary
+        n_done = summary.n_points - summary.n_left
+        where = f"{target} holds them" if summary.written else f"{target} is the finished result that it was"
+        kept = f"{n_done} of {summary.n_points} points are kept, {where}"
+        raise KeyboardInterrupt(f"interrupted: {kept}, the same call goes on") from None
+    return open_result(target)
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Open a result file, once a process of its own has read it without harm and it is known to be a result.
+
+    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. It
+    keeps the file open until it is closed: use it in a `with` statement, or call its `load` and `close`. A file that is
+    replaced meanwhile, by another run, stays as it was for this dataset.
+
+    Raises
+    ------
+    UserError
+        Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
+    """
+    opened = open_vetted(path)
+    try:
+        with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
+            check_dataset(opened, str(path))
+    except BaseException:
+        opened.close()
+        raise
+    return opened
+
+
+def _check_output(path: Path, study: Study) -> Path:
+    try:
+        return check_output("output", path, study.files)
+    except UserError as error:
+        raise UserError("run_study", error.key, error.value, error.remedy) from None
