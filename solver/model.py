@@ -48,7 +48,7 @@ class ContactInterface:
 
 @dataclass(frozen=True)
 class LinearModel:
-    """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`.
+    """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`, Eq. (1).
 
     mass, damping, stiffness (n, n): symmetric real, or Hermitian for a cyclic sector at one nodal diameter.
     load_static (n,): N, real. load_harmonic (n,): N per unit excitation amplitude; complex, load(t) = Re(F exp(i w t)).

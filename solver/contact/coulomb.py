@@ -1,7 +1,7 @@
 """Contact through one period: force, its tangent and the wear integral. Floats and arrays only.
 
 The law is applied to a *predicted* force `p` (what the joint would take up if the pair did not move) and to a
-force-like tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS
+force-like tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS,
 section 2: the print has the sign of the normal test the other way round):
 
 - separated, `p_N <= 0`: no force, and the state follows freely, `x = p_T`;
@@ -32,7 +32,7 @@ NEUTRAL = 1e-9  # of the determinant of the closure: what does not fade from per
 def contact_sample(
     normal: float, tangent_1: float, tangent_2: float, friction: float, state_1: float, state_2: float
 ) -> tuple[float, float, float, float, float, int]:
-    """One sample of one pair: normal force, two tangential forces, two states, status. All in N; Eqs. (11)-(15)."""
+    """One sample of one pair: normal force, two tangential ones, two states, status. In N; Eqs. (3), (4), (11)-(15)."""
     if normal <= 0.0:
         return 0.0, 0.0, 0.0, tangent_1, tangent_2, SEPARATED
     pre_1 = tangent_1 - state_1
@@ -210,7 +210,7 @@ def close(influence: FloatArray, change_1: float, change_2: float) -> tuple[floa
 def wear_integral(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
     """Integral over a period of normal force times corrected slip, as force times state: N * N, (n_contact,).
 
-    Eq. (21) with the sliding velocity, integrated as force times increments of the corrected slip: divided by the
+    Eqs. (7), (21) with the sliding velocity, integrated as force times increments of corrected slip: divided by the
     tangential penalty it is N m. The trapezoidal rule takes the force of both ends of an increment.
     """
     n_contact, _, n_samples = force_t.shape

@@ -1,15 +1,15 @@
 """The harmonic balance of a joint: residual, exact Jacobian, and wear that goes with the motion.
 
-The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eq. (10). It gives at each pair, by itself, the
+The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eqs. (9), (10). It gives at each pair by itself the
 contact force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` (Eqs. (10)-(12), with `X` the corrected
 motion), so that
 
     R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
 
 is the only coupled equation. For a given wear depth this is the residual in u of the paper after a linear change of
-variable, so a Newton iteration takes the same steps. With the implicit scheme `W = W_k + h g(p)`, Eq. (24) (the print
-of (26b) lacks h): the wear rate of a pair depends on its own p alone, W is eliminated there, and the Jacobian changes
-by a rank-one block a pair:
+variable, so a Newton iteration takes the same steps. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26)
+(the print of (26b) lacks h): the wear rate of a pair depends on its own p alone, W is eliminated there, and the
+Jacobian changes by a rank-one block a pair:
 
     dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
 """
@@ -33,7 +33,8 @@ class Balance:
     """A periodic problem: a joint, the history of its pairs and the wear.
 
     history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start
-    of the slow step. wear_gain (n_contact,): `h k_w / alpha`, 1/N; zero where W does not grow with the motion.
+    of the slow step; the same all period, Eq. (6). wear_gain (n_contact,): `h k_w / alpha`, 1/N; zero where W does not
+    grow with the motion.
     """
 
     joint: Joint
@@ -79,7 +80,7 @@ class Balance:
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
-        """Exact derivative of the residual: closure of the history and wear included."""
+        """Exact derivative of the residual, Eqs. (16), (17): closure of the history and wear included."""
         joint = self.joint
         force_tangent, slip_tangent = law_tangent(joint, at)
         m = joint.basis.synthesis.shape[0]

@@ -9,7 +9,7 @@ from solver.structure.joint import Joint
 
 
 def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
-    """Depths (n_contact,), m, that do not depend on the motion: from `before` at share 0 to `after` at 1, Eq. (21)."""
+    """Depths (n_contact,), m, independent of the motion: from `before` at share 0 to `after` at 1, Eqs. (20), (23)."""
 
     def balance_at(share: float, history: FloatArray) -> Balance:
         return Balance.frozen(joint, history, before + share * (after - before))
@@ -18,7 +18,7 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
 
 
 def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray) -> BalanceAt:
-    """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eq. (24).
+    """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24), (25).
 
     gain: of the whole step, `h k_w / alpha`.
     """
