@@ -333,7 +333,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
 
 def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     readme = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
-    example, of_accessor = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+    _, example, of_accessor = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
     plan = build_tasks(study, FACTS.n_displacements)

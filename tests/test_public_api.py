@@ -1,0 +1,404 @@
+"""What users of Python import: a few names of each package, against exact answers and against the command."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import solver
+import studies
+import studyrunner
+from solver import FrequencyResponse, Outcome, SolverSettings, build_model, frequency_response, march_wear
+from studies import SceneError, build_scene, read_scene
+from studies.scene_file import write_scene
+from studies.scenes import sdof_slider
+from studies.scenes.den_hartog import DenHartogSlider
+from studyrunner import Study, UserError, open_result, read_study, run, run_study
+from studyrunner.cli import main
+from studyrunner.evaluate import build_evaluator
+
+ROOT = Path(solver.__file__).parents[1]
+PACKAGES = (solver, studies, studyrunner)
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+FREQUENCIES = [160.0, 150.0]
+SMALL = {"axes.frequency": np.array(FREQUENCIES), "axes.scheme": ("implicit",), "slow_time.cycles": 4000}
+AS_TEXTS = ["axes.frequency=[160.0, 150.0]", "axes.scheme=implicit", "slow_time.cycles=4000"]
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Iterator[xr.Dataset]:
+    """A small study through the public functions."""
+    path = tmp_path_factory.mktemp("api") / "slider.nc"
+    with run_study(read_study("sdof_slider", SMALL), path, progress=False) as dataset:
+        yield dataset
+
+
+# --- the names ---
+
+
+def test_every_name_is_there_and_is_said() -> None:
+    for package in PACKAGES:
+        assert package.__doc__
+        for name in package.__all__:
+            assert getattr(package, name).__name__ == name
+            assert name in dir(package)
+            assert f"`{name}`" in package.__doc__
+        with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+            package.nothing  # noqa: B018
+
+
+def test_importing_the_packages_loads_nothing_else() -> None:
+    """The commands say how many threads there are to be before numpy is loaded."""
+    code = (
+        "import sys, solver, studies, studyrunner; print({'numpy', 'pydantic', 'xarray', 'numba'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_a_name_is_no_module() -> None:
+    """A module of the same name would take the place of the function once it is loaded."""
+    for package in PACKAGES:
+        folder = Path(package.__file__ or "").parent
+        modules = {path.stem for path in folder.iterdir()}
+        assert modules.isdisjoint(package.__all__)
+
+
+def test_types_and_physics_are_part_of_the_packages() -> None:
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["package-data"]
+    for name, file in (("solver", "PHYSICS.md"), *((package.__name__, "py.typed") for package in PACKAGES)):
+        assert file in data[name]
+        assert (ROOT / name / file).is_file()
+
+
+def test_a_script_is_checked_by_mypy(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        """\
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from solver import Outcome, ReducedModel, SolverSettings, build_model, frequency_response, march_wear
+from studies import build_scene, read_scene
+from studyrunner import Study, open_result, read_study, run_study
+
+study: Study = read_study("sdof_slider", {"axes.frequency": [150.0]})
+result: xr.Dataset = run_study(study, "out.nc", fresh=True)
+result = open_result("out.nc")
+model: ReducedModel = build_scene("sdof_slider", normal_load=12.0)
+model = read_scene("root.h5")
+model = build_model([[1.0]], None, [[1.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=1.0)
+settings = SolverSettings(harmonics=5, rtol=1e-3)
+response: NDArray[np.complex128] = frequency_response(model, [0.1], 1.0, 0.5, sweep="down", settings=settings).response
+outcome: Outcome = march_wear(model, 0.1, 1.0, 0.5, 1e-11, np.linspace(0.0, 10.0, 3)).outcome
+wrong: str = run_study(3)
+frequency_response(model, [0.1], 1.0, 0.5, sweep="sideways")
+""",
+        encoding="utf-8",
+    )
+    # with the cache of the project's own check, as everything is read again otherwise
+    options = ["--strict", "--config-file", "pyproject.toml", "--cache-dir", ".mypy_cache", str(script)]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    errors = re.findall(r"script\.py:(\d+): error:.*\[([a-z-]+)\]", done.stdout)
+    last = script.read_text(encoding="utf-8").count("\n")
+    found = [(int(line), kind) for line, kind in errors]
+    expected = [(last - 1, "assignment"), (last - 1, "arg-type"), (last, "arg-type")]
+    assert sorted(found) == sorted(expected), done.stdout + done.stderr
+
+
+# --- the README ---
+
+
+def test_the_example_of_the_readme_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (example,) = re.findall(
+        r"```python\n(.*?)```", README.split("\n## In Python\n")[1].split("\n## ")[0], flags=re.DOTALL
+    )
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(example, "README.md", "exec"), names)
+    assert np.isfinite(names["result"]["worn_volume"]).all()
+    assert set(names["curve"].outcome) == {Outcome.CONVERGED}
+    assert names["history"].outcome is Outcome.CONVERGED
+    assert "1.27e-05 m at 505 Hz, converged" in capsys.readouterr().out
+
+
+def test_the_map_of_the_house_names_what_there_is() -> None:
+    section = README.split("\n## Map of the house\n")[1].split("\n## ")[0]
+    names = {path.name for package in PACKAGES for path in Path(package.__file__ or "").parent.rglob("*")}
+    names |= {"solver", "studies", "studyrunner", "tests"}
+    told = set(re.findall(r"`(?:\w+/)*(\w+\.(?:py|md|js|css))`", section))
+    folders = {name for path in re.findall(r"`((?:\w+/)+)", section) for name in path.strip("/").split("/")}
+    assert told
+    assert told | folders <= names, f"there is no {', '.join(sorted((told | folders) - names))}"
+    rooms = [path for package in ("solver", "studyrunner") for path in (ROOT / package).iterdir() if path.is_dir()]
+    assert {path.name for path in rooms} - {"__pycache__"} <= folders
+
+
+# --- studies ---
+
+
+def test_a_study_gives_what_the_command_gives(
+    result: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = [word for text in AS_TEXTS for word in ("--set", text)]
+    assert main(["sdof_slider", *words, "-o", "command.nc"]) == 0
+    with xr.open_dataset("command.nc") as command:
+        xr.testing.assert_identical(result.drop_vars("run_time"), command.drop_vars("run_time"))
+        with open_result("command.nc") as opened:
+            xr.testing.assert_identical(opened, command)
+            assert opened.fretwear.response().dtype == complex
+
+
+def test_overrides_are_values_or_texts() -> None:
+    study = read_study("sdof_slider", SMALL)
+    assert isinstance(study, Study)
+    assert study == read_study("sdof_slider", AS_TEXTS)
+    assert study.axes.frequency == tuple(FREQUENCIES)
+    with pytest.raises(UserError, match=r"^sdof_slider: slow_time.cycle = 3: unknown key, give cycles$"):
+        read_study("sdof_slider", {"slow_time.cycle": 3})
+    with pytest.raises(UserError, match=r"^overrides: study.name.x = 3: name holds a value and no keys$"):
+        read_study("sdof_slider", {"study.name.x": 3})
+
+
+def test_a_run_that_is_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: xr.Dataset) -> None:
+    path = tmp_path / "out.nc"
+    done: list[object] = []
+
+    def interrupted(*arguments: Any) -> Callable[..., Iterator[object]]:
+        compute = build_evaluator(*arguments)
+
+        def evaluate(task: Any, keep: Any) -> Iterator[object]:
+            for each in compute(task, keep):
+                yield each
+                done.append(each)
+                if len(done) == 3:
+                    raise KeyboardInterrupt
+
+        return evaluate
+
+    monkeypatch.setattr(run, "build_evaluator", interrupted)
+    with pytest.raises(KeyboardInterrupt, match=r"1 of 2 points are kept, .*out.nc holds them, the same call goes on"):
+        run_study("sdof_slider", path, overrides=SMALL, progress=False)
+    with open_result(path) as partly:
+        assert sorted(partly.outcome.values.ravel()) == [Outcome.CONVERGED, Outcome.NOT_COMPUTED]
+    n_before = len(done)
+    monkeypatch.setattr(run, "build_evaluator", build_evaluator)
+    with run_study("sdof_slider", path, overrides=SMALL, progress=False) as again:
+        xr.testing.assert_equal(again.drop_vars("run_time"), result.drop_vars("run_time"))
+    assert n_before == 3
+
+
+def test_several_processes_do_not_compute_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PMI_SIZE", "2")
+    with pytest.raises(
+        UserError, match=r"^run_study: processes = 2: call it in one process, or give `mpiexec run-study`"
+    ):
+        run_study("sdof_slider", tmp_path / "out.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_wrong_with_a_run_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"^run_study: output = .*: give a file in a folder that exists"):
+        run_study("sdof_slider", tmp_path / "none" / "out.nc", progress=False)
+    with pytest.raises(UserError, match=r"^run_study: overrides: give them to read_study"):
+        run_study(read_study("sdof_slider"), overrides=SMALL)
+    with pytest.raises(UserError, match=r"^nothing: the study: there is none of this name"):
+        run_study("nothing")
+
+
+def test_what_is_no_result_is_said_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "out.nc"
+    with pytest.raises(UserError, match=r"out.nc: OUT.nc: there is no such file; give a result file"):
+        open_result(path)
+    path.write_text("no result", encoding="utf-8")
+    with pytest.raises(UserError, match=r"out.nc: the file: is no NetCDF file"):
+        open_result(path)
+    xr.Dataset({"a": ("x", [1.0])}).to_netcdf(path)
+    with pytest.raises(UserError, match=r"out.nc: OUT.nc: holds no outcome and no cycle and no contact"):
+        open_result(path)
+
+
+# --- scenes ---
+
+
+def test_scenes_are_those_of_studies(tmp_path: Path) -> None:
+    model = build_scene("sdof_slider", normal_load=np.float64(12.0))
+    own = sdof_slider.build(sdof_slider.Parameters(normal_load=12.0), 1)
+    np.testing.assert_array_equal(model.linear[0].load_static, own.linear[0].load_static)
+    write_scene(model, tmp_path / "slider.h5")
+    read = read_scene(tmp_path / "slider.h5")
+    np.testing.assert_array_equal(read.linear[0].stiffness, model.linear[0].stiffness)
+    assert read.response_names == model.response_names
+
+
+def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path: Path) -> None:
+    for name, parameters, message in (
+        ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
+        ("sdof_slider", {"friction_coefficient": 0.3}, "friction_coefficient: 0.3; give it to the solver"),
+        ("sdof_slider", {"mas": 1.0}, "mas: unknown parameter; give one of mass, damping"),
+        ("sdof_slider", {"mass": -1.0}, "mass: -1.0; give greater than 0"),
+        ("sdof_slider", {"mass": "1"}, "mass: 1; give a valid number"),
+    ):
+        with pytest.raises(SceneError, match=f"^{re.escape(message)}"):
+            build_scene(name, **parameters)
+    path = tmp_path / "no.h5"
+    with pytest.raises(FileNotFoundError):
+        read_scene(path)
+    path.write_text("no scene", encoding="utf-8")
+    with pytest.raises(SceneError, match=r"no\.h5"):
+        read_scene(path)
+
+
+# --- one joint ---
+
+
+def slider(**changes: Any) -> Any:
+    """The mass of Den Hartog's case from matrices: 0.1 kg on 1.6e5 N/m, pressed by 10 N."""
+    given = {"load_harmonic": [1.0], "normal_load": 10.0, "response_names": ["mass"]} | changes
+    return build_model([[0.1]], None, [[1.6e5]], [[-1, 0, -1]], 1e-4, **given)
+
+
+def test_the_response_is_that_of_den_hartog() -> None:
+    curve = frequency_response(slider(), FREQUENCIES, 10.0, 0.5)
+    assert isinstance(curve, FrequencyResponse)
+    assert curve.frequency.tolist() == FREQUENCIES
+    for place, frequency in enumerate(FREQUENCIES):
+        exact = DenHartogSlider(0.1, 1.6e5, 10.0, 2.0 * np.pi * frequency)
+        first, largest = (float(value(np.array(5.0))) for value in (exact.first_harmonic, exact.amplitude))
+        assert abs(curve.response[place, 0]) == pytest.approx(first, rel=1e-2)
+        assert curve.response_peak[place, 0] == pytest.approx(largest, rel=1e-2)
+    assert (curve.response_error < 1e-2).all()
+    assert curve.outcome == (Outcome.CONVERGED,) * 2
+    assert curve.message == ("", "")
+    assert curve.branch.tolist() == [0, 0]
+
+
+def test_the_response_without_friction_is_linear() -> None:
+    mass, damping, stiffness = np.diag([0.1, 0.2]), np.diag([2.0, 3.0]), np.array([[3e5, -1e5], [-1e5, 2e5]])
+    model = build_model(
+        mass,
+        damping,
+        stiffness,
+        [[-1, 1, -1]],
+        1e-4,
+        load_harmonic=[1.0, 2.0j],
+        normal_load=5.0,
+        response=[[1.0, 1.0], [0.0, 2.0]],
+    )
+    curve = frequency_response(model, [250.0, 90.0], 3.0, 0.0, sweep="ramp")
+    for place, frequency in enumerate(curve.frequency):
+        omega = 2.0 * np.pi * frequency
+        exact = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, 3.0 * np.array([1.0, 2.0j]))
+        np.testing.assert_allclose(curve.response[place], [exact.sum(), 2.0 * exact[1]], rtol=1e-9)
+
+
+def test_one_joint_gives_the_bits_of_a_study(result: xr.Dataset) -> None:
+    """In tests BLAS has one thread, as in a run."""
+    model = build_scene("sdof_slider")
+    there = result.sel(scheme="implicit").isel(response=0).squeeze(drop=True)
+    curve = frequency_response(model, FREQUENCIES, 10.0, 0.5)
+    np.testing.assert_array_equal(np.abs(curve.response[:, 0]), there.response_amplitude.isel(cycle=0))
+    np.testing.assert_array_equal(np.angle(curve.response[:, 0]), there.response_phase.isel(cycle=0))
+    np.testing.assert_array_equal(curve.response_peak[:, 0], there.response_peak.isel(cycle=0))
+    counts = result.cycle.values
+    history = march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, counts[1:], scheme="implicit", step=1000)
+    at = there.sel(frequency=160.0)
+    np.testing.assert_array_equal(history.cycles, counts)
+    for name in ("worn_volume", "wear_rate", "worn_volume_error", "residual"):
+        np.testing.assert_array_equal(getattr(history, name), at[name])
+    np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
+
+
+def test_wear_is_that_of_the_closed_form() -> None:
+    counts = np.linspace(0.0, 1e5, 5)
+    history = march_wear(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1.1e-11, counts)
+    exact = sdof_slider.exact_answer(sdof_slider.Parameters(), 160.0, 10.0, np.array([1.1e-11]), counts)
+    np.testing.assert_allclose(history.worn_volume, exact.worn_volume[0], rtol=1e-2)
+    assert history.outcome is Outcome.CONVERGED
+
+
+def test_a_point_that_fails_is_one_point() -> None:
+    settings = SolverSettings(time_limit=0.0)
+    curve = frequency_response(slider(), [150.0], 10.0, 0.5, settings=settings)
+    assert curve.outcome == (Outcome.TIME_LIMIT,)
+    assert np.isnan(curve.response).all()
+    history = march_wear(slider(), 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
+    assert history.outcome is Outcome.TIME_LIMIT
+    assert history.cycles.tolist() == [0.0, 1e4]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mass": [[1.0, 0.0]]}, "mass: give a square matrix instead of shape (1, 2)"),
+        ({"mass": np.eye(3)}, "mass: give a square matrix"),
+        ({"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
+        ({"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
+        ({"contact_dofs": [0, 1, -1]}, "contact_dofs: give a row of 3 indices for each pair"),
+        ({"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give -1 or an index from 0 to 1"),
+        ({"contact_dofs": [[0, 0, -1]]}, "contact_dofs: give each displacement to one pair only"),
+        ({"contact_dofs": [[-1, -1, -1]]}, "contact_dofs: give every pair a displacement"),
+        ({"contact_dofs": [[0.0, 1.0, -1.0]]}, "contact_dofs: give whole numbers"),
+        ({"area": 0.0}, "area: give a positive area, m2, to every contact pair"),
+        ({"area": [1.0, 2.0]}, "area: give shape (1,) instead of (2,)"),
+        ({"load_harmonic": [1.0]}, "load_harmonic: give shape (2,) instead of (1,)"),
+        ({"response": [2]}, "response: give indices from 0 to 1"),
+        ({"response_names": ["one"]}, "response_names: give 2 texts"),
+        ({"surface": "left"}, "surface: give 1 texts"),
+    ],
+)
+def test_what_is_wrong_with_matrices_is_said_in_one_line(change: dict[str, Any], message: str) -> None:
+    right = {
+        "mass": np.eye(2),
+        "damping": None,
+        "stiffness": [[2.0, -1.0], [-1.0, 2.0]],
+        "contact_dofs": [[0, 1, -1]],
+        "area": 1.0,
+        "load_harmonic": [0.0, 1.0],
+    }
+    build_model(**right)
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        build_model(**(right | change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"frequency": 0.0}, "frequency: give values above 0 instead of 0"),
+        ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
+        ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
+        ({"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
+        ({"wear_coefficient": -1.0}, "wear_coefficient: give values of at least 0"),
+        ({"cycles": [0.0, 2.0, 2.0]}, "cycles: give ascending counts"),
+        ({"cycles": []}, "cycles: give finite numbers"),
+        ({"scheme": "implicit"}, 'step: give the length of a step in cycles to the scheme "implicit"'),
+        ({"scheme": "implicit", "step": 0.0}, "step: give values above 0"),
+        ({"settings": SolverSettings(harmonics=5, samples=10)}, "settings.samples: give more than 10"),
+    ],
+)
+def test_what_is_wrong_with_a_march_is_said_in_one_line(change: dict[str, Any], message: str) -> None:
+    right = {
+        "frequency": 150.0,
+        "excitation_amplitude": 10.0,
+        "friction_coefficient": 0.5,
+        "wear_coefficient": 1e-11,
+        "cycles": 1e4,
+    }
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        march_wear(slider(), **(right | change))
