@@ -80,7 +80,7 @@ class Balance:
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
-        """Exact derivative of the residual, Eqs. (16), (17): closure of the history and wear included."""
+        """Exact derivative of the residual, Eqs. (16)-(18): closure of the history and wear included."""
         joint = self.joint
         force_tangent, slip_tangent = law_tangent(joint, at)
         m = joint.basis.synthesis.shape[0]

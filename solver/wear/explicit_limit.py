@@ -3,8 +3,8 @@
 The wear rate g(W) of the joint falls where wear takes load off a pair. An explicit Euler step multiplies a disturbance
 of W by 1 + h dg/dW: it grows where h exceeds 2 / mu, mu the largest positive eigenvalue of -dg/dW. With an implicit
 step the Jacobian of the balance is J_h = J + h Z E G, where E puts the depths into the static normal displacements and
-G dp = dg, and the motion follows the depth as dp = -J^-1 Z E dW, Eqs. (18), (19). So -dg/dW = G J^-1 Z E, whose
-eigenvalues other than zero are those of J^-1 (J_h - J) / h: no other matrix is needed than the two Jacobians.
+G dp = dg, and the motion follows the depth as dp = -J^-1 Z E dW. So -dg/dW = G J^-1 Z E, whose eigenvalues other than
+zero are those of J^-1 (J_h - J) / h: no other matrix is needed than the two Jacobians.
 """
 
 from __future__ import annotations
