@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,13 +77,13 @@ def frequency_response(
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
-    check_case(model, excitation_amplitude, friction_coefficient, settings)
+    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     ascending, place = np.unique(wanted, return_inverse=True)
     found: dict[int, WearHistory] = {}
-    branch = follow_branch(model, friction_coefficient, excitation_amplitude, ascending, sweep, settings)
+    branch = follow_branch(model, friction, load, ascending, sweep, settings)
     for index, start in branch:
         # a state is reported as at cycle 0 of any wear history; nothing wears until then
-        found[index] = march_from_start(model, friction_coefficient, start, 0.0, 1.0, "implicit", _UNWORN, settings)
+        found[index] = march_from_start(model, friction, start, 0.0, 1.0, "implicit", _UNWORN, settings)
     points = [found[index] for index in place.tolist()]
     return FrequencyResponse(
         frequency=wanted,
@@ -97,16 +98,36 @@ def frequency_response(
 
 
 def check_case(
-    model: ReducedModel, excitation_amplitude: float, friction_coefficient: float, settings: SolverSettings
-) -> None:
-    """Raises ValueError where a joint cannot be computed with these numbers."""
-    check_numbers("excitation_amplitude", excitation_amplitude, least=0.0)
-    check_numbers("friction_coefficient", friction_coefficient, least=0.0)
+    model: ReducedModel,
+    excitation_amplitude: float,
+    friction_coefficient: float,
+    sweep: Sweep,
+    settings: SolverSettings,
+) -> tuple[float, float]:
+    """Excitation amplitude and friction coefficient. Raises ValueError where a joint cannot be computed like this."""
+    load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
+    friction = check_number("friction_coefficient", friction_coefficient, least=0.0)
+    check_word("sweep", sweep, get_args(Sweep))
     highest = 1 if settings.harmonics == "auto" else settings.harmonics
     if not model.holds(highest):
         raise ValueError(f"the model does not hold the nodal diameters that harmonics up to {highest} see")
     if settings.samples != "auto" and settings.samples <= 2 * highest:
         raise ValueError(f"settings.samples: give more than {2 * highest}, twice the harmonics")
+    return load, friction
+
+
+def check_word(name: str, given: str, known: tuple[str, ...]) -> None:
+    """Raises ValueError where a text is none of those that are known."""
+    if given not in known:
+        raise ValueError(f"{name}: give one of {', '.join(known)} instead of {given!r}")
+
+
+def check_number(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    """The number. Raises ValueError where it is not one alone, or as `check_numbers`."""
+    found = check_numbers(name, given, above=above, least=least)
+    if found.size != 1:
+        raise ValueError(f"{name}: give one number")
+    return float(found[0])
 
 
 def check_numbers(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> FloatArray:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from typing import get_args
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.forced_response import check_case, check_numbers
+from solver.forced_response import check_case, check_number, check_numbers, check_word
 from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
@@ -61,21 +64,16 @@ def march_wear(
         not hold the nodal diameters that the harmonics need.
     """
     settings = SolverSettings() if settings is None else settings
-    check_case(model, excitation_amplitude, friction_coefficient, settings)
-    frequencies = check_numbers("frequency", frequency, above=0.0)
-    if frequencies.size != 1:
-        raise ValueError("frequency: give one number")
-    check_numbers("wear_coefficient", wear_coefficient, least=0.0)
+    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    at = check_number("frequency", frequency, above=0.0)
+    per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     counts = check_numbers("cycles", cycles, least=0.0)
     if (np.diff(counts) <= 0.0).any():
         raise ValueError("cycles: give ascending counts")
-    if scheme != "adaptive":
-        if step is None:
-            raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
-        check_numbers("step", step, above=0.0)
+    check_word("scheme", scheme, get_args(Scheme))
+    if step is None and scheme != "adaptive":
+        raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
+    length = math.inf if step is None else check_number("step", step, above=0.0)
     counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
-    _, start = next(follow_branch(model, friction_coefficient, excitation_amplitude, frequencies, sweep, settings))
-    length = counts[-1] if step is None else step
-    return march_from_start(
-        model, friction_coefficient, start, wear_coefficient, float(length), scheme, counts, settings
-    )
+    _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
+    return march_from_start(model, friction, start, per_pressure, length, scheme, counts, settings)
