@@ -100,8 +100,6 @@ class AccuracyOptions:
     # refinement
     most_samples: int = 8192
     """Samples of a period, of "auto"."""
-    most_homotopies: int = 5
-    """Homotopies to more harmonics in one refinement."""
     refinement_iterations: int = 200
     """Newton iterations of one refinement."""
     cheap_refinement_iterations: int = 600

@@ -69,7 +69,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
     here = Level(case, case.joint(omega, excitation_amplitude), point)
     here = here.at_rest(effort)
     begun = effort.iterations
-    homotopies, faint = ACCURACY.most_homotopies, False
+    faint = False
     richer: Level | None = None
     while True:
         if nothing_happens(here.point.evaluation):
@@ -92,9 +92,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         by_harmonics, richer = here.harmonics_error(effort, richer)
         above = shifted(resolution, 1)
         cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and _allowed(here, above)
-        if richer is None and settings.harmonics == "auto" and homotopies and cheap:
+        if richer is None and settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
-            homotopies -= 1
             richer = here.by_homotopy(above, effort)
             by_harmonics = by_harmonics if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         estimate = by_samples + by_harmonics
@@ -161,11 +160,8 @@ def _allowed(here: Level, resolution: Resolution) -> bool:
     """Whether "auto" may go on with these harmonics and samples."""
     if not here.case.model.holds(resolution.highest):
         return False
-    most = (
-        ACCURACY.few_pairs_unknowns
-        if here.joint.slots.size <= NEWTON.small_joint_displacements
-        else ACCURACY.most_unknowns
-    )
+    small = here.joint.slots.size <= NEWTON.small_joint_displacements
+    most = ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns
     if resolution.highest > ACCURACY.most_mixed_harmonics:
         # friction alone: motions that hit something take more in vain
         if not all(order % 2 for order in resolution.orders):

@@ -83,7 +83,7 @@ class AdaptiveSteps:
         while True:
             length, shortest = self.length, max(0.5 * WEAR.fold_resolution * trajectory.cycle, self.shortest)
             tried = self._attempt(length)
-            shorter = WEAR.failed_step_ratio
+            shorter = WEAR.smallest_step_ratio
             if tried is not None:
                 ratio, point, error = tried
                 wanted = WEAR.step_safety / np.sqrt(max(ratio, 1e-12))

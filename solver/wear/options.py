@@ -14,14 +14,12 @@ class WearOptions:
     """Of rtol: error of a step over what it has worn, or would have worn at the mean rate so far."""
     largest_step_ratio: float = 2.0
     """Of two steps; BDF2 is zero-stable below 1 + sqrt(2)."""
-    smallest_step_ratio: float = 0.2
-    """Of two steps: a step that was refused is not cut by more."""
+    smallest_step_ratio: float = 0.25
+    """By which a step is cut whose end was not found; one that was refused is not cut by more."""
     step_safety: float = 0.85
     """Of the length at which the error would be the one allowed."""
     refused_step_ratio: float = 0.8
     """A step that was refused is cut by at least so much, one that was taken by at most."""
-    failed_step_ratio: float = 0.25
-    """By which a step is cut whose end was not found."""
     first_step: float = 0.05
     """Of the explicit step limit: length of the first step, before anything is known of its error."""
     first_depth: float = 0.01
