@@ -1,4 +1,4 @@
-"""Values of the solver as text and plain arrays, for whoever keeps them: what a march or a sweep carries on.
+"""Values of the solver as text and plain arrays, to be kept on disk: the state of a march or of a sweep.
 
 `unpack(pack(value))` is equal to `value` to the last bit, and its arrays lie in memory in rows. The order in which an
 array lies decides the order of sums over it, and so their last bits: a computation that is to go on elsewhere to the
@@ -8,8 +8,9 @@ same numbers goes on from the unpacked value itself.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +36,24 @@ class Packed:
 
 
 def packable(known: type[T]) -> type[T]:
-    """Decorator of the frozen results of the solver that a march or a sweep carries on; no two of one name."""
+    """Decorator of the frozen classes that are part of the state of a march or of a sweep; no two of one name."""
     assert known.__name__ not in _CLASSES
     _CLASSES[known.__name__] = known
     return known
 
 
 def pack(value: object) -> Packed:
-    """Text and arrays of a value: numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and the
-    frozen results of the solver. Raises TypeError for anything else: a bug.
+    """Text and arrays of a value.
+
+    Parameters
+    ----------
+    value
+        Numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and packable classes.
+
+    Raises
+    ------
+    TypeError
+        For anything else: a bug.
     """
     arrays: list[NDArray[np.generic]] = []
     text = json.dumps(_described(value, arrays))
@@ -51,8 +61,25 @@ def pack(value: object) -> Packed:
 
 
 def unpack(packed: Packed) -> Any:
-    """The value. Raises ValueError, KeyError, TypeError or IndexError where text and arrays are not those of one."""
+    """The value.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, IndexError
+        Where text and arrays are not those of a value.
+    """
     return _rebuilt(json.loads(packed.text), packed.arrays)
+
+
+def attributes(part: object, state: type[T]) -> T:
+    """The attributes of a part that a TypedDict of states names."""
+    return cast("T", {name: getattr(part, name) for name in state.__annotations__})
+
+
+def set_attributes(part: object, state: Mapping[str, object]) -> None:
+    """Set the attributes that a state holds."""
+    for name, value in state.items():
+        setattr(part, name, value)
 
 
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:

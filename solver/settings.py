@@ -21,8 +21,8 @@ class SolverSettings:
     samples: N, equally spaced time samples in a period, at which the contact law is applied, more than 2 H; or "auto".
     tolerance: largest accepted scaled residual of the harmonic balance.
     rtol: relative error of response and wear rate that automatic harmonics and samples aim at.
-    time_limit: CPU seconds that the way to a start state may take, or a march, before it is given up; without those
-        that kernels are compiled in.
+    time_limit: CPU seconds that a start state with its loading history may take, or a march, before it is given up;
+        without those that kernels are compiled in.
     """
 
     harmonics: int | Automatic = "auto"
@@ -59,20 +59,30 @@ def all_orders(n_harmonics: int) -> tuple[int, ...]:
     return tuple(range(1, n_harmonics + 1))
 
 
-FIRST_HARMONICS = 3
-FEWEST_SAMPLES = 64
-SAMPLES_A_HARMONIC = 8  # of the highest one
+@dataclass(frozen=True)
+class ResolutionOptions:
+    """What automatic harmonics and samples begin with, each with the evidence for its value."""
+
+    first_harmonics: int = 3
+    """Harmonics of the first state: the fewest that friction is seen in."""
+    fewest_samples: int = 64
+    """Samples in a period; with fewer the samples, not the harmonics, limit a slider with one harmonic."""
+    samples_per_harmonic: int = 8
+    """Samples in a period of the highest harmonic."""
+
+
+RESOLUTION = ResolutionOptions()
 
 
 def samples_for(highest: int) -> int:
     """Samples, a power of two, with which the harmonics up to the highest one are resolved."""
-    wanted = max(FEWEST_SAMPLES, SAMPLES_A_HARMONIC * highest)
+    wanted = max(RESOLUTION.fewest_samples, RESOLUTION.samples_per_harmonic * highest)
     return 1 << (wanted - 1).bit_length()
 
 
 def first_resolution(settings: SolverSettings) -> Resolution:
     """The resolution that the settings fix, or the one that automatic settings begin with."""
-    n_harmonics = FIRST_HARMONICS if settings.harmonics == "auto" else settings.harmonics
+    n_harmonics = RESOLUTION.first_harmonics if settings.harmonics == "auto" else settings.harmonics
     samples = samples_for(n_harmonics) if settings.samples == "auto" else settings.samples
     return Resolution(all_orders(n_harmonics), samples)
 

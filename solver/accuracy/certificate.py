@@ -5,7 +5,7 @@ number asks what the samples and the series together can still get wrong:
 
 - residual: equilibrium of the motion and force that are handed out; mean forces are its static harmonic.
 - penetration: of the series of the motion, which is what a user plots, also between samples. Over the largest relative
-  motion in the joint, without its mean: a long way of closing hides nothing. Falls as harmonics are added.
+  motion in the joint, without its mean: a large mean closing hides nothing. Falls as harmonics are added.
 - tension, cone_violation: of the samples, and of the Fejer mean of the series: the mean of its truncations. Its kernel
   is positive, so the Fejer mean of any force that obeys the law lies in the cone, too, which is convex: the truncated
   series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
@@ -26,10 +26,10 @@ Largest values measured on good states (0 stands for below 1e-12):
 | coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
 | dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
 
-With the limits below all of these hold but vibro-impact from 1.1 rad/s on at one harmonic, which is far off. They are
-no measure of the truncation error: that is estimated in `solver.accuracy.refinement`.
-What does not hold, as tested: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 %
-too large (15 % too small), slip that does not repeat by 2 % of the limit.
+With the limits of `AccuracyOptions` all of these hold but vibro-impact from 1.1 rad/s on at one harmonic, which is far
+off. They are no measure of the truncation error: that is estimated in `solver.accuracy.refinement`. What does not hold,
+as tested: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 % too large (15 % too
+small), slip that does not repeat by 2 % of the limit.
 """
 
 from __future__ import annotations
@@ -38,17 +38,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.packing import packable
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
-
-# largest accepted violations; response and wear rate have estimates of their own
-LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.05, "energy_error": 0.05, "drift": 1e-3}
-ROUND_OFF = 1e-10  # of a residual: the mean position of a marched mass is held by 1e-5 of its stiffness
-FINER = 4  # points between two samples at which series are looked at: the samples themselves would flatter them
-LOSS = 1e-3  # loss factor below which nobody notices
 
 
 @packable
@@ -76,7 +71,7 @@ class Certificate:
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of everything that does not hold; tolerance: of the scaled residual. NaN does not hold."""
         # twice the tolerance: a state that is taken up again from its harmonics has lost some digits to round-off
-        limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | LIMITS
+        limits = {"residual": 2.0 * max(tolerance, ACCURACY.residual_round_off)} | ACCURACY.violation_limits
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
         }
@@ -97,16 +92,16 @@ class Certificate:
 
 _MEANING = {
     "residual": "the scaled residual of the equilibrium is",
-    "penetration": "the surfaces penetrate each other by, in shares of the largest relative motion,",
-    "tension": "the contact pulls by, in shares of the largest normal force,",
-    "cone_violation": "friction exceeds its limit by, in shares of the largest limit,",
-    "energy_error": "the energy of a period is out of balance by, in shares of the work done,",
-    "drift": "the slip does not repeat from period to period: it drifts by, in shares of the force that drives it,",
+    "penetration": "the surfaces penetrate each other by, as a fraction of the largest relative motion,",
+    "tension": "the contact pulls by, as a fraction of the largest normal force,",
+    "cone_violation": "friction exceeds its limit by, as a fraction of the largest limit,",
+    "energy_error": "the energy of a period is out of balance by, as a fraction of the work done,",
+    "drift": "the slip does not repeat from period to period: it drifts by, as a fraction of the force that drives it,",
 }
 
 
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
-    """Certificate of an evaluated state, without its truncation errors and its stability, which need other states."""
+    """What an evaluated state violates, without truncation errors and stability, which need other states."""
     force_t = evaluation.force_t
     friction = joint.friction_coefficient
     normal = float(force_t[:, 0].max(initial=0.0))
@@ -118,14 +113,14 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     return Certificate(
         residual=_residual(joint, evaluation),
         penetration=_penetration(joint, evaluation),
-        tension=_share(float((-both[:, 0]).max(initial=0.0)), normal),
-        cone_violation=_share(float(excess.max(initial=0.0)), limit),
+        tension=_relative(float((-both[:, 0]).max(initial=0.0)), normal),
+        cone_violation=_relative(float(excess.max(initial=0.0)), limit),
         energy_error=_energy_error(joint, evaluation),
-        drift=_share(_drift(joint, evaluation), max(limit, _drive(joint, evaluation))),
+        drift=_relative(_drift(joint, evaluation), max(limit, _drive(joint, evaluation))),
     )
 
 
-def _share(violation: float, size: float) -> float:
+def _relative(violation: float, size: float) -> float:
     """Violation over what it is compared with; nothing violated is nothing, whatever it is compared with."""
     if violation == 0.0:
         return 0.0
@@ -133,13 +128,13 @@ def _share(violation: float, size: float) -> float:
 
 
 def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
-    """Values (..., FINER N) of a series (..., m) on a finer grid than that of the samples."""
-    finer = build_basis(joint.basis.orders, FINER * joint.basis.n_samples)
+    """Values (..., n N) of a series (..., m) on a grid n times finer than that of the samples."""
+    finer = build_basis(joint.basis.orders, ACCURACY.points_per_sample * joint.basis.n_samples)
     return np.asarray(values_h @ finer.synthesis)
 
 
 def _fejer_mean(joint: Joint, force_h: FloatArray) -> FloatArray:
-    """Mean (n_contact, 3, FINER N), N, of the truncations of the force series."""
+    """Mean (n_contact, 3, n N), N, of the truncations of the force series."""
     orders = np.array(joint.basis.orders)
     weighted = force_h.copy()
     if orders.size:
@@ -177,9 +172,9 @@ def _penetration(joint: Joint, evaluation: Evaluation) -> float:
     moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
-    still = 1e-6 * np.abs(flexed[..., 0])  # as in `_amplitude`
+    still = ACCURACY.round_off_vibration * np.abs(flexed[..., 0])  # as in `_amplitude`
     size = max(float(part.max(initial=0.0)) for part in (moved, elastic, still))
-    return _share(float(depth.max(initial=0.0)), size)
+    return _relative(float(depth.max(initial=0.0)), size)
 
 
 def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
@@ -189,8 +184,9 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
-    """Size (...) of the vibration in a series (..., m); below a millionth of the mean it is round-off."""
-    return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), 1e-6 * np.abs(values_h[..., 0])))
+    """Size (...) of the vibration in a series (..., m); a small fraction of the mean at least."""
+    round_off = ACCURACY.round_off_vibration * np.abs(values_h[..., 0])
+    return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 
 def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
@@ -204,12 +200,13 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # what the excitation could do at most: beside a resonance it does next to nothing
     apparent = np.pi * float((_amplitude(joint.structure.force_h()) * _amplitude(motion)).sum())
-    size = max(abs(excitation), abs(damping), abs(contact), dissipation, LOSS * elastic, LOSS * apparent)
-    return _share(abs(excitation - damping - dissipation), size)
+    factor = ACCURACY.noticed_loss_factor
+    size = max(abs(excitation), abs(damping), abs(contact), dissipation, factor * elastic, factor * apparent)
+    return _relative(abs(excitation - damping - dissipation), size)
 
 
 def _drive(joint: Joint, evaluation: Evaluation) -> float:
-    """Largest force, N, that drives a marched mass: its velocity repeats to a share of what that gives it."""
+    """Largest force, N, that drives a marched mass: its velocity repeats to a fraction of what that gives it."""
     driven = evaluation.predicted_t[joint.penalty.inertial, 1:]
     return float(np.abs(driven).max(initial=0.0))
 

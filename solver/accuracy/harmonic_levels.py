@@ -1,15 +1,22 @@
-"""The resolutions between which automatic settings choose."""
+"""The harmonic levels between which automatic settings choose, and how many levels up an error would show.
+
+Two things hide an error from states with a few more harmonics: a contact that is shorter than the period of the highest
+of them, and a structure that answers higher harmonics otherwise than the penalty does. With the penalty E and the
+compliance G of a pair the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`
+(`solver.structure.penalty`). They need not fall with the next few harmonics: a slider on a beam has a mass that falls
+from mode to mode, and one behind a stiff spring a mass only up to the resonance of the two. As long as the highest
+harmonic is below that, states with a few more harmonics are alike and all wrong.
+"""
 
 from __future__ import annotations
 
-from solver.settings import Resolution, SolverSettings, all_orders, samples_for
+import numpy as np
 
-LADDER = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
-"""Highest harmonics; "auto" uses all but the last two, those above `MOST_HARMONICS` only where they are odd and few."""
-MOST_HARMONICS = 79
-COSTLY, LIGHT = 2500, 1600
-"""Unknowns from which a state on the way takes fewer harmonics than its error asks for, and how many it has then."""
-RESOLVED = 0.5  # periods of the highest harmonic that the shortest contact takes, from where on harmonics see it
+from solver.accuracy.options import ACCURACY
+from solver.model import ReducedModel
+from solver.settings import Resolution, SolverSettings, all_orders, samples_for
+from solver.structure.condensation import relative_indices
+from solver.structure.penalty import build_penalty, compliance_at
 
 
 def n_unknowns(resolution: Resolution, n_rel: int) -> int:
@@ -17,13 +24,14 @@ def n_unknowns(resolution: Resolution, n_rel: int) -> int:
     return n_rel * (2 * len(resolution.orders) + 1)
 
 
-def on_ladder(resolution: Resolution, steps: int) -> Resolution:
-    """Up (or with -1 down) the ladder, with samples enough for it; odd harmonics stay odd."""
-    if steps > 0:
-        above = [step for step in LADDER if step > resolution.highest]
-        highest = above[steps - 1] if len(above) >= steps else (steps + 1) * resolution.highest
+def shifted(resolution: Resolution, levels: int) -> Resolution:
+    """So many harmonic levels up (or with -1 one down), with samples enough for them; odd harmonics stay odd."""
+    if levels > 0:
+        above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
+        highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
     else:
-        highest = max((step for step in LADDER if step < resolution.highest), default=resolution.highest)
+        below = (highest for highest in ACCURACY.harmonic_levels if highest < resolution.highest)
+        highest = max(below, default=resolution.highest)
     orders = all_orders(highest)
     if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
         orders = orders[::2]
@@ -31,25 +39,52 @@ def on_ladder(resolution: Resolution, steps: int) -> Resolution:
 
 
 def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
-    """One step down: harmonics and samples, whichever are automatic."""
-    orders = on_ladder(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
+    """One level down: harmonics and samples, whichever are automatic."""
+    orders = shifted(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
     samples = resolution.samples
     if settings.samples == "auto":
         samples = max(samples // 2, samples_for(orders[-1]))
     return Resolution(orders, samples)
 
 
-def steps_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
-    """Steps up the ladder, at least `fewest`, to harmonics that see a contact which takes such a share of the period.
+def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
+    """Levels up, at least `fewest`, to harmonics that resolve a contact which lasts a fraction `contact` of the period.
 
     While a contact takes less than about half a period of the highest harmonic, its force is much the same in every
     harmonic, and a few more of them change next to nothing, however large the error.
     """
-    above = [step for step in LADDER if step > resolution.highest]
-    blind = sum(step * contact < RESOLVED for step in above)
+    above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
+    blind = sum(highest * contact < ACCURACY.periods_in_contact for highest in above)
     return max(fewest, min(blind + 1, len(above)))
 
 
-def steps_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
-    """Steps up the ladder, at least `fewest`, to harmonics up to `highest`."""
-    return max(fewest, sum(resolution.highest < step <= highest for step in LADDER))
+def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
+    """Levels up, at least `fewest`, to harmonics up to `highest`."""
+    return max(fewest, sum(resolution.highest < level <= highest for level in ACCURACY.harmonic_levels))
+
+
+def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
+    """Whether |1 - E G| stays below `stiffness_mismatch` for all pairs and all harmonics above the highest one.
+
+    Judged at real rates, at which the structure has no resonances. omega: rad/s.
+    """
+    penalty = build_penalty(model, omega, highest)
+    _, slots = relative_indices(model.contact)
+    pair, tangent = slots // 3, slots % 3 > 0
+    held = np.where(tangent, penalty.tangential[pair], penalty.normal[pair])
+    marched = tangent & penalty.inertial[pair]
+    for octaves in np.arange(0.0, ACCURACY.octaves_beyond + 0.5, 0.5):
+        rate = (highest + 1) * omega * 2.0**octaves
+        acts = np.where(marched, penalty.mass[pair] * rate**2, held)
+        if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > ACCURACY.stiffness_mismatch:
+            return False
+    return True
+
+
+def reach(model: ReducedModel, omega: float, highest: int) -> int:
+    """Lowest highest harmonic of a level, at least the given one, that reaches so far; the last where none does.
+
+    omega: rad/s.
+    """
+    above = (level for level in ACCURACY.harmonic_levels if level > highest)
+    return next((level for level in (highest, *above) if reaches(model, omega, level)), ACCURACY.harmonic_levels[-1])

@@ -1,7 +1,7 @@
 """A state at one of several resolutions: the same state at others, and how far they differ.
 
 What changes in a state that is solved again with more harmonics or with more samples is its error, up to the rest of
-the series (`*_SAFETY`).
+the series, for which there are safety factors (`AccuracyOptions`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import fewer, on_ladder, steps_to_reach, steps_to_see
-from solver.accuracy.harmonic_reach import reach
+from solver.accuracy.harmonic_levels import fewer, levels_to_reach, levels_to_see, n_unknowns, reach, shifted
+from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
 from solver.continuation.homotopy import add_harmonics, start_with_tail
 from solver.continuation.ratcheting import ratchets, shake_down
@@ -27,27 +27,6 @@ from solver.newton.solve_balance import Effort, solve_balance
 from solver.settings import Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
-
-SEEN_SAMPLES = 2048  # a sine overtops a limit unseen by 1e-6 of its size then
-MOST_ITERATIONS = 40  # of a solve from the state with other harmonics
-FEW_ITERATIONS = 30  # where they are dear
-DEAR = 1000  # unknowns
-MOST_FAR = 200  # of a balance that is solved to see a short contact
-FEW_PLACES = 2  # relative displacements: where there are more, states far up the ladder are rarely found at once
-MOST_REACHED = 400  # of a balance of so few that is solved to see how the structure goes on
-MOST_COMPARED = 12000  # of a balance that is solved to estimate an error
-HARMONICS_SAFETY = 1.5  # where the error falls as 1/H to 1/H^3 it is 2 to 1.2 times the difference to two steps up
-NEAR_SAFETY = 2.5  # and 3.4 to 1.5 times that to one step up
-SAMPLES_SAFETY = 1.5  # the error falls with the time between samples or its square: 2 to 1.3 times the difference
-SCATTER_SAFETY = 2.0  # 1.5 to 1.1 times that to three times as many, but those of single events scatter
-SMALL_WORK = 0.001  # of the work of the excitation: where normal force times slip is less, it is judged against this
-SMALL_WORK_DEAR = 0.01  # the same where the unknowns are many
-NO_WORK = 1e-3  # of this: where even that is not reached, nothing wears
-CREEP = 0.1  # of rtol: share of the slip work that may be creep
-SMALL_SHARE = 0.01  # of the largest peak: responses that move less are judged against this
-SMALL_RESPONSE = 1e-5  # of what the excitation would cause on the stiffness of the joint alone
-SPARE = 0.3  # of what is enough: a state so accurate is tried with fewer
-FAINT = 0.1  # of rtol: share of the largest normal force below which it does not matter whether a contact is seen
 
 
 @dataclass(frozen=True)
@@ -64,14 +43,14 @@ class Level:
 
     def unknowns(self, resolution: Resolution) -> int:
         """Unknowns of the balance with other harmonics."""
-        return self.joint.slots.size * (2 * len(resolution.orders) + 1)
+        return n_unknowns(resolution, self.joint.slots.size)
 
-    def may_look_at(self, resolution: Resolution, most: int = MOST_FAR) -> bool:
-        """Whether a state of so many more harmonics is so cheap that it may be asked what these miss."""
+    def may_solve(self, resolution: Resolution, most: int) -> bool:
+        """Whether the scene holds so many harmonics and their balance has at most so many unknowns."""
         return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
-    def led_to(self, resolution: Resolution, effort: Effort) -> Level | None:
-        """The same state with more harmonics, these raised from nothing; None where that way ends."""
+    def by_homotopy(self, resolution: Resolution, effort: Effort) -> Level | None:
+        """The same state with more harmonics, these raised from nothing; None where that homotopy ends."""
         if 2 * resolution.highest < self.case.resolution.samples:
             case = self.case.at(resolution)
             joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
@@ -97,7 +76,7 @@ class Level:
         )
 
     def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, effort: Effort) -> Level | None:
-        most = MOST_ITERATIONS if start.size <= DEAR else FEW_ITERATIONS
+        most = ACCURACY.level_iterations
         result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, most)
         if not result.converged:
             return None
@@ -108,23 +87,24 @@ class Level:
     def at_rest(self, effort: Effort) -> Level:
         """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
         settings = self.case.settings
-        share = CREEP * settings.rtol
-        if not ratchets(self.joint, self.point.evaluation, share):
+        fraction = ACCURACY.creep_fraction * settings.rtol
+        if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
-        rested = shake_down(self.joint, self.point, share, settings.tolerance, effort)
+        rested = shake_down(self.joint, self.point, fraction, settings.tolerance, effort)
         return Level(self.case, self.joint, rested)
 
     def least_work(self) -> float:
-        """Slip work, N m, below which a relative error of it weighs less: a share of what the excitation does."""
+        """Slip work, N m, below which a relative error of it weighs less: a fraction of what the excitation does."""
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        cheap = self.unknowns(self.case.resolution) <= DEAR
-        return (SMALL_WORK if cheap else SMALL_WORK_DEAR) * abs(self.joint.structure.input_work(motion))
+        cheap = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
+        small = ACCURACY.small_slip_work if cheap else ACCURACY.dear_small_slip_work
+        return small * abs(self.joint.structure.input_work(motion))
 
     def without_even(self, effort: Effort) -> Level | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not half_wave_symmetric(self.point.evaluation):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
 
@@ -140,7 +120,7 @@ class Level:
         the samples; None where nothing does. Harmonics without an event in between are exact: one look is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(SEEN_SAMPLES, 2 * samples)), effort)
+        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), effort)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
@@ -152,60 +132,63 @@ class Level:
     def samples_error(self, effort: Effort) -> tuple[Estimate, Level | None]:
         """Estimated error for want of samples, and the state with more of them that it comes from.
 
-        What is wrong is where in its step an event falls. A sample next to an extreme is also among twice as many and
-        may still be the one next to it: then both states are wrong by the same. So the others lie in between: three
-        times as many and two, which have only the phases 0 and pi in common with these. Where the unknowns are many so
-        are the events, and twice as many samples, with which the refinement can go on, tell enough. Where no state is
-        found it is the difference to the one with half as many, which is at least as large.
+        The error depends on where between two samples an event (slip, stick, lift) falls. The sample next to an event
+        is also one of twice as many samples and may still be the next one: then both states have the same error. So the
+        other state has 3 N + 2 samples, which have only the phases 0 and pi in common with these N. Where the unknowns
+        are many there are many events, and 2 N samples, with which the refinement can go on, suffice. Where no such
+        state is found the error is the difference to the one with N / 2, which is at least as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        few = self.unknowns(self.case.resolution) <= DEAR
+        few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), effort)
         if finer is not None:
-            return self.difference(finer).times(SCATTER_SAFETY if few else SAMPLES_SAFETY), finer
+            safety = ACCURACY.triple_samples_safety if few else ACCURACY.double_samples_safety
+            return self.difference(finer).times(safety), finer
         coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
     def harmonics_error(self, effort: Effort, known: Level | None = None) -> tuple[Estimate, Level | None]:
         """Estimated error for want of harmonics, and the state with more of them that it comes from.
 
-        It is the difference to the state two steps up the ladder; where that is not found, takes too many unknowns, or
-        the scene does not hold the nodal diameters of so many, one step; where not even those, to the state one step
-        down, which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
+        It is the difference to the state two levels up; where that is not found, takes too many unknowns, or the scene
+        does not hold the nodal diameters of so many, one level; where not even those, to the state one level down,
+        which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
         and where none such is found the error is unknown, whatever the other states say; and to one with so many that
         the structure answers those beyond as the penalty does (`reach`): below, a few more may change nothing.
 
         known: a richer state that was compared before, which is not solved again where it reaches so far.
         """
         evaluation = self.point.evaluation
-        felt = FAINT * self.case.settings.rtol
+        felt = ACCURACY.faint_force * self.case.settings.rtol
         contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
         # a whole period of the highest harmonic in the contact shows it well, half a period shows it
-        far, seeing = (steps_to_see(self.case.resolution, share * contact, 2) for share in (0.5, 1.0))
-        while far > 2 and not self.may_look_at(on_ladder(self.case.resolution, far)):
+        far, seeing = (levels_to_see(self.case.resolution, part * contact, 2) for part in (0.5, 1.0))
+        while far > 2 and not self.may_solve(shifted(self.case.resolution, far), ACCURACY.far_unknowns):
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        most = MOST_REACHED if self.joint.slots.size <= FEW_PLACES else MOST_FAR
-        if self.may_look_at(on_ladder(self.case.resolution, 2), most):
-            reaching = steps_to_reach(
+        few = self.joint.slots.size <= ACCURACY.few_displacements
+        most = ACCURACY.few_far_unknowns if few else ACCURACY.far_unknowns
+        if self.may_solve(shifted(self.case.resolution, 2), most):
+            reaching = levels_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
             )
-            while not self.may_look_at(on_ladder(self.case.resolution, reaching), most):
+            while not self.may_solve(shifted(self.case.resolution, reaching), most):
                 reaching -= 1
-        for steps in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
-            other = on_ladder(self.case.resolution, steps)
-            affordable = self.unknowns(other) <= MOST_COMPARED
+        for levels in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
+            other = shifted(self.case.resolution, levels)
+            affordable = self.unknowns(other) <= ACCURACY.compared_unknowns
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
-                level = known if 2 < steps <= reaching and known is not None and known.covers(other) else None
+                level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
                 level = level or self.solve_at(other, effort)
-                if level is None and 2 < steps <= reaching:
-                    level = self.climbed(steps, effort)
+                if level is None and 2 < levels <= reaching:
+                    level = self.level_by_level(levels, effort)
                 if level is not None:
-                    richer = level if steps > 0 else None
-                    if steps < seeing and seeing > 2:
+                    richer = level if levels > 0 else None
+                    if levels < seeing and seeing > 2:
                         return UNKNOWN, richer
-                    return self.difference(level).times(NEAR_SAFETY if steps == 1 else HARMONICS_SAFETY), richer
+                    safety = ACCURACY.one_level_safety if levels == 1 else ACCURACY.two_levels_safety
+                    return self.difference(level).times(safety), richer
         return UNKNOWN, None
 
     def covers(self, resolution: Resolution) -> bool:
@@ -213,25 +196,25 @@ class Level:
         own = self.case.resolution
         return own.orders == resolution.orders and own.samples >= resolution.samples
 
-    def climbed(self, steps: int, effort: Effort) -> Level | None:
-        """The same state so many steps up the ladder, where it is not found at once; None where a step fails."""
+    def level_by_level(self, levels: int, effort: Effort) -> Level | None:
+        """The same state so many levels up, where it is not found at once; None where one of them fails."""
         level: Level | None = self
-        for _ in range(steps):
-            level = None if level is None else level.solve_at(on_ladder(level.case.resolution, 1), effort)
+        for _ in range(levels):
+            level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), effort)
         return level
 
     def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[Level, Estimate]:
         """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.
 
-        Half of rtol is kept, so that the next state does not go up again at once.
+        A fraction of rtol is kept, so that the next state does not go up again at once.
         """
-        here, enough = self, 0.5 * self.case.settings.rtol
-        while estimate.largest <= SPARE * enough:
+        here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
+        while estimate.largest <= ACCURACY.spare_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, effort) if lower != here.case.resolution else None
             if level is None:
                 break
-            larger = level.difference(here).times(HARMONICS_SAFETY) + estimate
+            larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate
             if larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
@@ -247,14 +230,14 @@ class Level:
         return largest_responses(self.joint, self.point.evaluation)
 
     def least_response(self) -> float:
-        """Response, m, below which a relative error says nothing: a small share of what the excitation would cause on
-        the joint's own stiffness. A mass that its friction holds does not respond at all.
+        """Response, m, below which a relative error says nothing: a small fraction of what the excitation would cause
+        on the joint's own stiffness. A mass that its friction holds does not respond at all.
         """
         structure, penalty = self.joint.structure, self.joint.penalty
         stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
         moved = structure.harmonic_force / stiffness[self.joint.slots]
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(SMALL_RESPONSE * float(np.linalg.norm(response)), 1e-300)
+        return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether the certificate of the state holds."""
@@ -266,12 +249,12 @@ class Level:
         least = better.least_response()
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         mine_peak, its_peak = self.peaks(), better.peaks()
-        size = np.maximum(its_peak, max(SMALL_SHARE * float(its_peak.max(initial=0.0)), least))
+        size = np.maximum(its_peak, max(ACCURACY.small_peak * float(its_peak.max(initial=0.0)), least))
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= NO_WORK * work:
+        if max(its_slip, mine_slip) <= ACCURACY.no_slip_work * work:
             return Estimate(response, 0.0)
         # no wear rate is surer than the motion that it comes from
-        slip = max(its_slip, NO_WORK * work)
+        slip = max(its_slip, ACCURACY.no_slip_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import COSTLY, n_unknowns, on_ladder
+from solver.accuracy.harmonic_levels import n_unknowns, shifted
+from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray
 from solver.newton.solve_balance import Effort, move_point
@@ -17,8 +18,8 @@ def slip_work_error(case: Case, joint: Joint, point: PathPoint, effort: Effort) 
     Zero where there are none to compare with.
     """
     evaluation = point.evaluation
-    costly = n_unknowns(case.resolution, joint.slots.size) > COSTLY
-    wanted = on_ladder(case.resolution, -1 if costly else 2)
+    costly = n_unknowns(case.resolution, joint.slots.size) > ACCURACY.costly_unknowns
+    wanted = shifted(case.resolution, -1 if costly else 2)
     if wanted == case.resolution or not case.model.holds(wanted.highest):
         return np.zeros(evaluation.slip_work.shape)
     other = case.at(wanted)

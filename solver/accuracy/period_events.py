@@ -4,43 +4,53 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray, IntArray
-
-SYMMETRIC = 1e-9  # of the largest force: without even harmonics goes what has less of them
-ASYMMETRIC = 1e-6  # of the same: what has more of them takes them again
-STILL = 1e-9  # of the tangential state: less is no slip
 
 
 def nothing_happens(evaluation: Evaluation) -> bool:
     """Whether every pair sticks or is open all period long: the joint is linear. What only touches its limit sticks."""
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    still = (np.ptp(state_t, axis=2) <= STILL * np.abs(state_t).max(axis=2)).all(axis=1) & ~separated.any(axis=1)
+    rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off_change * np.abs(state_t).max(axis=2)
+    still = rests.all(axis=1) & ~separated.any(axis=1)
     sticks = (evaluation.status_t == STICK).all(axis=1)
     return bool((sticks | still | separated.all(axis=1)).all())
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
     """Whether a state of odd harmonics alone has contact forces with even ones: it was symmetric and no longer is."""
-    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ASYMMETRIC)
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ACCURACY.asymmetric_force)
 
 
-def half_wave_symmetric(evaluation: Evaluation, share: float = SYMMETRIC) -> bool:
-    """Whether the contact force has no even harmonics but the static one, to a share of the largest force."""
+def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
+    """Whether the contact force has no even harmonics but the static one, to a fraction of the largest force."""
     half = evaluation.force_t.shape[2] // 2
     if evaluation.force_t.shape[2] % 2:
         return False
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
-    return bool(np.ptp(total, axis=2).max(initial=0.0) <= share * size)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= fraction * size)
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
-    """Share of the period that the shortest contact of a pair takes that opens; 1 where none does.
+    """Shortest time in which a pair that opens is in contact.
 
-    status_t (n_contact, N): states of the pairs at the samples. normal_force_t (n_contact, N): N. felt: share of the
-    largest normal force that a pair has to reach; those that hardly touch matter as little as their forces do.
+    Parameters
+    ----------
+    status_t
+        (n_contact, N), states of the pairs at the samples.
+    normal_force_t
+        (n_contact, N), N.
+    felt
+        Fraction of the largest normal force that a pair has to reach: those that hardly touch matter as little as their
+        forces do.
+
+    Returns
+    -------
+    float
+        As a fraction of the period; 1 where no pair opens.
     """
     n_samples = status_t.shape[1]
     shortest = n_samples

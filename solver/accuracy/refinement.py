@@ -1,10 +1,11 @@
 """How wrong a state is for its harmonics and samples, and which of them it needs.
 
 The error of a state is estimated by solving it again with more harmonics and with more samples, each warm started: what
-changes is the error, up to the rest of the series (`SAFETY`). Automatic settings go up, one or the other, until the
-estimate is below `rtol`; a state that carries no even harmonics goes on without them, and one in which nothing slips
-or opens keeps the first harmonic alone, which is then exact. Masses that creep are brought to rest first (`creep`), and
-where a warm start with more harmonics is thrown off the state is led to them (`enrich`), as far as that is cheap.
+changes is the error, up to the rest of the series (`solver.accuracy.level`). Automatic settings go up, one or the
+other, until the estimate is below `rtol`; a state without even harmonics goes on without them, and one in which nothing
+slips or opens keeps the first harmonic alone, which is then exact. Masses that ratchet are brought to rest first
+(`solver.continuation.ratcheting`), and where Newton's method diverges from a warm start with more harmonics these are
+added by homotopy (`solver.continuation.harmonic_homotopy`), as far as that is cheap.
 """
 
 from __future__ import annotations
@@ -14,23 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import LADDER, MOST_HARMONICS, fewer, n_unknowns, on_ladder
-from solver.accuracy.level import DEAR, NEAR_SAFETY, SAMPLES_SAFETY, Level
+from solver.accuracy.harmonic_levels import fewer, n_unknowns, shifted
+from solver.accuracy.level import Level
+from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.harmonic_balance.converged import PathPoint
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Effort
 from solver.settings import Resolution
 from solver.structure.joint import Case, Joint
-
-MOST_SAMPLES = 8192
-MOST_LEADS = 5  # ways to more harmonics in one refinement
-MOST_REFINEMENT = 200  # iterations of one refinement in all
-MOST_CHEAP = 600  # the same while the unknowns are few: solves that fail take most of them, and little time
-CHEAP = 2000  # unknowns up to which they are that few, two steps up the ladder
-MOST_UNKNOWNS = 8000  # of a balance that "auto" may march with
-MOST_OF_FEW = 2000  # where the pairs are few: impacts couple all harmonics, and no preconditioner helps
-AIM = 0.8  # of rtol: an estimate is one within a factor
 
 
 @dataclass(frozen=True)
@@ -39,7 +32,7 @@ class Refined:
 
     case: with the resolution of the state. point: the state; its parameter is that of the point refined. estimate: of
     its errors. accurate: whether it is below rtol (that of the response, where only the finest samples show any slip);
-    for fixed settings always true. spare: whether fewer might do.
+    for fixed settings always true.
     """
 
     case: Case
@@ -51,13 +44,32 @@ class Refined:
 def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoint, effort: Effort) -> Refined:
     """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
 
-    omega: rad/s. excitation_amplitude: N.
+    Parameters
+    ----------
+    case
+        With the harmonics and samples of the state.
+    omega, excitation_amplitude
+        rad/s, N.
+    point
+        The state.
+    effort
+        Newton iterations spent are added to it.
+
+    Returns
+    -------
+    Refined
+        The state as it was, with its error, where no accurate one is found.
+
+    Raises
+    ------
+    OutOfTimeError
+        Behind the deadline of the effort.
     """
     settings = case.settings
     here = Level(case, case.joint(omega, excitation_amplitude), point)
     here = here.at_rest(effort)
     begun = effort.iterations
-    leads, faint = MOST_LEADS, False
+    faint = False
     richer: Level | None = None
     while True:
         if nothing_happens(here.point.evaluation):
@@ -68,7 +80,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             if missed is None:
                 return Refined(here.case, here.point, NOTHING, True)
             if settings.samples != "auto":
-                missing = here.difference(missed).times(SAMPLES_SAFETY)
+                missing = here.difference(missed).times(ACCURACY.double_samples_safety)
                 accurate = not settings.automatic or missing.largest <= settings.rtol
                 return Refined(here.case, here.point, missing, accurate)
             here, faint = missed, True
@@ -78,31 +90,31 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         resolution = here.case.resolution
         by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort, richer)
-        above = on_ladder(resolution, 1)
-        cheap = here.unknowns(above) <= DEAR and _allowed(here, above)
-        if richer is None and settings.harmonics == "auto" and leads and cheap:
-            # impacts: a warm start with more harmonics is thrown off, though they have the state
-            leads -= 1
-            richer = here.led_to(above, effort)
-            by_harmonics = by_harmonics if richer is None else here.difference(richer).times(NEAR_SAFETY)
+        above = shifted(resolution, 1)
+        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and _allowed(here, above)
+        if richer is None and settings.harmonics == "auto" and cheap:
+            # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
+            richer = here.by_homotopy(above, effort)
+            by_harmonics = by_harmonics if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         estimate = by_samples + by_harmonics
         if not settings.automatic:
             known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
             return Refined(here.case, here.point, known, True)
         holds = here.holds()
-        if estimate.largest <= AIM * settings.rtol and holds:
+        if estimate.largest <= ACCURACY.aim * settings.rtol and holds:
             here, estimate = here.relaxed(estimate, effort)
             return Refined(here.case, here.point, estimate, True)
-        more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / 3.0
-        more_harmonics = settings.harmonics == "auto" and (not holds or by_harmonics.largest > by_samples.largest / 3.0)
+        more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / ACCURACY.error_ratio
+        lacks_harmonics = not holds or by_harmonics.largest > by_samples.largest / ACCURACY.error_ratio
+        more_harmonics = settings.harmonics == "auto" and lacks_harmonics
         wanted = resolution
         if more_harmonics:
-            higher = above
-            wanted = higher if settings.samples == "auto" else Resolution(higher.orders, resolution.samples)
+            wanted = above if settings.samples == "auto" else Resolution(above.orders, resolution.samples)
         if more_samples:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
-        most = begun + (MOST_CHEAP if here.unknowns(on_ladder(resolution, 2)) <= CHEAP else MOST_REFINEMENT)
+        few = here.unknowns(shifted(resolution, 2)) <= ACCURACY.cheap_unknowns
+        most = begun + (ACCURACY.cheap_refinement_iterations if few else ACCURACY.refinement_iterations)
         if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
             if finer is not None and finer.case.resolution == wanted:
                 next_level = finer
@@ -122,8 +134,13 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         here = next_level
 
 
-def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort) -> Refined | None:
-    """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
+def coarse_state(
+    refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort
+) -> Refined | None:
+    """The same state with so few harmonics that it has at most `most` unknowns; None where there is none.
+
+    omega: rad/s. excitation_amplitude: N. Its error is not known.
+    """
     here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
     while n_unknowns(here.case.resolution, here.joint.slots.size) > most:
         lower = fewer(here.case.resolution, here.case.settings)
@@ -140,12 +157,16 @@ def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint)
 
 
 def _allowed(here: Level, resolution: Resolution) -> bool:
+    """Whether "auto" may go on with these harmonics and samples."""
     if not here.case.model.holds(resolution.highest):
         return False
-    most = MOST_OF_FEW if here.joint.slots.size <= NEWTON.small_joint_displacements else MOST_UNKNOWNS
-    if resolution.highest > MOST_HARMONICS:
-        # friction alone: motions that hit something take their time in vain
+    small = here.joint.slots.size <= NEWTON.small_joint_displacements
+    most = ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns
+    if resolution.highest > ACCURACY.most_mixed_harmonics:
+        # friction alone: motions that hit something take more in vain
         if not all(order % 2 for order in resolution.orders):
             return False
-        most = min(most, DEAR)
-    return resolution.samples <= MOST_SAMPLES and resolution.highest <= LADDER[-3] and here.unknowns(resolution) <= most
+        most = min(most, ACCURACY.dear_unknowns)
+    # two levels more are left to compare with
+    in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
+    return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most

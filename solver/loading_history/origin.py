@@ -1,6 +1,6 @@
 """Where a sweep begins: a frequency that depends on the scene and on the point alone, not on the others of a study.
 
-A machine that is run up or down passes the frequencies on its way to the point, and the joint remembers. So a sweep
+A machine that is run up or down passes the frequencies before the point, and the joint remembers. So a sweep
 begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85
 times. It is the same for all points of a quarter octave, and it begins where the vibration loads the stuck joint least,
 so that it does not begin at a resonance.
@@ -14,22 +14,15 @@ from typing import Literal
 
 import numpy as np
 
+from solver.loading_history.options import LOADING
 from solver.model import ReducedModel
+from solver.packing import packable
 from solver.structure.condensation import build_structure
 
 Sweep = Literal["up", "down", "ramp"]
 
-LEAD = {"up": 0.7, "down": 1.3}
-"""Frequency that a sweep has begun before, over that of the point (measured: 0.62 and 0.78 give the same state of the
-dovetail within 2e-3)."""
 
-CELLS = 4
-"""Cells an octave."""
-
-CANDIDATES = 8
-"""Frequencies of a cell that are looked at."""
-
-
+@packable
 @dataclass(frozen=True)
 class Origin:
     """Where the sweep to a point begins, all in Hz.
@@ -46,19 +39,19 @@ class Origin:
 
 def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
     """Origin of the sweep to a frequency, Hz."""
-    cell = math.floor(CELLS * math.log2(frequency))
-    low, high = (2.0 ** (edge / CELLS) for edge in (cell, cell + 1))
+    cell = math.floor(LOADING.cells_per_octave * math.log2(frequency))
+    low, high = (2.0 ** (edge / LOADING.cells_per_octave) for edge in (cell, cell + 1))
     if sweep == "ramp":
         return Origin((), high, cell)
-    width = 2.0 ** (1.0 / CELLS)
+    width = 2.0 ** (1.0 / LOADING.cells_per_octave)
     # where no state is found at the quiet frequency, the edge of the cell and one nearer to the points are tried
-    near, away = (LEAD[sweep] * low, 1.0 / width) if sweep == "up" else (LEAD[sweep] * high, width)
+    near, away = (LOADING.begin_below * low, 1.0 / width) if sweep == "up" else (LOADING.begin_above * high, width)
     return Origin((_quiet(model, near * away, near), near, near / away), high, cell)
 
 
 def _quiet(model: ReducedModel, far: float, near: float) -> float:
     """Frequency between two of them, Hz, at which the excitation loads the stuck joint least."""
-    frequencies = np.geomspace(far, near, CANDIDATES + 1)
+    frequencies = np.geomspace(far, near, LOADING.origin_candidates + 1)
     loads = []
     for frequency in frequencies:
         try:

@@ -12,6 +12,7 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.options import LOADING
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort
@@ -19,15 +20,6 @@ from solver.outcome import Outcome
 from solver.packing import packable
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
-
-FINE = 1e-3
-"""Of the parameter: steps that may always be taken within a step, however much the vibration changes."""
-
-SPAN = 0.05
-"""Of the parameter: natural length of arc-length steps."""
-
-MOST_LANDINGS = 6
-"""Ends of branches within a step."""
 
 
 @packable
@@ -42,7 +34,7 @@ class Step:
 @dataclass(frozen=True)
 class Route:
     """The unworn joint along its frequency (parameter: rad/s; omega: None) or, at a frequency omega, rad/s, along its
-    excitation (parameter: share of excitation_amplitude, N).
+    excitation (parameter: load factor, of excitation_amplitude, N).
     """
 
     case: Case
@@ -61,7 +53,7 @@ class Route:
         return Balance.frozen(self.joint_at(parameter), history, unworn)
 
     def scale(self, parameter: float) -> float:
-        """What lengths are shares of."""
+        """What lengths of steps are relative to."""
         return abs(parameter) if self.omega is None else 1.0
 
     def step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | Outcome:
@@ -74,17 +66,17 @@ class Route:
             balance = self.balance_at(point.parameter, point.evaluation.history)
             return is_stable(balance.linearise(point.evaluation), solver)
 
-        for _ in range(MOST_LANDINGS):
+        for _ in range(LOADING.most_folds):
             if effort.exhausted:
                 break
             point, arrived = follow_naturally(
-                self.balance_at, start, target, solver, tolerance, effort, fine=FINE * scale
+                self.balance_at, start, target, solver, tolerance, effort, fine=LOADING.free_step * scale
             )
             if arrived and stays(point):
                 return Step(point, tuple(folds))
             # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
             end = start if arrived else point
-            arc = follow_arc(self.balance_at, end, target, SPAN * scale, solver, tolerance, effort, stays)
+            arc = follow_arc(self.balance_at, end, target, LOADING.arc_span * scale, solver, tolerance, effort, stays)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))
             landed = self._settled(end, target, arc.folds, solver, effort)
@@ -99,8 +91,8 @@ class Route:
     def _settled(
         self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
     ) -> Step | Outcome:
-        """State that the structure settles to from the end of a branch, a little beyond it on the way to the target."""
-        fine = FINE * self.scale(end.parameter)
+        """State that the structure settles to from the end of a branch, a little beyond it towards the target."""
+        fine = LOADING.free_step * self.scale(end.parameter)
         beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
         joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
         unworn = np.zeros(self.case.model.contact.n_contact)

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -19,10 +19,11 @@ from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.converged import PathPoint
+from solver.loading_history.options import LOADING
 from solver.loading_history.origin import Origin, find_origin
 from solver.loading_history.origin import Sweep as Direction
 from solver.loading_history.route import Step
-from solver.loading_history.sweep import MOST_ITERATIONS, Sweep
+from solver.loading_history.sweep import Sweep, SweepState
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, OutOfTimeError, move_point
@@ -33,13 +34,6 @@ from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.stability.period_doubling import doubles_period
 from solver.structure.joint import Case, build_case
-
-OTHER_STARTS = (Resolution((1,), 64), Resolution((1, 2, 3), 256), Resolution(all_orders(15), 256))
-FEW_PAIRS = 12  # up to which a state that is not accurate is sought from nothing as well: impacts have many others
-AGAIN = 0.05  # of the frequency: how far behind the end of a walk, and how far apart, it is begun anew
-MOST_AGAIN = 6  # attempts to begin it anew
-FIRST_SHARE = 1e-3  # of the excitation: where a ramp begins
-KEEP = 100  # iterations after which the progress is handed out
 
 
 def follow_branch(
@@ -52,31 +46,50 @@ def follow_branch(
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at the frequencies (Hz, ascending): index and state, one by one.
+    """Unworn periodic states at some frequencies: index and state, one by one.
 
     A state depends on its own frequency and on no other: the sweep to it begins at a frequency that is the same for
     all points of a quarter octave (`origin`) and has steps of its own (`sweep`). Where the branch ends at a fold it is
     followed by arc length until it reaches the next node in a stable state, which is where a slow sweep of the machine
     would land if the branch is one curve; where that fails, the structure is left to settle in time from the last
-    state, and at last the state is sought from nothing.
-    excitation_amplitude in N.
-    keep: called now and then, after the state was taken from the iterator, with the progress of the sweep. resume: such
-        progress of a sweep that differs in its frequencies only. Frequencies beyond those that it had passed are
+    state, and at last the state is sought from the static one.
+
+    Parameters
+    ----------
+    model, friction_coefficient
+        The case.
+    excitation_amplitude
+        N.
+    frequencies
+        Hz, ascending.
+    sweep
+        How the states are reached: "up" or "down" along the frequency, "ramp" at a fixed one.
+    settings
+        Harmonics, samples, tolerances, limit of time.
+    keep
+        Called now and then, after the state was taken from the iterator, with the progress of the sweep.
+    resume
+        Such progress of a sweep that differs in its frequencies only. Frequencies beyond those that it had passed are
         reached from there; the states are the same to the last bit, but for `run_time`.
+
+    Yields
+    ------
+    tuple of int and StartState
+        Index of the frequency, in the order of the sweep, and its state or why there is none.
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
-    line = _Line(model, friction_coefficient, excitation_amplitude, sweep, settings)
+    walks = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
     counted = 0
     if resume is not None:
-        counted, carried = unpack(resume)
-        line.load_state(carried)
+        counted, state = unpack(resume)
+        walks.load_state(state)
     kept = counted
     started = computing_time()
     for index in order:
-        line.set_deadline(started + settings.time_limit)
+        walks.set_deadline(started + settings.time_limit)
         message = ""
         try:
-            found = line.advance(float(frequencies[index]))
+            found = walks.advance(float(frequencies[index]))
         except OutOfTimeError:
             found = _Found(Outcome.TIME_LIMIT)
         except Exception as error:
@@ -89,20 +102,20 @@ def follow_branch(
                 outcome=found.outcome,
                 state=found.state,
                 coarse=found.coarse,
-                penalty_omega=line.penalty_omega,
-                resolution=found.resolution or line.resolution,
+                penalty_omega=walks.penalty_omega,
+                resolution=found.resolution or walks.resolution,
                 response_error=found.estimate.response,
                 wear_rate_error=found.estimate.wear_rate,
-                newton_iterations=line.n_iterations - counted,
+                newton_iterations=walks.n_iterations - counted,
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
                 message=message,
             ),
         )
-        started, counted = now, line.n_iterations
-        if keep is not None and counted >= kept + KEEP and line.walk is not None:
-            keep(pack((counted, line.state_dict())))
+        started, counted = now, walks.n_iterations
+        if keep is not None and counted >= kept + LOADING.iterations_per_report and walks.walk is not None:
+            keep(pack((counted, walks.state_dict())))
             kept = counted
 
 
@@ -118,8 +131,18 @@ class _Found:
         self.estimate = UNKNOWN
 
 
-class _Line:
-    """The walks of a line of points: one for all that begin at the same origin, one for each of a ramp."""
+class FrequencySweepState(TypedDict):
+    """What goes on from frequency to frequency: attributes of a `FrequencySweep` and of its current walk."""
+
+    origin: Origin
+    omega: float | None
+    own_iterations: int
+    walked_iterations: int
+    walk: SweepState
+
+
+class FrequencySweep:
+    """The sweep over frequencies: one walk for all points with the same origin, or one for each point of a ramp."""
 
     def __init__(
         self,
@@ -160,21 +183,26 @@ class _Line:
         if self.walk is not None:
             self.walk.effort.deadline = deadline
 
-    def state_dict(self) -> dict[str, Any]:
+    def state_dict(self) -> FrequencySweepState:
         """What goes on from frequency to frequency, to be packed."""
         assert self.walk is not None
+        assert self.walk.saved is not None
         assert self.origin is not None
-        own = {"own_iterations": self.effort.iterations, "omega": self.walk.omega}
-        own["walked"] = max(self.walk.effort.iterations, self._walked)
-        return self.walk.saved | own | {"origin": (self.origin.starts, self.origin.penalty, self.origin.cell)}
+        return {
+            "origin": self.origin,
+            "omega": self.walk.omega,
+            "own_iterations": self.effort.iterations,
+            "walked_iterations": max(self.walk.effort.iterations, self._walked),
+            "walk": self.walk.saved,
+        }
 
-    def load_state(self, carried: dict[str, Any]) -> None:
-        """Go on from what another one has carried so far."""
-        self.origin = Origin(*carried.pop("origin"))
-        self.effort.iterations = carried.pop("own_iterations")
-        self._walked = carried.pop("walked")
-        self.walk = self._new_walk(self.origin, carried.pop("omega"))
-        self.walk.load_state(carried)
+    def load_state(self, state: FrequencySweepState) -> None:
+        """Go on from the state of another one."""
+        self.origin = state["origin"]
+        self.effort.iterations = state["own_iterations"]
+        self._walked = state["walked_iterations"]
+        self.walk = self._new_walk(self.origin, state["omega"])
+        self.walk.load_state(state["walk"])
 
     def _new_walk(self, origin: Origin, omega: float | None) -> Sweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
@@ -195,7 +223,7 @@ class _Line:
             self._begin(self.walk, origin)
         walk, target = self.walk, 1.0 if self.sweep == "ramp" else omega
         self._walk_to(walk, target)
-        self.effort.limit = self.effort.iterations + MOST_ITERATIONS
+        self.effort.limit = self.effort.iterations + LOADING.node_iterations
         try:
             reached, coarse = walk.state_at(target, self.effort)
             case = walk.case
@@ -205,8 +233,8 @@ class _Line:
             if reached is None:
                 return _Found(self._why_lost(walk))
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
-            if not refined.accurate and self.model.contact.n_contact <= FEW_PAIRS:
-                refined = self._afresh(omega) or refined
+            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
+                refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)
         # those of a ramp are no frequencies
@@ -236,16 +264,16 @@ class _Line:
 
     def _begin(self, walk: Sweep, origin: Origin) -> None:
         """A state where the walk begins; none where there is none, or where the structure is singular there."""
-        self.effort.limit = self.effort.iterations + MOST_ITERATIONS
-        places = [2.0 * np.pi * start for start in origin.starts] or [FIRST_SHARE]
+        self.effort.limit = self.effort.iterations + LOADING.node_iterations
+        places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(walk, place):
                 return
 
     def _begin_at(self, walk: Sweep, place: float) -> bool:
-        omega, share = (place, 1.0) if walk.omega is None else (walk.omega, place)
+        omega, load_factor = (place, 1.0) if walk.omega is None else (walk.omega, place)
         try:
-            case, point = self._first(omega, share)
+            case, point = self._first(omega, load_factor)
         except np.linalg.LinAlgError:
             return False
         if point is None:
@@ -255,7 +283,7 @@ class _Line:
 
     def _walk_to(self, walk: Sweep, target: float) -> None:
         """As far as the target; where the walk ends before, it is begun anew a little behind its end."""
-        for _ in range(MOST_AGAIN):
+        for _ in range(LOADING.most_restarts):
             try:
                 walk.walk_to(target)
             except np.linalg.LinAlgError:
@@ -263,10 +291,10 @@ class _Line:
                 walk.here = walk.coarse = walk.ahead = None
             if walk.here is not None or walk.omega is not None or np.isnan(walk.lost_at):
                 return
-            behind = walk.lost_at * (1.0 + AGAIN * walk.direction)
+            behind = walk.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
             if (behind - target) * walk.direction >= 0.0:
                 return
-            self.effort.limit = self.effort.iterations + MOST_ITERATIONS
+            self.effort.limit = self.effort.iterations + LOADING.node_iterations
             if not self._begin_at(walk, behind):
                 walk.lost_at = behind
 
@@ -274,9 +302,9 @@ class _Line:
         never = np.isnan(walk.lost_at)
         return walk.failure if never or walk.failure in (Outcome.UNSTABLE, Outcome.ADRIFT) else Outcome.BRANCH_LOST
 
-    def _afresh(self, omega: float) -> Refined | None:
-        """An accurate state from nothing with other harmonics, where those of the branch are a dead end."""
-        for resolution in OTHER_STARTS[1:]:
+    def _restarted_from_static(self, omega: float) -> Refined | None:
+        """An accurate state from the static one with other harmonics, where those of the branch lead to none."""
+        for resolution in _other_starts()[1:]:
             case, point = self._first_at(omega, 1.0, resolution)[1:]
             refined = None
             if point is not None:
@@ -285,13 +313,13 @@ class _Line:
                 return refined
         return None
 
-    def _first(self, omega: float, share: float = 1.0) -> tuple[Case, PathPoint | None]:
-        """A state from nothing; where the harmonics of the line find none, with others."""
+    def _first(self, omega: float, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
+        """A state from the static one; where the harmonics of the walk find none, with others."""
         assert self.walk is not None
-        others = OTHER_STARTS if self.settings.automatic else ()
+        others = _other_starts() if self.settings.automatic else ()
         why = Outcome.START_FAILED
         for attempt, resolution in enumerate((self.walk.case.resolution, *others)):
-            outcome, case, point = self._first_at(omega, share, resolution)
+            outcome, case, point = self._first_at(omega, load_factor, resolution)
             if point is not None:
                 return case, point
             # the first attempt says why there is none
@@ -302,12 +330,19 @@ class _Line:
         self.walk.failure = why
         return self.walk.case, None
 
-    def _first_at(self, omega: float, share: float, resolution: Resolution) -> tuple[Outcome, Case, PathPoint | None]:
-        """A state from nothing with these harmonics and samples, as far as they are not fixed."""
+    def _first_at(
+        self, omega: float, load_factor: float, resolution: Resolution
+    ) -> tuple[Outcome, Case, PathPoint | None]:
+        """A state from the static one with these harmonics and samples, as far as they are not fixed."""
         assert self.walk is not None
         case = self.walk.case.at(allowed(resolution, self.settings))
         unworn = np.zeros(self.model.contact.n_contact)
         outcome, found = solve_first_state(
-            case, omega, share * self.excitation_amplitude, unworn, JacobianSolver(), self.effort
+            case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), self.effort
         )
         return outcome, case, None if found is None else PathPoint(omega, found.evaluation, found.history)
+
+
+def _other_starts() -> tuple[Resolution, ...]:
+    """Harmonics and samples with which a first state is sought where those of the walk find none."""
+    return tuple(Resolution(all_orders(highest), samples) for highest, samples in LOADING.other_starts)

@@ -14,55 +14,51 @@ the coarse one, and at least that of the fine one.
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import COSTLY, LIGHT, fewer, n_unknowns
-from solver.accuracy.refinement import Refined, lighter, refine
+from solver.accuracy.harmonic_levels import fewer, n_unknowns
+from solver.accuracy.options import ACCURACY
+from solver.accuracy.refinement import Refined, coarse_state, refine
 from solver.contact.coulomb import STICK
 from solver.harmonic_balance.converged import PathPoint, vibration_change
+from solver.loading_history.options import LOADING
 from solver.loading_history.route import Route, Step
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, move_point
 from solver.outcome import Outcome
-from solver.settings import first_resolution
+from solver.packing import attributes, set_attributes
+from solver.settings import Resolution, first_resolution
 from solver.structure.joint import Case
 
-HISTORY = 10.0
-"""Change of the tangential history in a step over the friction limits, over rtol. Measured on the dovetail beside its
-resonance, where it matters most: 0.2 leaves the wear rate wrong by 0.5 %, 0.1 by 0.2 %, 0.02 by 0.1 %."""
 
-SMALLEST_CHANGE, LARGEST_CHANGE = 0.02, 0.2
-"""Limits of that change: smaller ones take hundreds of nodes, larger ones miss the states in which pairs let go."""
+class NodeState(TypedDict):
+    """What goes on from node to node: attributes of `Sweep`."""
 
-LONGEST, SHORTEST = 0.03, 2e-5
-"""Of the parameter: lengths of a step."""
+    here: PathPoint | None
+    coarse: PathPoint | None
+    checked: PathPoint | None
+    length: float
+    n_nodes: int
+    n_walked: int
+    branch: int
+    fold: float
+    failure: Outcome
+    lost_at: float
 
-MOST_IN_ALL = 8000
-"""Newton iterations of a walk: one that takes more, in jumps and searches, leads nowhere (the dovetail: 1500)."""
 
-MANY_NODES = 300
-"""From here on the shortest step grows with the square of their number: no walk takes for ever."""
+class SweepState(TypedDict):
+    """The same with harmonics and samples of the nodes and of the coarse walk, and Newton iterations so far."""
 
-JUMPING = 1e-3
-"""Of the parameter: length of a step in which the branch may end."""
-
-RECHECK = 0.3
-"""Change of the vibration over the smaller one, after which harmonics and samples are chosen anew. Measured on
-the dovetail: with 1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
-
-MOST_ITERATIONS = 2500
-"""From one node to the next."""
-
-REFRESH = 8
-"""Nodes after which the factorisation that is kept from node to node is given up: a walk can go on from there."""
-
-_STATE = ("here", "coarse", "checked", "length", "n_nodes", "n_walked", "branch", "fold", "failure", "lost_at")
+    node: NodeState
+    resolution: Resolution
+    coarse_resolution: Resolution
+    iterations: int
 
 
 class Sweep:
-    """The walk along the frequency (rad/s; up or down), or along the excitation (share of it) for a ramp.
+    """The walk along the frequency (rad/s; up or down), or along the load factor for a ramp.
 
     here, coarse: the last node of each walk, None where there is no state. branch: folds jumped over so far. fold: the
     last of them, NaN if none. failure: why there is no state.
@@ -80,25 +76,27 @@ class Sweep:
         self.ahead: Step | None = None
         self.length = 0.0
         self.n_nodes = self.n_walked = 0
-        self.saved: dict[str, Any] = {}
+        self.saved: SweepState | None = None
         self.lost_at = float("nan")
         self.branch = 0
         self.fold = float("nan")
         self.failure = Outcome.START_FAILED
 
-    def state_dict(self) -> dict[str, Any]:
+    def state_dict(self) -> SweepState:
         """What goes on from node to node, to be packed."""
-        resolutions = (self.case.resolution, self.coarse_route.case.resolution)
-        own = {"resolutions": resolutions, "iterations": self.effort.iterations}
-        return {name: getattr(self, name) for name in _STATE} | own
+        return {
+            "node": attributes(self, NodeState),
+            "resolution": self.case.resolution,
+            "coarse_resolution": self.coarse_route.case.resolution,
+            "iterations": self.effort.iterations,
+        }
 
-    def load_state(self, saved: dict[str, Any]) -> None:
-        """Go on from what was `saved` of another walk of the same line: its nodes follow to the last bit."""
-        self.saved = saved
-        for name in _STATE:
-            setattr(self, name, saved[name])
-        self._take_cases(*(self.case.at(resolution) for resolution in saved["resolutions"]))
-        self.effort.iterations = saved["iterations"]
+    def load_state(self, state: SweepState) -> None:
+        """Go on from what was `saved` of another walk to the same points: its nodes follow to the last bit."""
+        self.saved = state
+        set_attributes(self, state["node"])
+        self._take_cases(self.case.at(state["resolution"]), self.case.at(state["coarse_resolution"]))
+        self.effort.iterations = state["iterations"]
         self.solver, self.coarse_solver, self.ahead = JacobianSolver(), JacobianSolver(), None
 
     @property
@@ -119,7 +117,7 @@ class Sweep:
         self.solver, self.coarse_solver = JacobianSolver(), JacobianSolver()
         self._take_cases(case, case)
         self.here = point
-        self.length = LONGEST * self.route.scale(point.parameter)
+        self.length = LOADING.longest_sweep_step * self.route.scale(point.parameter)
         self._begin_coarse()
         self._choose_harmonics()
         self._save()
@@ -152,8 +150,8 @@ class Sweep:
         """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
         while self.here is not None:
             if self.ahead is None:
-                self.effort.limit = self.effort.iterations + MOST_ITERATIONS
-                lost = self.effort.iterations > MOST_IN_ALL
+                self.effort.limit = self.effort.iterations + LOADING.node_iterations
+                lost = self.effort.iterations > LOADING.sweep_iterations
                 self.ahead = None if lost else self._look_ahead()
                 if self.ahead is None:
                     self.lost_at, self.here, self.coarse = self.here.parameter, None, None
@@ -194,10 +192,12 @@ class Sweep:
         here = self.here
         assert here is not None
         scale = self.route.scale(here.parameter)
-        shortest = SHORTEST * scale * max(1.0, self.n_walked / MANY_NODES) ** 2
-        most = float(np.clip(HISTORY * self.case.settings.rtol, SMALLEST_CHANGE, LARGEST_CHANGE))
+        shortest = LOADING.shortest_sweep_step * scale * max(1.0, self.n_walked / LOADING.many_nodes) ** 2
+        wanted = LOADING.history_change_per_rtol * self.case.settings.rtol
+        most = float(np.clip(wanted, LOADING.smallest_history_change, LOADING.largest_history_change))
+        aim = LOADING.aimed_history_change * most
         while True:
-            length = min(self.length, LONGEST * scale)
+            length = min(self.length, LOADING.longest_sweep_step * scale)
             target = here.parameter + self.direction * length
             if self.omega is not None and target > 1.0:
                 target = 1.0
@@ -205,8 +205,9 @@ class Sweep:
             at_last = length <= shortest
             if step is not None:
                 change = self._history_change(here, step.point)
-                if change <= most or at_last or (step.folds and length <= JUMPING * scale):
-                    self.length = length * float(np.clip(0.9 * most / max(change, 1e-12), 0.3, 2.0))
+                if change <= most or at_last or (step.folds and length <= LOADING.free_step * scale):
+                    ratio = np.clip(aim / max(change, 1e-12), LOADING.most_shortening, LOADING.most_lengthening)
+                    self.length = length * float(ratio)
                     return step
                 shorter = 0.8 * most / change
             elif at_last or self.effort.exhausted:
@@ -229,16 +230,16 @@ class Sweep:
             target = step.point.parameter
             coarse = self.coarse_route.step(self.coarse, target, self.coarse_solver, self.effort)
             if isinstance(coarse, Outcome) or coarse.folds:
-                # one that is thrown off goes on from the other
+                # one that does not arrive, or jumps, goes on from the other
                 self._begin_coarse()
             else:
                 self.coarse = coarse.point
         before, now = self.checked, step.point
         assert before is not None
         old, new = before.evaluation, now.evaluation
-        if max(vibration_change(old, new), vibration_change(new, old)) > RECHECK:
+        if max(vibration_change(old, new), vibration_change(new, old)) > ACCURACY.vibration_recheck:
             self._choose_harmonics()
-        if self.n_nodes % REFRESH == 0:
+        if self.n_nodes % LOADING.nodes_per_save == 0:
             self._save()
 
     def _history_change(self, before: PathPoint, after: PathPoint) -> float:
@@ -272,8 +273,9 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        if n_unknowns(refined.case.resolution, joint.slots.size) > COSTLY:
-            refined = lighter(refined, joint.omega, joint.excitation_amplitude, LIGHT, self.effort) or refined
+        if n_unknowns(refined.case.resolution, joint.slots.size) > ACCURACY.costly_unknowns:
+            most = ACCURACY.coarse_unknowns
+            refined = coarse_state(refined, joint.omega, joint.excitation_amplitude, most, self.effort) or refined
         if refined.case is not self.case:
             self._change_case(refined)
         else:

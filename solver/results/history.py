@@ -41,10 +41,9 @@ class StartState:
     it has found none. penalty_omega: rad/s, the frequency that the penalty was taken at, the same for all points of a
     quarter octave. resolution: harmonics and samples of the state. response_error, wear_rate_error: its estimated
     relative errors, what the steps of the sweep leave wrong included.
-    newton_iterations and run_time (CPU seconds of the computing thread) are those spent on the way to this frequency.
+    newton_iterations and run_time (CPU seconds of the computing thread) are those spent up to this frequency.
     branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
-    fold_frequency: Hz, the last of them; NaN if none, and for a ramp, whose folds are none of the
-        frequency.
+    fold_frequency: Hz, the last of them; NaN if none, and for a ramp, whose folds are none of the frequency.
     message: what an unexpected error said, see `Outcome.EXCEPTION`.
     """
 
@@ -81,9 +80,9 @@ class WearHistory:
     harmonics_used, samples_used (n_output,): int, 0 where there is no state.
     run_time: CPU seconds of the computing thread, start state included.
     branch, fold_frequency: those of the start state.
-    step_limit: cycles, predicted largest stable explicit step at the first state that wears: 2 over the largest
-    positive rate at which the wear rate falls with the depth; inf where none. oscillates: the wear rate went up and
-    down from step to step without calming, as in an unstable explicit scheme.
+    step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf where
+        there is none.
+    oscillates: the wear rate went up and down from step to step without calming, as in an unstable explicit scheme.
     message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
         longer and the error reached; empty where there is nothing to add.
     """

@@ -1,6 +1,6 @@
 """Fretting loops: force over relative displacement of a contact pair through one period, at phases of their own.
 
-The force is that of the law in time (`law.Marched`), not a series: it has corners and, where a mass turns on its
+The force is that of the law in time (`solver.contact`), not a series: it has corners and, where a mass turns on its
 slider, jumps, and a series would overshoot there. Between the samples of the state it is interpolated linearly, so that
 it stays within the friction cone; where a phase is one of the samples it is that sample. The displacement is the series
 of the state, which is exact at any phase. Pairs whose mass is marched (`rigid_slider`) move by all harmonics, of which
@@ -27,10 +27,21 @@ def loop_phases() -> FloatArray:
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Relative displacement, m, and contact force, N, of some pairs of a state, both (n_pairs, LOOP_PHASES, 3).
+    """Fretting loops of some pairs of a state.
 
-    Components: normal, first and second tangent; positive where the pair closes and in compression. A displacement that
-    a pair does not have is 0, and so is the force along it but for the constant normal load.
+    Parameters
+    ----------
+    joint, evaluation
+        The joint and its converged state.
+    pairs
+        Indices of pairs.
+
+    Returns
+    -------
+    tuple of two FloatArray
+        Relative displacement, m, and contact force, N, both (n_pairs, LOOP_PHASES, 3). Components: normal, first and
+        second tangent; positive where the pair closes and in compression. A displacement that a pair does not have is
+        0, and so is the force along it but for the constant normal load.
     """
     chosen = list(pairs)
     orders, n_samples = joint.basis.orders, joint.basis.n_samples

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TypedDict
 
 import numpy as np
 
 from solver.model import FloatArray, IntArray
+from solver.packing import attributes, set_attributes
+from solver.results.options import RESULTS
 
-SUCCESSIVE = 4  # increments of a wear rate that alternate in sign and do not shrink
-NOTICEABLE = 1e-3  # of the largest rate of all pairs together: increments below it are no oscillation
-CALMING = 0.98  # an increment that is smaller than this share of the one before calms
+
+class RatesState(TypedDict):
+    """What goes on from step to step: attributes of `WearRates`."""
+
+    value: FloatArray
+    increment: FloatArray
+    n_alternating: IntArray
+    last: FloatArray
+    largest: FloatArray
+    strongest: FloatArray
 
 
 @dataclass
@@ -19,7 +28,7 @@ class WearRates:
     """Follows the wear rates of pairs and, last, of all together (n,) from step to step, and forgets them.
 
     An explicit Euler step beyond its limit turns the sign of the error and enlarges it; a physical rise and fall takes
-    many steps. largest (n,): of all so far. strongest (n,): the smallest of `SUCCESSIVE` - 1 increments that followed
+    many steps. largest (n,): of all so far. strongest (n,): the smallest of `alternations` - 1 increments that followed
     each other in this way, where they were strongest.
     """
 
@@ -34,33 +43,32 @@ class WearRates:
     def __post_init__(self) -> None:
         self.value, self.increment = np.full(self.n, np.nan), np.full(self.n, np.nan)
         self.n_alternating = np.zeros(self.n, np.int64)
-        self.last = np.zeros((SUCCESSIVE - 1, self.n))
+        self.last = np.zeros((RESULTS.alternations - 1, self.n))
         self.largest, self.strongest = np.zeros(self.n), np.zeros(self.n)
 
     def add(self, rates: FloatArray) -> None:
         """Rates (n,) of the state after the next step."""
         before, self.increment = self.increment, rates - self.value
         size = np.abs(self.increment)
-        alternates = (before * self.increment < 0.0) & (size >= CALMING * np.abs(before))
+        alternates = (before * self.increment < 0.0) & (size >= RESULTS.calming * np.abs(before))
         self.n_alternating = np.where(alternates, self.n_alternating + 1, 0)
         self.last = np.vstack([self.last[1:], size])
-        weakest = np.where(self.n_alternating >= SUCCESSIVE - 1, self.last.min(axis=0), 0.0)
+        weakest = np.where(self.n_alternating >= RESULTS.alternations - 1, self.last.min(axis=0), 0.0)
         self.strongest = np.maximum(self.strongest, weakest)
         self.largest = np.maximum(self.largest, np.abs(rates))
         self.value = rates
 
     def oscillate(self, least: float = 0.0) -> bool:
-        """Whether one of them went up and down `SUCCESSIVE` times in a row without calming, by more than `least` and a
-        share of what all of them wear together: a pair at the edge of the slip zone that wears next to nothing does so
-        at any step.
+        """Whether one of them went up and down `alternations` times in a row without calming, by more than `least` and
+        a fraction of what all of them wear together: a pair at the edge of the slip zone that wears next to nothing
+        does so at any step.
         """
-        return bool(self.strongest.max(initial=0.0) > max(NOTICEABLE * self.largest[-1], least))
+        return bool(self.strongest.max(initial=0.0) > max(RESULTS.noticeable_oscillation * self.largest[-1], least))
 
-    def carried(self) -> dict[str, Any]:
+    def state_dict(self) -> RatesState:
         """What goes on from step to step, to be packed."""
-        return {entry.name: getattr(self, entry.name) for entry in fields(self) if not entry.init}
+        return attributes(self, RatesState)
 
-    def take_up(self, carried: dict[str, Any]) -> None:
-        """Go on from what another one has carried so far."""
-        for name, value in carried.items():
-            setattr(self, name, value)
+    def load_state(self, state: RatesState) -> None:
+        """Go on from the state of another one."""
+        set_attributes(self, state)

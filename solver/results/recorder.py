@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
+from solver.packing import attributes, set_attributes
 from solver.results.history import WearHistory
 from solver.results.loops import LOOP_PHASES
+from solver.results.options import RESULTS
 from solver.results.state_report import StateReport
 from solver.settings import Scheme
 
@@ -35,17 +37,15 @@ CERTIFIED = (
     "wear_rate_error",
 )
 
-SAFETY = {"implicit": 1.5, "explicit": 0.8, "adaptive": 0.6}
-"""Error of a history over its difference to the companion. Expected where steps are short: 1, 1/3 and 1/3. Measured on
-the dovetail: 0.6 to 1.3, 0.2 to 0.9, 0.05 to 0.4."""
 
-NEAR = 0.5
-"""Share of the cycle count: histories that differ by when something happens cross each other, and where they do their
-difference is small and says nothing. It is the largest one since this share of the count (measured on the dovetail,
-211.25 Hz, steps of 2000 cycles: without it a quarter of the true error at the crossing). What comes later has no part
-in it, so that an error does not depend on how far a study goes."""
+class RecorderState(TypedDict):
+    """What was kept so far: attributes of `Recorder`."""
 
-_CARRIED = ("_kept", "_last", "_local", "_truncation", "_pair_truncation")
+    kept: dict[str, Any]
+    last: tuple[float, StateReport, float] | None
+    local: float
+    truncation: float
+    pair_truncation: FloatArray
 
 
 @dataclass
@@ -53,9 +53,9 @@ class Recorder:
     """Takes the state after every step and keeps the requested counts.
 
     Between two steps they are interpolated linearly. Adaptive: the depth by cubics with the wear rates at both ends
-    instead, and all else by the share of the step's worn volume, of which the state is a function: long steps of higher
-    order are worth that. Fretting loops (n_loops of them) are interpolated phase by phase like all else, so that they
-    close, stay within the friction cone and have the mean pressure that is reported at the same count.
+    instead, and all else by the fraction of the step's worn volume, of which the state is a function: long steps of
+    higher order are worth that. Fretting loops (n_loops of them) are interpolated phase by phase like all else, so that
+    they close, stay within the friction cone and have the mean pressure that is reported at the same count.
     """
 
     model: ReducedModel
@@ -64,11 +64,11 @@ class Recorder:
     start_time: float
     scheme: Scheme
     n_loops: int = 0
-    _kept: dict[str, Any] = field(init=False, repr=False)
-    _last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
-    _local: float = field(init=False, default=0.0, repr=False)
-    _truncation: float = field(init=False, default=0.0, repr=False)
-    _pair_truncation: FloatArray = field(init=False, repr=False)
+    kept: dict[str, Any] = field(init=False, repr=False)
+    last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
+    local: float = field(init=False, default=0.0, repr=False)
+    truncation: float = field(init=False, default=0.0, repr=False)
+    pair_truncation: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         n_output, n_contact = self.cycles.size, self.model.contact.n_contact
@@ -76,80 +76,88 @@ class Recorder:
         shapes: dict[str, tuple[int, ...]] = dict.fromkeys(REPORTED, (n_contact,))
         shapes |= dict.fromkeys(("response", "response_peak"), (n_response,))
         shapes |= dict.fromkeys(("loop_displacement", "loop_force"), (self.n_loops, LOOP_PHASES, 3))
-        self._kept = {
+        self.kept = {
             name: np.full((n_output, *shape), np.nan, complex if name == "response" else float)
             for name, shape in shapes.items()
         }
-        self._kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "local", "truncation", *CERTIFIED)}
-        self._kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
-        self._kept["stable"] = np.zeros(n_output, np.bool_)
-        self._kept["pair_truncation"] = np.full((n_output, n_contact), np.nan)
-        self._pair_truncation = np.zeros(n_contact)
+        self.kept |= {name: np.full(n_output, np.nan) for name in ("wear_rate", "local", "truncation", *CERTIFIED)}
+        self.kept |= {name: np.zeros(n_output, np.int64) for name in ("harmonics_used", "samples_used")}
+        self.kept["stable"] = np.zeros(n_output, np.bool_)
+        self.kept["pair_truncation"] = np.full((n_output, n_contact), np.nan)
+        self.pair_truncation = np.zeros(n_contact)
 
-    def carried(self) -> dict[str, Any]:
+    def state_dict(self) -> RecorderState:
         """What was kept so far, to be packed."""
-        return {name: getattr(self, name) for name in _CARRIED}
+        return attributes(self, RecorderState)
 
-    def take_up(self, carried: dict[str, Any]) -> None:
-        """Go on from what another one has kept so far."""
-        for name in _CARRIED:
-            setattr(self, name, carried[name])
+    def load_state(self, state: RecorderState) -> None:
+        """Go on from the state of another one."""
+        set_attributes(self, state)
 
     def add(self, cycle: float, report: StateReport, wear_coefficient: float, error: float | None = None) -> None:
-        """State at the end of a step; `cycle` never falls.
+        """Take the state at the end of a step.
 
-        error: estimated local error of the step, as worn volume, m3; None for that of an Euler step, which is its
-        difference to the trapezoidal rule.
+        Parameters
+        ----------
+        cycle
+            Count at the end of the step; it never falls.
+        report
+            Of the state.
+        wear_coefficient
+            1/Pa.
+        error
+            Estimated local error of the step, as worn volume, m3; None for that of an Euler step, which is its
+            difference to the trapezoidal rule.
         """
         per_work = wear_coefficient / self.model.contact.area
         rate = wear_coefficient * float(report.slip_work.sum())
         smooth = self.scheme == "adaptive"
-        if self._last is None:
+        if self.last is None:
             wanted = self.cycles == cycle
             before, before_report, before_rate = cycle, report, rate
         else:
-            before, before_report, before_rate = self._last
+            before, before_report, before_rate = self.last
             wanted = (self.cycles > before) & (self.cycles <= cycle)
-            self._local += 0.5 * (cycle - before) * abs(rate - before_rate) if error is None else error
+            self.local += 0.5 * (cycle - before) * abs(rate - before_rate) if error is None else error
             # what the wear rates are wrong by for want of harmonics and samples, of all pairs together and of each
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)
-                self._truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
-                self._pair_truncation = self._pair_truncation + half * per_work * of.slip_work_error
-        share = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
+                self.truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
+                self.pair_truncation = self.pair_truncation + half * per_work * of.slip_work_error
+        fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         ends = [(of.wear_depth, per_work * of.slip_work) for of in (before_report, report)]
-        depth = depth_within(share, cycle - before, ends[0], ends[1], smooth)
+        depth = depth_within(fraction, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
-            share = self._worn_share(depth, before_report.wear_depth, report.wear_depth, share)
+            fraction = self._worn_fraction(depth, before_report.wear_depth, report.wear_depth, fraction)
         for name in REPORTED:
             old, new = getattr(before_report, name), getattr(report, name)
-            shares = share.reshape(-1, *(1,) * old.ndim)
-            self._kept[name][wanted] = depth if name == "wear_depth" else old + shares * (new - old)
-        self._kept["wear_rate"][wanted] = before_rate + share * (rate - before_rate)
+            fractions = fraction.reshape(-1, *(1,) * old.ndim)
+            self.kept[name][wanted] = depth if name == "wear_depth" else old + fractions * (new - old)
+        self.kept["wear_rate"][wanted] = before_rate + fraction * (rate - before_rate)
         for name in CERTIFIED:
             # what holds for both states holds in between
-            self._kept[name][wanted] = np.fmax(
+            self.kept[name][wanted] = np.fmax(
                 getattr(before_report.certificate, name), getattr(report.certificate, name)
             )
-        self._kept["harmonics_used"][wanted] = report.resolution.highest
-        self._kept["samples_used"][wanted] = report.resolution.samples
-        self._kept["stable"][wanted] = report.certificate.stable
-        self._kept["local"][wanted] = self._local
-        self._kept["truncation"][wanted] = self._truncation
-        self._kept["pair_truncation"][wanted] = self._pair_truncation
-        self._last = (cycle, report, rate)
+        self.kept["harmonics_used"][wanted] = report.resolution.highest
+        self.kept["samples_used"][wanted] = report.resolution.samples
+        self.kept["stable"][wanted] = report.certificate.stable
+        self.kept["local"][wanted] = self.local
+        self.kept["truncation"][wanted] = self.truncation
+        self.kept["pair_truncation"][wanted] = self.pair_truncation
+        self.last = (cycle, report, rate)
 
-    def _worn_share(
+    def _worn_fraction(
         self, depth: FloatArray, before: FloatArray, after: FloatArray, otherwise: FloatArray
     ) -> FloatArray:
-        """Share (n,) of the worn volume of a step."""
+        """Fraction (n,) of the worn volume of a step."""
         area = self.model.contact.area
         whole = float((after - before) @ area)
         return np.asarray((depth - before) @ area / whole) if whole > 0.0 else otherwise
 
     def failed(self, outcome: Outcome, run_time: float) -> WearHistory:
         """History of a point that has no start state: NaN everywhere."""
-        return self.finish(outcome, np.nan, 0, run_time, self._kept["wear_depth"])
+        return self.finish(outcome, np.nan, 0, run_time, self.kept["wear_depth"])
 
     def finish(
         self,
@@ -159,23 +167,35 @@ class Recorder:
         run_time: float,
         companion: FloatArray,
         met: Sequence[tuple[float, float]] = (),
-        start_share: float = 0.0,
+        start_error: float = 0.0,
     ) -> WearHistory:
         """The history as far as it was computed.
 
-        companion (n_output, n_contact): m, depths of the coarser history, NaN at counts that it has not come to. met:
-        counts at which it has come to the history, and how much both differ there, m3. start_share: error of the wear
-        rates of the start state, which is at least that of what they wear.
+        Parameters
+        ----------
+        outcome, jump_cycle, iterations, run_time
+            As in `WearHistory`, the last two without the start state.
+        companion
+            (n_output, n_contact), m, depths of the coarser history, NaN at counts that it has not come to.
+        met
+            Counts at which it has come to the history, and how much both differ there, m3.
+        start_error
+            Relative error of the wear rates of the start state, which is at least that of what they wear.
+
+        Returns
+        -------
+        WearHistory
+            With the errors of volume and depths.
         """
-        kept, area = dict(self._kept), self.model.contact.area
+        kept, area = dict(self.kept), self.model.contact.area
         local, truncation, of_pairs = (kept.pop(name) for name in ("local", "truncation", "pair_truncation"))
-        difference = _held(np.abs(kept["wear_depth"] - companion)) * SAFETY[self.scheme]
+        difference = _held(np.abs(kept["wear_depth"] - companion)) * RESULTS.companion_safety(self.scheme)
         volume = kept["wear_depth"] @ area
-        # rates that are all wrong by one share are those of another time: this counts where the wear rises steeply
+        # wear rates wrong by a common factor shift the history in time: this counts where the wear rises steeply
         late = np.divide(self.cycles * kept["wear_rate"], volume, out=np.ones_like(volume), where=volume > 0.0)
-        # in the first steps both histories are wrong by the same, which only the rates at their ends show
-        differs = np.fmax(difference @ area, SAFETY[self.scheme] * _before(self.cycles, met))
-        differs = np.fmax(differs, start_share * volume)
+        # in the first steps both histories have the same error, which only the wear rates at their ends show
+        differs = np.fmax(difference @ area, RESULTS.companion_safety(self.scheme) * _before(self.cycles, met))
+        differs = np.fmax(differs, start_error * volume)
         error = np.fmax(differs, local) + truncation * np.fmax(late, 1.0)
         relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
         relative[np.isnan(volume)] = np.nan
@@ -192,7 +212,7 @@ class Recorder:
             error_estimate=float(relative[reached[-1]]) if reached.size else float("nan"),
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
-            last_cycle=float("nan") if self._last is None else min(self._last[0], float(self.cycles[-1])),
+            last_cycle=float("nan") if self.last is None else min(self.last[0], float(self.cycles[-1])),
             **kept,
         )
 
@@ -206,9 +226,9 @@ def _held(difference: FloatArray) -> FloatArray:
 
 
 def _before(cycles: FloatArray, met: Sequence[tuple[float, float]]) -> FloatArray:
-    """Largest of the differences met since a share of each count; 0 where there is none."""
+    """Largest of the differences met since a fraction of each count; 0 where there is none."""
     at, differences = (np.array(values, dtype=float) for values in (zip(*met, strict=True) if met else ((), ())))
-    first, last = np.searchsorted(at, NEAR * cycles, "left"), np.searchsorted(at, cycles, "right")
+    first, last = np.searchsorted(at, RESULTS.crossing_window * cycles, "left"), np.searchsorted(at, cycles, "right")
     return np.array([differences[one:other].max(initial=0.0) for one, other in zip(first, last, strict=True)])
 
 
@@ -219,11 +239,26 @@ def depth_within(
     after: tuple[FloatArray, FloatArray],
     smooth: bool,
 ) -> FloatArray:
-    """Depth (n, n_contact), m, at fractions (n,) of a step of so many cycles.
+    """Worn depth within a step.
 
-    before, after: depth, m, and wear rate, m per cycle, (n_contact,) at its ends. Linear, or smooth: Hermite's cubic
-    with slopes that are cut so that wear never falls; a cubic is monotone where both slopes are at most three times
-    the mean one (Fritsch and Carlson 1980).
+    Linear, or smooth: Hermite's cubic with slopes that are cut so that wear never falls; a cubic is monotone where both
+    slopes are at most three times the mean one (Fritsch and Carlson 1980).
+
+    Parameters
+    ----------
+    fraction
+        (n,), of the step.
+    length
+        Of the step, cycles.
+    before, after
+        Depth, m, and wear rate, m per cycle, both (n_contact,), at the ends of the step.
+    smooth
+        Whether the cubic is taken.
+
+    Returns
+    -------
+    FloatArray
+        (n, n_contact), m.
     """
     s = fraction[:, None]
     grown = after[0] - before[0]

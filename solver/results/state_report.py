@@ -63,7 +63,17 @@ def report_state(
     slip_work_error: FloatArray,
     loops: tuple[int, ...] = (),
 ) -> StateReport:
-    """Pressures, slip and responses of a converged state. loops: pairs whose fretting loops are reported, too."""
+    """Pressures, slip and responses of a converged state.
+
+    Parameters
+    ----------
+    joint, evaluation, certificate
+        The joint, its state, and what this violates.
+    slip_work_error
+        (n_contact,), N m, what the slip work is wrong by for want of harmonics.
+    loops
+        Pairs whose fretting loops are reported, too.
+    """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     return StateReport(

@@ -5,7 +5,7 @@ With w = h_n / h_(n-1), the ratio of two steps, and the wear rate g = dW/dt of E
     W_(n+1) = W_n + w^2 / (1 + 2 w) (W_n - W_(n-1)) + (1 + w) / (1 + 2 w) h_n g(W_(n+1)),
 
 which is an implicit Euler step from a depth that is already worn and with a shorter h, so that a step costs one balance
-like any other, Eq. (24). It is L-stable for equal steps and zero-stable as long as w < 1 + sqrt(2); both shares are
+like any other, Eq. (24). It is L-stable for equal steps and zero-stable as long as w < 1 + sqrt(2); both factors are
 positive, so that wear never falls. The local error follows from the difference to an explicit formula of the same order
 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, III.5; Gresho, Lee, Sani 1980):
 
@@ -22,7 +22,7 @@ is interpolated, and runs that differ in k_w alone are the same trajectory.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -31,45 +31,47 @@ from solver.harmonic_balance.converged import PathPoint, final_history, vibratio
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.solve_balance import solve_balance
-from solver.wear.trajectory import RESOLUTION, Trajectory
+from solver.packing import attributes, set_attributes
+from solver.wear.options import WEAR
+from solver.wear.trajectory import Trajectory
 
-SHARE = 0.2  # of rtol, for the step; an error is judged by what it has worn, or would have worn at the mean rate so far
-LONGEST_RATIO = 2.0  # of two steps
-SHORTEST_RATIO = 0.2
-SAFETY = 0.85
-CAREFUL = 0.8  # a step that was refused is cut by at least so much
-FIRST = 0.05  # of the explicit step limit: the first step, before anything is known of the error
-FIRST_DEPTH = 0.01  # of the largest relative motion: what it wears at most
-ITERATIONS = 10  # of a step: one that takes more is halved
-SHORTEST = 1e-4  # of the first step
-ZERO_STABLE = 2.4  # ratio of two steps below 1 + sqrt(2)
+ZERO_STABLE = 1.0 + np.sqrt(2.0)
+"""Ratio of two steps up to which errors do not grow from step to step, in theory."""
 
-_CARRIED = ("error", "_length", "_shortest", "_before")
+
+class AdaptiveState(TypedDict):
+    """What goes on from step to step: attributes of `AdaptiveSteps`."""
+
+    error: float
+    length: float
+    shortest: float
+    before: tuple[float, FloatArray] | None
 
 
 @dataclass
 class AdaptiveSteps:
     """Steps of a trajectory with a relative error of the worn volume near `rtol`.
 
-    error: estimated error of the last step, as worn volume, m3.
+    error: estimated error of the last step, as worn volume, m3. length: of the next step, cycles. shortest: the same at
+    least. before: length of the last step, cycles, and depth (n_contact,) at its start, m; None where there is none.
     """
 
     trajectory: Trajectory
     rtol: float
     error: float = field(init=False, default=0.0)
-    _length: float = field(init=False)
-    _shortest: float = field(init=False, repr=False)
-    _before: tuple[float, FloatArray] | None = field(init=False, default=None, repr=False)
+    length: float = field(init=False)
+    shortest: float = field(init=False, repr=False)
+    before: tuple[float, FloatArray] | None = field(init=False, default=None, repr=False)
 
     def __post_init__(self) -> None:
-        way = self.trajectory
-        fastest = float(way.rate().max(initial=0.0))
-        self._length = 1.0
+        trajectory = self.trajectory
+        fastest = float(trajectory.rate().max(initial=0.0))
+        self.length = 1.0
         if fastest > 0.0:
-            moved = float(np.abs(way.point.evaluation.displacement_h[:, :, 1:]).max())
+            moved = float(np.abs(trajectory.point.evaluation.displacement_h[:, :, 1:]).max())
             # the limit is far off where next to nothing slips
-            self._length = min(FIRST * way.step_limit, FIRST_DEPTH * moved / fastest)
-        self._shortest = SHORTEST * self._length
+            self.length = min(WEAR.first_step * trajectory.step_limit, WEAR.first_depth * moved / fastest)
+        self.shortest = WEAR.shortest_slow_step * self.length
 
     def advance(self) -> tuple[bool, float]:
         """One step that is accurate enough. Whether the branch goes on, and the length of the step that was tried.
@@ -77,83 +79,90 @@ class AdaptiveSteps:
         Steps are not cut below half the resolution of jumps: where the vibration changes over one of that length, or
         none is found, an Euler step finds out whether the branch ends there.
         """
-        way = self.trajectory
+        trajectory = self.trajectory
         while True:
-            length, shortest = self._length, max(0.5 * RESOLUTION * way.cycle, self._shortest)
+            length, shortest = self.length, max(0.5 * WEAR.fold_resolution * trajectory.cycle, self.shortest)
             tried = self._attempt(length)
-            shorter = 0.25
+            shorter = WEAR.smallest_step_ratio
             if tried is not None:
                 ratio, point, error = tried
+                wanted = WEAR.step_safety / np.sqrt(max(ratio, 1e-12))
                 # down there the wear rate has a corner, or the branch ends, which shows in the vibration
-                calm = vibration_change(way.point.evaluation, point.evaluation) < CONTINUATION.smooth_change
+                calm = vibration_change(trajectory.point.evaluation, point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
                     self._accept(point, length)
                     self.error = error
-                    self._length = length * float(np.clip(SAFETY / np.sqrt(max(ratio, 1e-12)), CAREFUL, LONGEST_RATIO))
+                    self.length = length * float(np.clip(wanted, WEAR.refused_step_ratio, WEAR.largest_step_ratio))
                     return True, length
-                shorter = float(np.clip(SAFETY / np.sqrt(max(ratio, 1e-12)), SHORTEST_RATIO, CAREFUL))
+                shorter = float(np.clip(wanted, WEAR.smallest_step_ratio, WEAR.refused_step_ratio))
             if length <= shortest:
-                rate, depth = way.rate(), way.point.evaluation.wear_depth
-                arrived = way.advance(way.cycle + length)
-                self.error = 0.5 * length * float(np.abs(way.rate() - rate) @ way.joint.contact.area)
-                self._before, self._length = (length, depth), length
+                rate, depth = trajectory.rate(), trajectory.point.evaluation.wear_depth
+                arrived = trajectory.advance(trajectory.cycle + length)
+                self.error = 0.5 * length * float(np.abs(trajectory.rate() - rate) @ trajectory.joint.contact.area)
+                self.before, self.length = (length, depth), length
                 return arrived, length
-            self._length = max(shorter * length, 0.999 * shortest)
+            self.length = max(shorter * length, 0.999 * shortest)
 
     def follow(self, length: float) -> bool:
         """One step of a given length, however wrong it is; False where none is found."""
-        if self._before is not None and length > ZERO_STABLE * self._before[0]:
-            self._before = None
+        if self.before is not None and length > ZERO_STABLE * self.before[0]:
+            self.before = None
         tried = self._attempt(length)
         if tried is None:
             return False
         self._accept(tried[1], length)
         return True
 
-    def carried(self) -> dict[str, Any]:
+    def state_dict(self) -> AdaptiveState:
         """What goes on from step to step, to be packed."""
-        return {name: getattr(self, name) for name in _CARRIED}
+        return attributes(self, AdaptiveState)
 
-    def take_up(self, carried: dict[str, Any]) -> None:
-        """Go on from what another one has carried so far."""
-        for name in _CARRIED:
-            setattr(self, name, carried[name])
+    def load_state(self, state: AdaptiveState) -> None:
+        """Go on from the state of another one."""
+        set_attributes(self, state)
 
     def restart(self) -> None:
         """What came before tells nothing of what follows: behind a jump."""
-        self._before = None
+        self.before = None
 
     def _attempt(self, length: float) -> tuple[float, PathPoint, float] | None:
         """Error of a step over what is allowed, its end, and its error as worn volume; None where it is not found."""
-        way = self.trajectory
-        depth, rate, area = way.point.evaluation.wear_depth, way.rate(), way.joint.contact.area
-        base, share, grown = depth, 1.0, np.zeros_like(depth)
-        if self._before is not None:
-            ratio = length / self._before[0]
-            grown = depth - self._before[1]
+        trajectory = self.trajectory
+        depth, rate, area = trajectory.point.evaluation.wear_depth, trajectory.rate(), trajectory.joint.contact.area
+        base, factor, grown = depth, 1.0, np.zeros_like(depth)
+        if self.before is not None:
+            ratio = length / self.before[0]
+            grown = depth - self.before[1]
             base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
-            share = (1.0 + ratio) / (1.0 + 2.0 * ratio)
-        gain = share * length * way.wear_coefficient / area
-        balance = Balance(way.joint, way.point.history, base, gain)
-        start = way.predicted(balance, length)
-        result = solve_balance(balance, start, way.solver, way.case.settings.tolerance, way.effort, ITERATIONS)
+            factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
+        gain = factor * length * trajectory.wear_coefficient / area
+        balance = Balance(trajectory.joint, trajectory.point.history, base, gain)
+        start = trajectory.predicted(balance, length)
+        result = solve_balance(
+            balance,
+            start,
+            trajectory.solver,
+            trajectory.case.settings.tolerance,
+            trajectory.effort,
+            WEAR.step_iterations,
+        )
         if not result.converged:
             return None
         new = result.evaluation
-        new_rate = way.wear_coefficient / area * new.slip_work
-        if self._before is None:
+        new_rate = trajectory.wear_coefficient / area * new.slip_work
+        if self.before is None:
             error = 0.5 * length * (new_rate - rate)
         else:
             explicit = depth + (1.0 + ratio) * length * rate - ratio**2 * grown
             own, other = (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio)), (1.0 + 1.0 / ratio) / 6.0
             error = own / (own + other) * (new.wear_depth - explicit)
         worn, before = float(new.wear_depth @ area), float(depth @ area)
-        allowed = SHARE * self.rtol * max(worn - before, worn * length / (way.cycle + length))
+        allowed = WEAR.step_error_fraction * self.rtol * max(worn - before, worn * length / (trajectory.cycle + length))
         size = float(np.abs(error) @ area)
         point = PathPoint(0.0, new, final_history(balance, new))
         return (size / allowed if allowed > 0.0 else 0.0), point, size
 
     def _accept(self, point: PathPoint, length: float) -> None:
         depth = self.trajectory.point.evaluation.wear_depth
-        self._before = (length, depth)
+        self.before = (length, depth)
         self.trajectory.accept(point, length)

@@ -1,29 +1,55 @@
-"""What a slow step is solved for: the balance at a share of it, with depths that are given or grow with the motion."""
+"""What an Euler step is solved for: the balance at a fraction of it, with depths that are given or that grow."""
 
 from __future__ import annotations
 
 from solver.harmonic_balance.converged import BalanceAt
-from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
+from solver.settings import Scheme
 from solver.structure.joint import Joint
 
 
 def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
-    """Depths (n_contact,), m, independent of the motion: from `before` at share 0 to `after` at 1, Eqs. (20), (23)."""
+    """Depths (n_contact,), m, held: from `before` at fraction 0 of the step to `after` at 1, Eqs. (20), (23)."""
 
-    def balance_at(share: float, history: FloatArray) -> Balance:
-        return Balance.frozen(joint, history, before + share * (after - before))
+    def balance_at(fraction: float, history: FloatArray) -> Balance:
+        return Balance.frozen(joint, history, before + fraction * (after - before))
 
     return balance_at
 
 
 def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray) -> BalanceAt:
-    """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24), (25).
+    """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24) to (26).
 
     gain: of the whole step, `h k_w / alpha`.
     """
 
-    def balance_at(share: float, history: FloatArray) -> Balance:
-        return Balance(joint, history, before, share * gain)
+    def balance_at(fraction: float, history: FloatArray) -> Balance:
+        return Balance(joint, history, before, fraction * gain)
 
     return balance_at
+
+
+def euler_step(joint: Joint, scheme: Scheme, before: Evaluation, length: float, wear_coefficient: float) -> BalanceAt:
+    """What a step from a state is solved for: Eqs. (20), (23) if explicit, else Eqs. (24) to (26).
+
+    Parameters
+    ----------
+    joint, before
+        The joint and its state at the start of the step.
+    scheme
+        The adaptive scheme takes implicit Euler steps.
+    length
+        h, cycles.
+    wear_coefficient
+        k_w, 1/Pa.
+
+    Returns
+    -------
+    BalanceAt
+        The balance at a fraction of the step, for a start history.
+    """
+    area, depth = joint.contact.area, before.wear_depth
+    if scheme == "explicit":
+        return held_wear(joint, depth, depth + length * (wear_coefficient / area * before.slip_work))
+    return implicit_wear(joint, depth, length * wear_coefficient / area)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,13 +18,9 @@ from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.bdf2 import AdaptiveSteps
 from solver.wear.companion import Companion
+from solver.wear.options import WEAR
 from solver.wear.step_limit import StepTooLongError
 from solver.wear.trajectory import Trajectory
-
-MOST_ITERATIONS = 3000  # of Newton's method, and some more a step: a march that takes more leads nowhere
-STEP_ITERATIONS = 10
-REFRESH = 100  # iterations after which the factorisation kept from step to step is given up, so that a march can be
-# kept on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing
 
 
 def march_wear(
@@ -42,14 +37,37 @@ def march_wear(
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> WearHistory:
-    """Wear history of one point of a study.
+    """Wear history of one point of a study, Eqs. (20) to (26).
 
-    wear_coefficient: 1/Pa. step: h, cycles; the adaptive scheme chooses its own steps. cycles (n_output,): ascending
-    counts to report, the first 0; between two steps they are interpolated, and the last step is shortened to end on the
-    last of them. largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
-    loops: pairs whose fretting loops are kept at every count.
-    keep: called now and then with the progress of the march. resume: such progress of a march with the same arguments,
-        from which this one goes on: its history is the same to the last bit, but for `run_time`.
+    Parameters
+    ----------
+    model, friction_coefficient, start
+        The case, and the unworn state that it starts from.
+    wear_coefficient
+        k_w, 1/Pa.
+    step
+        h, cycles; the adaptive scheme chooses its own steps.
+    scheme
+        "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.bdf2`).
+    cycles
+        (n_output,), ascending counts to report, the first 0. Between two steps they are interpolated, and the last step
+        is shortened to end on the last of them.
+    settings
+        Harmonics, samples, tolerances, limit of time.
+    largest_depth
+        m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
+    loops
+        Pairs whose fretting loops are kept at every count.
+    keep
+        Called now and then with the progress of the march.
+    resume
+        Such progress of a march with the same arguments, from which this one goes on: its history is the same to the
+        last bit, but for `run_time`.
+
+    Returns
+    -------
+    WearHistory
+        As far as it was computed; its outcome says how it ended. No error is raised for a march that fails.
     """
     started = computing_time()
     recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops))
@@ -69,23 +87,23 @@ def march_wear(
                 companion.begin()
                 recorder.add(0.0, march.report(), wear_coefficient)
         else:
-            n_steps, spent_before, *carried = unpack(resume)
-            march.take_up(carried[0])
-            recorder.take_up(carried[1])
-            companion.take_up(carried[3])
+            n_steps, spent_before, *states = unpack(resume)
+            march.load_state(states[0])
+            recorder.load_state(states[1])
+            companion.load_state(states[3])
             march.effort.deadline -= spent_before
         steps: AdaptiveSteps | FixedSteps = (
             AdaptiveSteps(march, settings.rtol) if scheme == "adaptive" else FixedSteps(march, end, step, largest_depth)
         )
         if resume is not None:
-            steps.take_up(carried[2])
+            steps.load_state(states[2])
         refreshed = march.effort.iterations
         while outcome is Outcome.CONVERGED and march.cycle < end:
             if not march.wears():
                 recorder.add(end, march.report(), wear_coefficient)
                 break
             n_steps += 1
-            if march.effort.iterations > MOST_ITERATIONS + STEP_ITERATIONS * n_steps:
+            if march.effort.iterations > WEAR.march_iterations + WEAR.step_iterations * n_steps:
                 outcome = Outcome.MARCH_FAILED
                 break
             before = march.cycle
@@ -106,13 +124,13 @@ def march_wear(
                 break
             companion.follow(at_once=march.cycle >= end)
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
-            if march.effort.iterations >= refreshed + REFRESH:
+            if march.effort.iterations >= refreshed + WEAR.iterations_per_save:
                 spent = spent_before + computing_time() - started
                 parts = (march, recorder, steps, companion)
-                progress = pack([n_steps, spent, *(part.carried() for part in parts)])
-                # with or without anybody who keeps it, so that all marches take the same way
-                for part, carried in zip(parts, unpack(progress)[2:], strict=True):
-                    part.take_up(carried)
+                progress = pack([n_steps, spent, *(part.state_dict() for part in parts)])
+                # with or without anybody who keeps it, so that all marches go on from the same numbers
+                for part, state in zip(parts, unpack(progress)[2:], strict=True):
+                    part.load_state(state)
                 refreshed = march.effort.iterations
                 if keep is not None:
                     keep(progress)
@@ -132,7 +150,7 @@ def march_wear(
     jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
     n_iterations = march.effort.iterations + companion.effort.iterations
     history = recorder.finish(
-        outcome, jump_cycle, n_iterations, spent, companion.kept, companion.met, companion.start_share
+        outcome, jump_cycle, n_iterations, spent, companion.kept, companion.met, companion.start_error
     )
     if outcome is Outcome.CONVERGED:
         outcome, message = _judge(march, history, companion)
@@ -168,8 +186,9 @@ def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tup
 
 @dataclass
 class FixedSteps:
-    """Explicit or implicit Euler steps of a given length, or of one by the largest-depth rule.
+    """Explicit or implicit Euler steps of a given length, or explicit ones by the largest-depth rule, Eq. (22).
 
+    end: last cycle count. step: h, cycles. largest_depth: m, None where the step is given.
     error: None; that of an Euler step shows in the wear rates at its ends.
     """
 
@@ -182,16 +201,18 @@ class FixedSteps:
     def advance(self) -> tuple[bool, float]:
         """One step: whether the branch goes on, and the length of the step in cycles."""
         before = self.trajectory.cycle
-        planned = self.trajectory.planned_step(self.step, self.largest_depth)
+        planned = self.step
+        if self.largest_depth is not None and self.trajectory.scheme == "explicit":
+            planned = self.largest_depth / float(self.trajectory.rate().max())
         # a remainder below round-off of the count is no step of its own
         reach = self.end if before + planned >= self.end * (1.0 - 1e-12) else before + planned
         return self.trajectory.advance(reach), reach - before
 
-    def carried(self) -> dict[str, Any]:
-        """Nothing."""
+    def state_dict(self) -> dict[str, object]:
+        """Nothing goes on from step to step."""
         return {}
 
-    def take_up(self, carried: dict[str, Any]) -> None:
+    def load_state(self, state: dict[str, object]) -> None:
         """Nothing to go on from."""
 
     def restart(self) -> None:

@@ -1,34 +1,86 @@
-"""Whether a step on the slow time scale is a result: by how much of the preload it moves.
+"""Limits of a step on the slow time scale: where the explicit scheme becomes unstable, and where no step is a result.
 
-Worn depth lets the parts come nearer to each other where it is uniform, and takes the load off a pair where it is not.
-What a step wears is no result where that would move many times all normal forces at once: an explicit step then
-wears by a wear rate that its pairs had long lost, and an implicit one by one that they have only where they are left.
-The share is that of the linear static structure, with the tangents of pairs that slip free: it asks nothing of the
+The explicit limit is predicted from the exact tangents. The wear rate g(W) of the joint falls where wear takes load off
+a pair. An explicit Euler step, Eq. (20), multiplies a disturbance of W by 1 + h dg/dW: it grows where h exceeds 2 / mu,
+mu the largest positive eigenvalue of -dg/dW. With an implicit step the Jacobian of the balance is J_h = J + h Z E G,
+where E puts the depths into the static normal displacements and G dp = dg, and the motion follows the depth as
+dp = -J^-1 Z E dW. So -dg/dW = G J^-1 Z E, whose eigenvalues other than zero are those of J^-1 (J_h - J) / h: no other
+matrix is needed than the two Jacobians.
+
+Whether a step is a result is judged by how much of the preload it moves. Worn depth lets the parts come nearer to each
+other where it is uniform, and takes the load off a pair where it is not. A step is no result where what it wears would
+move many times all normal forces at once: an explicit step then wears by a wear rate that its pairs had long lost, and
+an implicit one by one that they have only where they are left.
+This fraction is that of the linear static structure, with the tangents of pairs that slip free: it asks nothing of the
 vibration, which may change at will where a branch ends, and it is zero where wear does not act back on the joint.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, FloatArray
+from solver.newton.krylov import ritz_values
+from solver.newton.linear_solver import JacobianSolver
 from solver.structure.joint import Joint
+from solver.wear.options import WEAR
 
-LARGEST = (
-    10.0  # of the normal forces, in their norm: with less, the error of the worn volume tells (measured: 27 % with 0.6)
-)
-SURE = 0.5  # of this, with all tangents held: then nothing need be followed
-USEFUL = 0.1  # the same of a step that is advised: the usual one of the dovetail root moves 0.001 to 0.01
+
+def explicit_step_limit(joint: Joint, at: Evaluation, wear_per_work: FloatArray, solver: JacobianSolver) -> float:
+    """Largest stable explicit step of Eq. (20) at a state.
+
+    The eigenvalues are those that Arnoldi's method knows after `arnoldi_products` solves; complex ones count where the
+    real part is the larger one.
+
+    Parameters
+    ----------
+    joint, at
+        The joint and its converged state.
+    wear_per_work
+        (n_contact,), `k_w / alpha`, 1/N.
+    solver
+        Solves with the Jacobian of the state.
+
+    Returns
+    -------
+    float
+        h, cycles; inf where the wear rate falls nowhere.
+    """
+    rate = wear_per_work * at.slip_work
+    if not rate.max(initial=0.0) > 0.0:
+        return float("inf")
+    frozen = Balance.frozen(joint, at.history, at.wear_depth)
+    # a step in which the fastest pair wears as much as the joint moves: both Jacobians differ in more than round-off
+    step = float(np.abs(at.displacement_h).max()) / float(rate.max())
+    plain = frozen.linearise(at)
+    wearing = replace(frozen, wear_gain=step * wear_per_work).linearise(at)
+    shape = at.predicted_h.shape
+
+    def product(vector: FloatArray) -> FloatArray:
+        predicted = vector.reshape(shape)
+        return solver.solve(plain, wearing.apply(predicted) - plain.apply(predicted)).ravel()
+
+    start = product(np.random.default_rng(0).normal(size=at.predicted_h.size))
+    if not np.all(np.isfinite(start)) or not start.any():
+        return float("inf")
+    n_wearing = int(np.count_nonzero(rate))
+    values = ritz_values(product, start, min(WEAR.arnoldi_products, n_wearing))
+    falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
+    # below round-off of the largest there is nothing
+    fastest = float(falling.max(initial=0.0))
+    return 2.0 * step / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
 
 
 class StepTooLongError(Exception):
     """A step wears off so much that its end is no result; what the step would have to be."""
 
 
-def moved_share(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> float:
-    """Share of the mean normal forces, in their norm, that wear down to `wear_depth` (n_contact,), m, moves.
+def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> float:
+    """Fraction of the mean normal forces, in their norm, that wear down to `wear_depth` (n_contact,), m, moves.
 
     before: state at the start of the step. Pairs that are open all period long carry nothing and hold nothing, tangents
     of pairs that slip follow.
@@ -56,17 +108,31 @@ def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[Bo
 
 
 def check_step(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> None:
-    """Raises StepTooLongError where a step of `length` cycles, or a jump, wears down to a depth that is no result.
+    """Refuse a step, or a jump, that wears down to a depth that is no result.
 
-    before: state at the start of the step, at the count `cycle`. wear_depth (n_contact,): m, at its end.
+    Parameters
+    ----------
+    joint, before
+        The joint and its state at the start of the step.
+    wear_depth
+        (n_contact,), m, at the end of the step.
+    cycle, length
+        Count at the start of the step, and its length in cycles.
+
+    Raises
+    ------
+    StepTooLongError
+        With the length of a step that would do.
     """
     normal, _, worn, preload = _parts(joint, before, wear_depth)
-    if np.linalg.norm((joint.structure.static_stiffness @ worn)[normal]) <= SURE * LARGEST * preload:
+    # with all tangents held: then none need be followed
+    held = float(np.linalg.norm((joint.structure.static_stiffness @ worn)[normal]))
+    if held <= WEAR.largest_moved_load * preload:
         return
-    share = moved_share(joint, before, wear_depth)
-    if share > LARGEST:
-        advised = length * USEFUL / share
+    fraction = moved_fraction(joint, before, wear_depth)
+    if fraction > WEAR.largest_moved_load:
+        advised = length * WEAR.advised_moved_load / fraction
         raise StepTooLongError(
-            f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {share:.2g} times the normal"
-            f" forces of the joint: use steps of at most {advised:.2g} cycles"
+            f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
+            f" normal forces of the joint: use steps of at most {advised:.2g} cycles"
         )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
 from solver.accuracy.certificate import Certificate, certify
 from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.options import ACCURACY
 from solver.accuracy.pair_error import slip_work_error
 from solver.accuracy.period_events import lacks_even
 from solver.accuracy.refinement import refine
@@ -20,33 +21,48 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
 from solver.outcome import Outcome
+from solver.packing import attributes, set_attributes
 from solver.results.history import StartState
-from solver.results.oscillation import WearRates
+from solver.results.oscillation import RatesState, WearRates
 from solver.results.state_report import StateReport, report_state
-from solver.settings import Scheme
+from solver.settings import Resolution, Scheme
 from solver.stability.period_doubling import doubles_period
 from solver.structure.joint import Case, Joint
 from solver.wear.branch_loss import state_after_fold, stays
-from solver.wear.euler import held_wear, implicit_wear
-from solver.wear.explicit_limit import explicit_step_limit
-from solver.wear.step_limit import check_step
+from solver.wear.euler import euler_step
+from solver.wear.options import WEAR
+from solver.wear.step_limit import check_step, explicit_step_limit
 
-RESOLUTION = 0.01  # of the cycle count: how exactly the end of a branch is found
-SMALLEST_RESOLUTION = 2.0**-10  # of a step
-JUMPED = 0.05  # relative change of the vibration beyond the end of a branch from which it counts as a jump
-MOST_JUMPS = 12
-JUMP_ITERATIONS = 800  # of the search for the state behind a jump: one that takes more leads nowhere
-ROUND_OFF = 1e-9  # of the wear rate if all pairs slipped as far as they move: less is no wear
-NO_WEAR = 1e-12  # of the same: such a joint sticks
-RECHECK = 0.3  # relative change of the vibration after which errors are estimated again
-RATE_RECHECK = 0.1  # the same of the wear rate, where the worn volume has grown by such a share as well (measured on
-# the dovetail at 211.5 Hz: without it the wear rate is 8 % off on the way where 0.8 % were told)
 
-_CARRIED = (
-    *("cycle", "jump_cycle", "last_change", "unresolved", "jumps", "failure", "step_limit", "largest_rate"),
-    *("estimate", "estimated_for", "estimated_at", "accurate", "slip_work_error", "inaccurate_from", "worst"),
-    *("certificate", "point"),
-)
+class Progress(TypedDict):
+    """What goes on from step to step: attributes of `Trajectory`."""
+
+    cycle: float
+    point: PathPoint
+    certificate: Certificate | None
+    last_change: tuple[float, FloatArray] | None
+    unresolved: float
+    jumps: int
+    jump_cycle: float
+    failure: Outcome
+    step_limit: float
+    largest_rate: float
+    estimate: Estimate
+    estimated_for: FloatArray
+    estimated_at: tuple[float, float]
+    accurate: bool
+    slip_work_error: FloatArray
+    inaccurate_from: float
+    worst: Estimate
+
+
+class TrajectoryState(TypedDict):
+    """The same with the harmonics and samples, Newton iterations so far and wear rates."""
+
+    progress: Progress
+    resolution: Resolution
+    iterations: int
+    rates: RatesState
 
 
 @dataclass
@@ -85,20 +101,22 @@ class Trajectory:
         self.inaccurate_from = float("inf")
         self.worst = NOTHING
 
-    def carried(self) -> dict[str, Any]:
+    def state_dict(self) -> TrajectoryState:
         """What goes on from step to step, to be packed; a factorisation that is kept for the next step is not in it."""
-        values = {name: getattr(self, name) for name in _CARRIED}
-        own = {"resolution": self.case.resolution, "iterations": self.effort.iterations, "rates": self.rates.carried()}
-        return values | own
+        return {
+            "progress": attributes(self, Progress),
+            "resolution": self.case.resolution,
+            "iterations": self.effort.iterations,
+            "rates": self.rates.state_dict(),
+        }
 
-    def take_up(self, carried: dict[str, Any]) -> None:
-        """Go on from what another one has carried so far, without its kept factorisation."""
-        for name in _CARRIED:
-            setattr(self, name, carried[name])
-        self.rates.take_up(carried["rates"])
-        self.case = self.case.at(carried["resolution"])
+    def load_state(self, state: TrajectoryState) -> None:
+        """Go on from the state of another one, without its kept factorisation."""
+        set_attributes(self, state["progress"])
+        self.rates.load_state(state["rates"])
+        self.case = self.case.at(state["resolution"])
         self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        self.effort.iterations = carried["iterations"]
+        self.effort.iterations = state["iterations"]
         self.solver = JacobianSolver()
 
     def begin(self) -> Outcome:
@@ -125,7 +143,7 @@ class Trajectory:
         accurate, anew = True, False
         automatic = self.case.settings.harmonics == "auto"
         unseen = automatic and lacks_even(self.case.resolution.orders, self.point.evaluation)
-        vibrates_otherwise = changed > RECHECK * float(np.linalg.norm(self.estimated_for[:, 1:]))
+        vibrates_otherwise = changed > ACCURACY.vibration_recheck * float(np.linalg.norm(self.estimated_for[:, 1:]))
         if vibrates_otherwise or unseen or self._wears_otherwise():
             accurate, anew = self._refine(), True
         holds = self._certify()
@@ -140,13 +158,14 @@ class Trajectory:
                 self.worst = self.estimate
         if not holds:
             return Outcome.CERTIFICATE_FAILED
-        return self._doubling() if anew else Outcome.CONVERGED
+        return self._period_doubling() if anew else Outcome.CONVERGED
 
     def _wears_otherwise(self) -> bool:
         """Whether so much has worn at another rate that errors may have become others, however alike the vibration."""
         (rate, volume), (rate_then, volume_then) = self._worn(), self.estimated_at
         return (
-            abs(rate - rate_then) > RATE_RECHECK * max(rate, rate_then) and volume - volume_then > RATE_RECHECK * volume
+            abs(rate - rate_then) > WEAR.rate_recheck * max(rate, rate_then)
+            and volume - volume_then > WEAR.rate_recheck * volume
         )
 
     def _worn(self) -> tuple[float, float]:
@@ -186,41 +205,29 @@ class Trajectory:
         return report_state(self.joint, self.point.evaluation, self.certificate, self.slip_work_error, self.loops)
 
     def rate(self) -> FloatArray:
-        """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21)."""
+        """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21), (25)."""
         return self.wear_coefficient / self.joint.contact.area * self.point.evaluation.slip_work
 
     def wears(self) -> bool:
         """Whether anything wears at all, more than round-off of the slip that the static load has caused."""
-        return bool(self.rate() @ self.joint.contact.area > NO_WEAR * self.largest_rate)
-
-    def planned_step(self, step: float, largest_depth: float | None) -> float:
-        """Step h in cycles: as given, or by the largest-depth rule, Eq. (22), over the pairs that wear."""
-        if largest_depth is None or self.scheme != "explicit":
-            return step
-        return largest_depth / float(self.rate().max())
+        return bool(self.rate() @ self.joint.contact.area > WEAR.no_wear * self.largest_rate)
 
     def advance(self, reach: float) -> bool:
         """One Euler step to the cycle count `reach`; False where the branch ends before: then the step has gone as far
-        as there is a stable state, to within `RESOLUTION`, and `jump` goes on.
+        as there is a stable state, to within `fold_resolution`, and `jump` goes on.
         """
         length = reach - self.cycle
-        balance_at = self._step(length)
+        balance_at = euler_step(self.joint, self.scheme, self.point.evaluation, length, self.wear_coefficient)
         base = PathPoint(0.0, self.point.evaluation, self.point.history)
         if (found := self._extrapolated(balance_at(1.0, base.history), length)) is not None:
             self.take(PathPoint(1.0, found, base.history), balance_at, length)
             return True
-        # the end of a branch is to be known to a share of the count; in the first step to that of the step
-        resolution = RESOLUTION * (self.cycle if self.cycle > 0.0 else length) / length
-        shortest = max(min(resolution, CONTINUATION.shortest_fraction), SMALLEST_RESOLUTION)
+        # the end of a branch is to be known to a fraction of the count; in the first step to that of the step
+        resolution = WEAR.fold_resolution * (self.cycle if self.cycle > 0.0 else length) / length
+        shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
+        tolerance = self.case.settings.tolerance
         last, arrived = follow_naturally(
-            balance_at,
-            base,
-            1.0,
-            self.solver,
-            self.case.settings.tolerance,
-            self.effort,
-            keep_history=True,
-            shortest=shortest,
+            balance_at, base, 1.0, self.solver, tolerance, self.effort, keep_history=True, shortest=shortest
         )
         if not stays(self.joint, last.evaluation, self.solver):
             # where it has become unstable is not known: the jump is made from the start of the step
@@ -234,14 +241,14 @@ class Trajectory:
         """The branch has ended at the current count, in a step of the given length: land on another stable state a
         little beyond; False where there is none. Raises StepTooLongError.
         """
-        if self.jumps >= MOST_JUMPS:
+        if self.jumps >= WEAR.most_jumps:
             return False
         beyond = min(2.0 * self.unresolved, length)
         worn = self.point.evaluation.wear_depth + beyond * self.rate()
         if self.bounded:
             check_step(self.joint, self.point.evaluation, worn, self.cycle, beyond)
         self.last_change = None
-        self.effort.limit = self.effort.iterations + JUMP_ITERATIONS
+        self.effort.limit = self.effort.iterations + WEAR.jump_iterations
         landed = self._land(beyond, worn)
         self.effort.limit = float("inf")
         return landed
@@ -252,7 +259,7 @@ class Trajectory:
         if not isinstance(landed, PathPoint):
             self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
             return False
-        if vibration_change(self.point.evaluation, landed.evaluation) > JUMPED:
+        if vibration_change(self.point.evaluation, landed.evaluation) > WEAR.jump_change:
             # corners at which the branch folds back a little are no jumps, and there may be many of them
             self.jumps += 1
             self.jump_cycle = self.cycle if np.isnan(self.jump_cycle) else self.jump_cycle
@@ -264,18 +271,18 @@ class Trajectory:
         """Whether the current state is one that the vibration stays at."""
         if not stays(self.joint, self.point.evaluation, self.solver):
             return Outcome.UNSTABLE
-        return self._doubling()
+        return self._period_doubling()
 
-    def _doubling(self) -> Outcome:
+    def _period_doubling(self) -> Outcome:
         doubled = doubles_period(self.case, self.joint, self.point.evaluation, self.effort)
         return Outcome.PERIOD_DOUBLED if doubled else Outcome.CONVERGED
 
     def oscillates(self) -> bool:
         """Whether the wear rate of the joint or of a pair went up and down from step to step."""
-        return self.rates.oscillate(ROUND_OFF * self.largest_rate)
+        return self.rates.oscillate(WEAR.oscillation_round_off * self.largest_rate)
 
     def take(self, point: PathPoint, balance_at: BalanceAt, length: float) -> None:
-        """Make the state at a share of a step the current one. Raises StepTooLongError."""
+        """Make the state at a fraction of a step the current one. Raises StepTooLongError."""
         ahead = point.parameter * length
         if self.bounded:
             check_step(self.joint, self.point.evaluation, point.evaluation.wear_depth, self.cycle, ahead)
@@ -300,16 +307,8 @@ class Trajectory:
         moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
         self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
         if np.isnan(self.step_limit) and self.wears():
-            balance = Balance.frozen(self.joint, self.point.evaluation.history, self.point.evaluation.wear_depth)
             per_work = self.wear_coefficient / self.joint.contact.area
-            self.step_limit = explicit_step_limit(balance, self.point.evaluation, per_work, self.solver)
-
-    def _step(self, length: float) -> BalanceAt:
-        """Where a step of this length leads, Eqs. (21) and (24)."""
-        before = self.point.evaluation.wear_depth
-        if self.scheme == "explicit":
-            return held_wear(self.joint, before, before + length * self.rate())
-        return implicit_wear(self.joint, before, length * self.wear_coefficient / self.joint.contact.area)
+            self.step_limit = explicit_step_limit(self.joint, self.point.evaluation, per_work, self.solver)
 
     def predicted(self, balance: Balance, length: float) -> FloatArray:
         """Predicted force (n_rel, m), N, to begin a step with: extrapolated over the last step, or that of now."""
@@ -326,5 +325,6 @@ class Trajectory:
         start = self.predicted(balance, length)
         if start is self.point.evaluation.predicted_h:
             return None
-        result = solve_balance(balance, start, self.solver, self.case.settings.tolerance, self.effort, 8)
+        most = WEAR.extrapolated_iterations
+        result = solve_balance(balance, start, self.solver, self.case.settings.tolerance, self.effort, most)
         return result.evaluation if result.converged else None

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.loading_history import sweep as sweeps
+from solver.loading_history import sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.results.history import StartState, WearHistory
@@ -71,13 +71,13 @@ def compare(name: str, history: WearHistory, truth: WearHistory, seconds: float)
 def dovetail_starts(model: ReducedModel, frequencies: tuple[float, ...], fine: bool) -> list[StartState]:
     """Start states with automatic settings, or for the truth."""
     settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3) if fine else SolverSettings()
-    before = sweeps.SMALLEST_CHANGE, sweeps.LARGEST_CHANGE
+    before = sweep.LOADING
     if fine:
-        sweeps.SMALLEST_CHANGE = sweeps.LARGEST_CHANGE = 0.02
+        sweep.LOADING = replace(before, smallest_history_change=0.02, largest_history_change=0.02)
     try:
         found = dict(follow_branch(model, 0.5, 0.5, np.array(frequencies), "up", settings))
     finally:
-        sweeps.SMALLEST_CHANGE, sweeps.LARGEST_CHANGE = before
+        sweep.LOADING = before
     return [found[place] for place in range(len(frequencies))]
 
 

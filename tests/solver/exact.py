@@ -8,8 +8,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from solver.accuracy import refinement as adapt
 from solver.accuracy.error_estimate import Estimate
+from solver.accuracy.refinement import refine
 from solver.continuation.arc_length import follow_arc
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import follow_naturally
@@ -134,7 +134,7 @@ def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
     effort = Effort()
     case = build_case(exact.model, exact.friction, exact.omega, settings)
     point = first_found(exact, case, effort)
-    refined = adapt.refine(case, exact.omega, exact.amplitude, point, effort)
+    refined = refine(case, exact.omega, exact.amplitude, point, effort)
     joint = refined.case.joint(exact.omega, exact.amplitude)
     evaluation = refined.point.evaluation
     found = to_complex(joint.structure.response_h(joint.to_relative(evaluation.displacement_h)))[:, 0]

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.accuracy.certificate import LIMITS, Certificate, certify
+from solver.accuracy.certificate import Certificate, certify
+from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ReducedModel
 from solver.settings import SolverSettings
@@ -225,9 +226,9 @@ def test_pairs_out_of_reach_have_nothing_to_violate() -> None:
     assert certificate.penetration == certificate.tension == certificate.cone_violation == certificate.drift == 0.0
 
 
-@pytest.mark.parametrize("name", ["residual", *LIMITS])
+@pytest.mark.parametrize("name", ["residual", *ACCURACY.violation_limits])
 def test_each_number_is_judged_and_named(name: str) -> None:
-    limit = LIMITS.get(name, 2.0 * TOLERANCE)
+    limit = ACCURACY.violation_limits.get(name, 2.0 * TOLERANCE)
     assert GOOD.holds(TOLERANCE)
     assert replace(GOOD, **{name: limit}).holds(TOLERANCE)
     for wrong in (1.01 * limit, float("inf"), float("nan")):
@@ -235,13 +236,16 @@ def test_each_number_is_judged_and_named(name: str) -> None:
         assert not broken.holds(TOLERANCE)
         assert set(broken.failures(TOLERANCE)) == {name}
         assert f"{wrong:.2g}" in broken.sentence(TOLERANCE)
-    sentences = {replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0] for other in ("residual", *LIMITS)}
-    assert len(sentences) == 1 + len(LIMITS)
+    sentences = {
+        replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0]
+        for other in ("residual", *ACCURACY.violation_limits)
+    }
+    assert len(sentences) == 1 + len(ACCURACY.violation_limits)
 
 
 def test_what_others_fill_in_is_open() -> None:
     names = [field.name for field in fields(Certificate)]
-    assert names == ["residual", *LIMITS, "response_error", "wear_rate_error", "stable"]
+    assert names == ["residual", *ACCURACY.violation_limits, "response_error", "wear_rate_error", "stable"]
     certificate = certify(*random_state(1))
     assert np.isnan(certificate.response_error)
     assert np.isnan(certificate.wear_rate_error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -161,7 +162,7 @@ def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkey
             estimated.append(float(given[3].evaluation.slip_work.sum()))
             return refine(*given)
 
-        monkeypatch.setattr(trajectory, "RATE_RECHECK", change)
+        monkeypatch.setattr(trajectory, "WEAR", replace(trajectory.WEAR, rate_recheck=change))
         monkeypatch.setattr(trajectory, "refine", note)
         model, state = start()
         march_wear(model, 0.5, state, WEAR, 1000.0, "implicit", CYCLES, GIVEN)

@@ -19,7 +19,7 @@ from solver.structure.fourier import change_orders
 from solver.structure.joint import Case
 from tests.random_scenes import random_scene
 from tests.solver.models import OMEGA, random_model
-from tests.solver.test_adapt import FRICTION, SLIDER_OMEGA, SLIPPING, response, slider, solved_at, started
+from tests.solver.test_refinement import FRICTION, SLIDER_OMEGA, SLIPPING, response, slider, solved_at, started
 
 RICH = Resolution(all_orders(9), 256)
 THROWN_OFF = 53  # seed: a warm start with more harmonics fails
@@ -52,7 +52,7 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) ->
 def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
-    found = Level(case, case.joint(omega, amplitude), point).led_to(RICH, Effort())
+    found = Level(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Effort())
     assert found is not None
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(found.case, omega, amplitude, found.point)
@@ -73,14 +73,14 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
 
 def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, attempts = random_scene(THROWN_OFF), []
-    led_to = Level.led_to
+    by_homotopy = Level.by_homotopy
 
     def noted(level: Level, resolution: Resolution, effort: Effort) -> Level | None:
-        found = led_to(level, resolution, effort)
+        found = by_homotopy(level, resolution, effort)
         attempts.append(found is not None)
         return found
 
-    monkeypatch.setattr(Level, "led_to", noted)
+    monkeypatch.setattr(Level, "by_homotopy", noted)
     frequencies = np.array([scene.frequency_hz])
     states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
     assert next(states)[1].outcome is Outcome.CONVERGED

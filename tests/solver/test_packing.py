@@ -9,8 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history import start_states as continuation
-from solver.loading_history import sweep as sweeps
+from solver.loading_history import start_states, sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -20,10 +19,10 @@ from solver.settings import Resolution, Scheme, SolverSettings
 from solver.wear import march
 from solver.wear.march import march_wear
 from tests.solver.models import branch_states, dovetail, scene
-from tests.solver.test_explicit_limit import WEAR as SEESAW_WEAR
-from tests.solver.test_explicit_limit import exact_limit, seesaw
-from tests.solver.test_jump import start as impacting_start
-from tests.solver.test_jump import worn_wall
+from tests.solver.test_branch_loss import start as impacting_start
+from tests.solver.test_branch_loss import worn_wall
+from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR
+from tests.solver.test_explicit_step_limit import exact_limit, seesaw
 
 AUTO = SolverSettings(rtol=3e-2)
 MOST_STOPS = 3
@@ -105,7 +104,7 @@ def from_every_stop(
 
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("explicit", 800.0), ("adaptive", 1.0)])
 def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "REFRESH", 8)
+    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=8))
     (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
     whole, kept = from_every_stop(dovetail(7), 0.5, start, 1.1e-11, step, scheme, 8e3, AUTO)
     assert whole.outcome is Outcome.CONVERGED
@@ -115,15 +114,15 @@ def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkey
 
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
 def test_a_march_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "REFRESH", 30)
+    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=30))
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, step, scheme, 1000.0, settings)
-    cycles = [unpack(progress)[2]["cycle"] for progress in kept]
+    cycles = [unpack(progress)[2]["progress"]["cycle"] for progress in kept]
     assert min(cycles) < whole.jump_cycle < max(cycles)
 
 
 def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "REFRESH", 1)
+    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=1))
     monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 100)
     (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
     step = 1.2 * exact_limit()
@@ -144,27 +143,27 @@ def test_a_start_state_comes_back() -> None:
     assert_same(unpack(pack(failed)), failed)
 
 
-@pytest.mark.parametrize("sweep", ["up", "down"])
-def test_a_sweep_goes_on_to_the_same_numbers(sweep: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""
-    monkeypatch.setattr(continuation, "KEEP", 1)
+    monkeypatch.setattr(start_states, "LOADING", replace(start_states.LOADING, iterations_per_report=1))
     for model, friction, amplitude, frequencies in (
         (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
         (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
     ):
-        monkeypatch.setattr(sweeps, "COSTLY", 200)
+        monkeypatch.setattr(sweep, "ACCURACY", replace(sweep.ACCURACY, costly_unknowns=200))
         kept: list[tuple[frozenset[int], Packed]] = []
         whole: dict[int, StartState] = {}
 
         def note(progress: Packed, kept: list = kept, whole: dict = whole) -> None:
             kept.append((frozenset(whole), progress))
 
-        for index, start in follow_branch(model, friction, amplitude, frequencies, sweep, AUTO, keep=note):
+        for index, start in follow_branch(model, friction, amplitude, frequencies, direction, AUTO, keep=note):
             whole[index] = start
         assert len(kept) >= 2
         for done, progress in kept[:: max(1, len(kept) // 2)]:
             left = [index for index in range(frequencies.size) if index not in done]
-            again = follow_branch(model, friction, amplitude, frequencies[left], sweep, AUTO, resume=progress)
+            again = follow_branch(model, friction, amplitude, frequencies[left], direction, AUTO, resume=progress)
             for place, start in again:
                 wanted = whole[left[place]]
                 assert_same(replace(start, state=None, coarse=None), replace(wanted, state=None, coarse=None))

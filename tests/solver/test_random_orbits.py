@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.accuracy.harmonic_levels import LADDER, steps_to_see
+from solver.accuracy.harmonic_levels import levels_to_see
+from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import shortest_contact
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.outcome import Outcome
@@ -112,7 +113,7 @@ def test_a_pair_that_hardly_touches_is_no_short_contact() -> None:
 
 def test_harmonics_that_see_a_short_contact_are_far_up() -> None:
     one = Resolution((1,), 64)
-    assert steps_to_see(one, 1.0, 2) == 2
+    assert levels_to_see(one, 1.0, 2) == 2
     # half a period of the highest harmonic: 27 of them for a contact of 2 % of the period
-    assert LADDER[steps_to_see(one, 0.02, 2)] == 27
-    assert steps_to_see(one, 1e-6, 2) == len(LADDER) - 1
+    assert ACCURACY.harmonic_levels[levels_to_see(one, 0.02, 2)] == 27
+    assert levels_to_see(one, 1e-6, 2) == len(ACCURACY.harmonic_levels) - 1

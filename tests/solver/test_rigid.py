@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.accuracy.harmonic_reach import reach, reaches
+from solver.accuracy.harmonic_levels import reach, reaches
 from solver.accuracy.level import Level
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver.loading_history import sweep as sweeps
+from solver.loading_history import sweep as sweep_module
+from solver.loading_history.options import LOADING
 from solver.loading_history.origin import find_origin
-from solver.loading_history.start_states import _Line, follow_branch
+from solver.loading_history.start_states import FrequencySweep, follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -62,8 +64,8 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
     settings = SolverSettings(harmonics=9, samples=128)
     found = {}
     for change in (0.2, 0.01):
-        monkeypatch.setattr(sweeps, "SMALLEST_CHANGE", change)
-        monkeypatch.setattr(sweeps, "LARGEST_CHANGE", change)
+        options = replace(LOADING, smallest_history_change=change, largest_history_change=change)
+        monkeypatch.setattr(sweep_module, "LOADING", options)
         found[change] = starts([213.25], settings=settings)[213.25]
     coarse, fine = found[0.2], found[0.01]
     assert coarse.coarse is not None
@@ -79,7 +81,7 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
 
 @pytest.mark.parametrize(("settings", "same"), [(AUTOMATIC, False), (SolverSettings(5, 64), True)])
 def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings: SolverSettings, same: bool) -> None:
-    line = _Line(dovetail(13), 0.5, 0.5, "up", settings)
+    line = FrequencySweep(dovetail(13), 0.5, 0.5, "up", settings)
     line.advance(BESIDE)
     assert line.walk is not None
     assert line.walk.here is not None

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver.accuracy import refinement as adapt
+from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.harmonic_levels import LADDER
+from solver.accuracy.options import ACCURACY
 from solver.accuracy.refinement import Refined, refine
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -167,22 +168,22 @@ def test_three_harmonics_that_do_not_suffice_are_not_called_accurate() -> None:
     assert refined.estimate.response > 1e-3
 
 
-@pytest.mark.parametrize(("name", "most"), [("MOST_SAMPLES", 64), ("MOST_OF_FEW", 5)])
+@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("few_pairs_unknowns", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     name: str, most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     case, point = slider(SolverSettings(rtol=1e-4))
-    monkeypatch.setattr(adapt, name, most)
+    monkeypatch.setattr(refinement, "ACCURACY", replace(ACCURACY, **{name: most}))
     refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
     assert not refined.accurate
     assert refined.estimate.largest > 1e-4
     assert refined.point.evaluation.scaled_residual() <= 1e-8
     resolution = refined.case.resolution
-    if name == "MOST_SAMPLES":
+    if name == "most_samples":
         assert resolution.samples <= 64
     else:
         assert refined.point.evaluation.predicted_h.size <= 7  # what it began with
-    assert LADDER[-1] >= resolution.highest
+    assert ACCURACY.harmonic_levels[-1] >= resolution.highest
 
 
 def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:

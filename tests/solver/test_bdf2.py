@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
-from solver.wear import bdf2 as adaptive
+from solver.wear import bdf2
 from solver.wear.march import march_wear
 from tests.solver.models import branch_states, scene
 from tests.solver.test_march import AREA, COARSE, CYCLES, END, FRICTION, OMEGA, WEAR, march, slider_start
@@ -59,11 +59,10 @@ def test_steps_are_of_second_order() -> None:
 
 def test_a_step_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None:
     # no error is refused, so that the steps are known: the first one Euler's, the second one by the formula with w
-    monkeypatch.setattr(adaptive, "SHARE", 1e9)
-    monkeypatch.setattr(adaptive, "FIRST", 1e-2)
-    monkeypatch.setattr(adaptive, "FIRST_DEPTH", 1e9)
+    options = replace(bdf2.WEAR, step_error_fraction=1e9, first_step=1e-2, first_depth=1e9)
+    monkeypatch.setattr(bdf2, "WEAR", options)
     first = 1e-2 * adaptive_march(1.0).step_limit
-    w = adaptive.LONGEST_RATIO
+    w = options.largest_step_ratio
     history = adaptive_march(1.0, cycles=np.array([0.0, first, (1 + w) * first, END]))
     depth, rate = history.wear_depth[:, 0], history.wear_rate / AREA
     assert depth[1] == pytest.approx(first * rate[1], rel=1e-9)

@@ -16,7 +16,8 @@ from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.march import march_wear
-from solver.wear.step_limit import LARGEST, StepTooLongError, check_step, moved_share
+from solver.wear.options import WEAR
+from solver.wear.step_limit import StepTooLongError, check_step, moved_fraction
 from tests.solver.models import OMEGA, branch_states, dovetail, random_model
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
@@ -46,7 +47,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
     before, after = (state.force_h[:, 0, 0] for state in states)
     change = np.linalg.norm(after - before) / np.linalg.norm(before)
     assert change > 0.01
-    assert moved_share(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
+    assert moved_fraction(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
 
 
 def test_wear_that_does_not_act_back_moves_nothing() -> None:
@@ -54,7 +55,7 @@ def test_wear_that_does_not_act_back_moves_nothing() -> None:
     joint = build_case(model, 0.3, OMEGA, SETTINGS).joint(OMEGA, 0.0)
     point = solve_static_state(joint, np.zeros(2), 1e-10, Effort())
     assert point is not None
-    assert moved_share(joint, point.evaluation, np.ones(2)) == 0.0
+    assert moved_fraction(joint, point.evaluation, np.ones(2)) == 0.0
 
 
 def test_the_error_names_the_step_and_one_that_would_do() -> None:
@@ -64,8 +65,8 @@ def test_the_error_names_the_step_and_one_that_would_do() -> None:
     assert point is not None
     one = np.zeros(16)
     one[0] = 1e-9
-    unit = moved_share(joint, point.evaluation, one)
-    check_step(joint, point.evaluation, 0.9 * LARGEST / unit * one, 3000.0, 1000.0)
+    unit = moved_fraction(joint, point.evaluation, one)
+    check_step(joint, point.evaluation, 0.9 * WEAR.largest_moved_load / unit * one, 3000.0, 1000.0)
     sentence = r"1e\+03 cycles at once from cycle 3000 on moves 20 times.*at most 5 cycles"
     with pytest.raises(StepTooLongError, match=sentence):
         check_step(joint, point.evaluation, 20.0 / unit * one, 3000.0, 1000.0)
@@ -115,4 +116,4 @@ def test_an_open_pair_carries_nothing_and_holds_nothing() -> None:
     assert point.evaluation.force_h[:2, 0, 0].max() == 0.0
     worn = np.zeros(16)
     worn[:2] = 1e-6
-    assert moved_share(joint, point.evaluation, worn) == 0.0
+    assert moved_fraction(joint, point.evaluation, worn) == 0.0

@@ -136,8 +136,8 @@ def test_oscillation_is_that_of_all_rates_together_also_when_carried_on(rates: l
     followed = WearRates(1)
     for place, rate in enumerate(rates):
         if place == cut:
-            carried, followed = followed.carried(), WearRates(1)
-            followed.take_up(carried)
+            state, followed = followed.state_dict(), WearRates(1)
+            followed.load_state(state)
         followed.add(np.array([rate]))
     assert followed.oscillate() is oscillation_of_all(rates)
 

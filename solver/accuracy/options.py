@@ -1,0 +1,133 @@
+"""Tuning constants of the accuracy control: certificate, harmonic levels, error estimates, refinement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AccuracyOptions:
+    """Limits and safety factors; each with its meaning, unit (none: a ratio) and the evidence for its value.
+
+    What is called measured without a place was measured on the states in the table of `solver.accuracy.certificate`.
+    """
+
+    # certificate
+    penetration_limit: float = 0.1
+    """Of the largest relative motion. Good states: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
+    tension_limit: float = 0.01
+    """Of the largest normal force. Good states: below 1e-12."""
+    cone_limit: float = 0.05
+    """Of the largest friction limit. Good states: below 1e-12; a friction coefficient 10 % too large is found."""
+    energy_limit: float = 0.05
+    """Of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
+    drift_limit: float = 1e-3
+    """Of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
+    residual_round_off: float = 1e-10
+    """Scaled residual: the mean position of a marched mass is held by 1e-5 of its stiffness."""
+    points_per_sample: int = 4
+    """Points a sample at which series are looked at: the samples themselves would flatter them."""
+    noticed_loss_factor: float = 1e-3
+    """Loss factor that is too small for any structure to notice."""
+    round_off_vibration: float = 1e-6
+    """Of the mean: a smaller vibration is round-off."""
+
+    # what happens in a period
+    round_off_change: float = 1e-9
+    """Change of the tangential state in a period, or even harmonics of the force, over their size: less is round-off
+    (1e-12 and below in good states), the pair does not slip and the state is symmetric."""
+    asymmetric_force: float = 1e-6
+    """Even harmonics over the largest force: a state of odd harmonics that has more takes even ones again."""
+
+    # harmonic levels
+    harmonic_levels: tuple[int, ...] = (1, 3, 5, 7, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
+    """Highest harmonics between which "auto" chooses: all but the last two, with which it compares."""
+    most_mixed_harmonics: int = 79
+    """Highest level of "auto" but for odd harmonics alone: motions that hit something take more in vain."""
+    costly_unknowns: int = 2500
+    """Unknowns from which a state that is no result takes fewer harmonics than its error asks for."""
+    coarse_unknowns: int = 1600
+    """Unknowns that it has then at most: about the dovetail of 48 pairs with five harmonics (1584)."""
+    periods_in_contact: float = 0.5
+    """Periods of the highest harmonic that the shortest contact takes, from where on harmonics see it."""
+    stiffness_mismatch: float = 0.25
+    """Of |1 - E G|: where the structure answers otherwise than the penalty, harmonics are missing."""
+    octaves_beyond: float = 8.0
+    """Octaves above the first harmonic left out up to which that is judged."""
+
+    # states at other levels
+    event_samples: int = 2048
+    """Samples of a period with which a missed event is looked for: a sine overtops a limit unseen by 1e-6 then."""
+    level_iterations: int = 40
+    """Newton iterations of a solve from the state of another level."""
+    dear_unknowns: int = 1000
+    """Unknowns from which a solve is dear: odd harmonics above 79, homotopies and thrice the samples end here."""
+    far_unknowns: int = 200
+    """Unknowns of a balance that is solved only to see a short contact, or how the structure goes on."""
+    few_displacements: int = 2
+    """Relative displacements with which states far up are found at once, as a rule."""
+    few_far_unknowns: int = 400
+    """The same as `far_unknowns` with so few displacements."""
+    compared_unknowns: int = 12000
+    """Unknowns of a balance that is solved to estimate an error."""
+    two_levels_safety: float = 1.5
+    """Error over the difference to two levels up: 2 to 1.2 where the error falls as 1/H to 1/H^3."""
+    one_level_safety: float = 2.5
+    """Error over the difference to one level up: 3.4 to 1.5 for the same."""
+    double_samples_safety: float = 1.5
+    """Error over the difference to twice the samples: 2 to 1.3 where it falls with the step in time or its square."""
+    triple_samples_safety: float = 2.0
+    """The same to three times the samples: 1.5 to 1.1, but those of single events scatter."""
+    small_slip_work: float = 1e-3
+    """Of the work of the excitation: where normal force times slip is less, it is judged against this."""
+    dear_small_slip_work: float = 1e-2
+    """The same from `dear_unknowns` on."""
+    no_slip_work: float = 1e-3
+    """Of the small slip work: where even that is not reached, nothing wears."""
+    creep_fraction: float = 0.1
+    """Of rtol: fraction of the slip work that may be creep."""
+    small_peak: float = 0.01
+    """Of the largest peak: responses that move less are judged against this."""
+    small_response: float = 1e-5
+    """Of what the excitation would cause on the stiffness of the joint alone: less says nothing."""
+    kept_fraction: float = 0.5
+    """Of rtol: error up to which harmonics are left out again, so that the next state does not add them at once."""
+    spare_fraction: float = 0.3
+    """Of the kept error: a state so accurate is tried with fewer harmonics and samples."""
+    faint_force: float = 0.1
+    """Of rtol, over the largest normal force: contacts with less force need not be resolved."""
+
+    # refinement
+    most_samples: int = 8192
+    """Samples of a period, of "auto"."""
+    refinement_iterations: int = 200
+    """Newton iterations of one refinement."""
+    cheap_refinement_iterations: int = 600
+    """The same up to `cheap_unknowns`: solves that fail take most of them, and little time."""
+    cheap_unknowns: int = 2000
+    """Unknowns, two levels up, up to which a refinement is cheap."""
+    most_unknowns: int = 8000
+    """Unknowns of a balance that "auto" may march with."""
+    few_pairs_unknowns: int = 2000
+    """The same where the pairs are few: impacts couple all harmonics, and no preconditioner helps."""
+    aim: float = 0.8
+    """Of rtol: an estimate is one within a factor."""
+    error_ratio: float = 3.0
+    """Of two errors (harmonics, samples): one that is smaller by more is left as it is."""
+    vibration_recheck: float = 0.3
+    """Relative change of the vibration after which errors are estimated, and harmonics chosen, again. Dovetail: with
+    1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
+
+    @property
+    def violation_limits(self) -> dict[str, float]:
+        """Largest accepted violations of a certificate; response and wear rate have estimates of their own."""
+        return {
+            "penetration": self.penetration_limit,
+            "tension": self.tension_limit,
+            "cone_violation": self.cone_limit,
+            "energy_error": self.energy_limit,
+            "drift": self.drift_limit,
+        }
+
+
+ACCURACY = AccuracyOptions()

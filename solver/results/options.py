@@ -1,0 +1,38 @@
+"""Tuning constants of what is reported: safety factors of error estimates, what counts as oscillation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.settings import Scheme
+
+
+@dataclass(frozen=True)
+class ResultOptions:
+    """Safety factors and thresholds; each with its meaning, unit (none: a ratio) and the evidence for its value."""
+
+    implicit_safety: float = 1.5
+    """Error of a history over its difference to the companion. Short steps: 1; dovetail: 0.6 to 1.3."""
+    explicit_safety: float = 0.8
+    """The same. Short steps: 1/3; dovetail: 0.2 to 0.9."""
+    adaptive_safety: float = 0.6
+    """The same. Short steps: 1/3; dovetail: 0.05 to 0.4."""
+    crossing_window: float = 0.5
+    """Of the cycle count: histories that differ by when something happens cross each other, and where they do their
+    difference is small and says nothing. It is the largest one since this fraction of the count (dovetail, 211.25 Hz,
+    steps of 2000 cycles: without it a quarter of the true error at the crossing). What comes later has no part in it,
+    so that an error does not depend on how far a study goes."""
+    alternations: int = 4
+    """Increments of a wear rate that alternate in sign and do not shrink, from where on it oscillates."""
+    noticeable_oscillation: float = 1e-3
+    """Of the largest rate of all pairs together: smaller increments are no oscillation."""
+    calming: float = 0.98
+    """Increment over the one before, below which an oscillation calms."""
+
+    def companion_safety(self, scheme: Scheme) -> float:
+        """Error of a history over its difference to the companion."""
+        factors = {"implicit": self.implicit_safety, "explicit": self.explicit_safety, "adaptive": self.adaptive_safety}
+        return factors[scheme]
+
+
+RESULTS = ResultOptions()

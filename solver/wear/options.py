@@ -1,0 +1,77 @@
+"""Tuning constants of the march on slow time: steps, their limits, loss of a branch, the companion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class WearOptions:
+    """Lengths and limits; each with its meaning, unit (none: a ratio) and the evidence for its value."""
+
+    # adaptive steps
+    step_error_fraction: float = 0.2
+    """Of rtol: error of a step over what it has worn, or would have worn at the mean rate so far."""
+    largest_step_ratio: float = 2.0
+    """Of two steps; BDF2 is zero-stable below 1 + sqrt(2)."""
+    smallest_step_ratio: float = 0.25
+    """By which a step is cut whose end was not found; one that was refused is not cut by more."""
+    step_safety: float = 0.85
+    """Of the length at which the error would be the one allowed."""
+    refused_step_ratio: float = 0.8
+    """A step that was refused is cut by at least so much, one that was taken by at most."""
+    first_step: float = 0.05
+    """Of the explicit step limit: length of the first step, before anything is known of its error."""
+    first_depth: float = 0.01
+    """Of the largest relative motion: what the first step wears at most."""
+    shortest_slow_step: float = 1e-4
+    """Of the first step."""
+    step_iterations: int = 10
+    """Newton iterations of a step: one that takes more is shortened. What a march may spend grows by them each step."""
+
+    # Euler steps
+    extrapolated_iterations: int = 8
+    """Newton iterations of an Euler step from an extrapolated start; more of them, and the step is divided instead."""
+    arnoldi_products: int = 16
+    """Linear solves for the limit of the explicit step."""
+    largest_moved_load: float = 10.0
+    """Of the normal forces, in their norm, that a step may move; with less the error of the worn volume tells (27 %
+    with 0.6)."""
+    advised_moved_load: float = 0.1
+    """Of the normal forces, of a step that is advised: the usual one of the dovetail root moves 0.001 to 0.01."""
+
+    # march
+    march_iterations: int = 3000
+    """Newton iterations of a march beside `step_iterations` for each step: one that takes more leads nowhere."""
+    iterations_per_save: int = 100
+    """Newton iterations after which the factorisation kept from step to step is given up, so that a march can be kept
+    on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing."""
+    rate_recheck: float = 0.1
+    """Relative change of wear rate and worn volume after which errors are estimated again (dovetail at 211.5 Hz:
+    without it the wear rate is 8 % off between two estimates of 0.8 %)."""
+    oscillation_round_off: float = 1e-9
+    """Of the wear rate if all pairs slipped as far as they move: smaller changes are no oscillation."""
+    no_wear: float = 1e-12
+    """Of the same: a joint that wears less sticks."""
+
+    # loss of a branch
+    fold_resolution: float = 0.01
+    """Of the cycle count: how exactly the end of a branch is found."""
+    smallest_fold_resolution: float = 2.0**-10
+    """Of a step: the same, at the finest."""
+    jump_change: float = 0.05
+    """Relative change of the vibration beyond the end of a branch that is a jump: corners at which the branch folds
+    back a little are none, and there may be many of them."""
+    most_jumps: int = 12
+    """Jumps of a march."""
+    jump_iterations: int = 800
+    """Newton iterations of the search for the state behind a jump: one that takes more leads nowhere."""
+
+    # companion
+    companion_steps: int = 40
+    """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
+    companion_spare: int = 500
+    """Newton iterations that the companion may take beyond those of the history: more, and it is lost between jumps."""
+
+
+WEAR = WearOptions()
