@@ -195,7 +195,7 @@ class Recorder:
         late = np.divide(self.cycles * kept["wear_rate"], volume, out=np.ones_like(volume), where=volume > 0.0)
         # in the first steps both histories have the same error, which only the wear rates at their ends show
         differs = np.fmax(difference @ area, RESULTS.companion_safety(self.scheme) * _before(self.cycles, met))
-        differs = np.fmax(differs, start_error * volume)
+        differs = np.fmax(differs, RESULTS.start_safety * start_error * volume)
         error = np.fmax(differs, local) + truncation * np.fmax(late, 1.0)
         relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
         relative[np.isnan(volume)] = np.nan

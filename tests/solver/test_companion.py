@@ -12,7 +12,9 @@ import pytest
 from solver.accuracy.refinement import Refined, refine
 from solver.model import ReducedModel
 from solver.outcome import Outcome
+from solver.results import recorder
 from solver.results.history import StartState, WearHistory
+from solver.results.options import RESULTS
 from solver.results.recorder import _before
 from solver.settings import Scheme, SolverSettings
 from solver.wear import march as march_module
@@ -151,6 +153,21 @@ def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
     # what comes later changes nothing
     assert np.array_equal(_before(cycles[:6], met[:10]), error[:6])
     assert (_before(cycles, []) == 0.0).all()
+
+
+def test_an_error_of_the_start_state_is_taken_to_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The volume is not known better than a multiple of what the wear rates of the start states differ by."""
+    model, found = start()
+    at_ends = []
+    for safety in (0.0, 1e4, 2e4):
+        monkeypatch.setattr(recorder, "RESULTS", replace(RESULTS, start_safety=safety))
+        history = march_wear(model, 0.5, found, WEAR, 1e3, "adaptive", CYCLES, SolverSettings(5, 64))
+        at_ends.append(history.error_estimate)
+    none, once, twice = at_ends
+    assert none < 0.05
+    assert once > 2.0 * none
+    assert twice == pytest.approx(2.0 * once, rel=0.05)
+    assert RESULTS.start_safety >= 3.0
 
 
 def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkeypatch: pytest.MonkeyPatch) -> None:
