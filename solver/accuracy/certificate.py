@@ -10,15 +10,15 @@ number asks what the samples and the series together can still get wrong:
   is positive, so the Fejer mean of any force that obeys the law lies in the cone, too, which is convex: the truncated
   series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
   that no such force has are seen.
-- energy_error: work of the excitation on the joint, less what the damping takes, less `mu` times normal force times
-  slip as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
+- energy_error: work of the excitation on the joint, less what the damping takes, less the friction work of the slip
+  as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
   these works, the elastic one and what the excitation could do at most times a loss factor of 1e-3 at least: less does
   no structure notice.
-- drift: change of the slip over a period.
+- periodicity_error: change of the slip over a period.
 
 Largest values measured on good states (0 stands for below 1e-12):
 
-| states | H | penetration | tension | cone | energy | drift |
+| states | H | penetration | tension | cone | energy | periodicity |
 |---|---|---|---|---|---|---|
 | slider, 10 N, 160 Hz | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 7e-4, 2e-4, 7e-5, 4e-5, 4e-5, 4e-5 | 1e-11 |
 | two masses, 0.4 to 0.6 rad/s | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 2e-3, 4e-4, 2e-4, 8e-5, 7e-5, 7e-5 | 1e-11 |
@@ -38,6 +38,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.contact.alternating_frequency_time import friction_work
+from solver.contact.coulomb import friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.packing import packable
@@ -45,7 +47,13 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
 
 # largest accepted violations; response and wear rate have estimates of their own
-LIMITS = {"penetration": 0.1, "tension": 0.01, "cone_violation": 0.05, "energy_error": 0.05, "drift": 1e-3}
+LIMITS = {
+    "penetration": 0.1,
+    "tension": 0.01,
+    "cone_violation": 0.05,
+    "energy_error": 0.05,
+    "periodicity_error": 1e-3,
+}
 ROUND_OFF = 1e-10  # of a residual: the mean position of a marched mass is held by 1e-5 of its stiffness
 FINER = 4  # points between two samples at which series are looked at: the samples themselves would flatter them
 LOSS = 1e-3  # loss factor below which nobody notices
@@ -58,7 +66,8 @@ class Certificate:
 
     residual: scaled residual. penetration: over the largest relative motion. tension: over the largest normal force.
     cone_violation: over the largest friction limit (normal force where there is no friction). energy_error: over the
-    largest work in a period. drift: change of the tangential state over a period, over the largest friction limit.
+    largest work in a period. periodicity_error: change of the tangential state over a period, over the largest friction
+    limit.
     response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated. stable: whether
     small disturbances die out. The last three are not judged here.
     """
@@ -68,7 +77,7 @@ class Certificate:
     tension: float
     cone_violation: float
     energy_error: float
-    drift: float
+    periodicity_error: float
     response_error: float = float("nan")
     wear_rate_error: float = float("nan")
     stable: bool = True
@@ -101,7 +110,8 @@ _MEANING = {
     "tension": "the contact pulls by, in shares of the largest normal force,",
     "cone_violation": "friction exceeds its limit by, in shares of the largest limit,",
     "energy_error": "the energy of a period is out of balance by, in shares of the work done,",
-    "drift": "the slip does not repeat from period to period: it drifts by, in shares of the force that drives it,",
+    "periodicity_error": "the slip does not repeat from period to period: it drifts by, in shares of the force that"
+    " drives it,",
 }
 
 
@@ -109,19 +119,20 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """Certificate of an evaluated state, without its truncation errors and its stability, which need other states."""
     force_t = evaluation.force_t
     friction = joint.friction_coefficient
-    normal = float(force_t[:, 0].max(initial=0.0))
+    largest = force_t[:, 0].max(axis=1, initial=0.0)
+    normal = float(largest.max(initial=0.0))
     # without friction there is no limit to compare with: any tangential force is too much
-    limit = friction * normal if friction > 0.0 else normal
+    limit = float(friction_limit(friction, largest).max(initial=0.0)) if friction.any() else normal
     smooth_t = _fejer_mean(joint, evaluation.force_h)
     both = np.concatenate([force_t, smooth_t], axis=2)
-    excess = np.hypot(both[:, 1], both[:, 2]) - friction * both[:, 0]
+    excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
     return Certificate(
         residual=_residual(joint, evaluation),
         penetration=_penetration(joint, evaluation),
         tension=_share(float((-both[:, 0]).max(initial=0.0)), normal),
         cone_violation=_share(float(excess.max(initial=0.0)), limit),
         energy_error=_energy_error(joint, evaluation),
-        drift=_share(_drift(joint, evaluation), max(limit, _drive(joint, evaluation))),
+        periodicity_error=_share(_periodicity_error(joint, evaluation), max(limit, _drive(joint, evaluation))),
     )
 
 
@@ -199,7 +210,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     excitation = _work(joint, joint.structure.force_h(), motion)
     damping = _work(joint, joint.structure.apply(motion), motion)
     contact = _work(joint, force, motion)
-    dissipation = joint.friction_coefficient * float(evaluation.slip_work.sum())
+    dissipation = float(friction_work(joint, evaluation).sum())
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # what the excitation could do at most: beside a resonance it does next to nothing
@@ -214,11 +225,11 @@ def _drive(joint: Joint, evaluation: Evaluation) -> float:
     return float(np.abs(driven).max(initial=0.0))
 
 
-def _drift(joint: Joint, evaluation: Evaluation) -> float:
+def _periodicity_error(joint: Joint, evaluation: Evaluation) -> float:
     """Change of the tangential state over the last period, N, of pairs that touch."""
     change = np.hypot(*(evaluation.state_t[:, :, -1] - evaluation.state_t[:, :, 0]).T)
     # the state of an inertial pair is its displacement; what moves it on is the mean force that its drag takes
     creep = change * joint.penalty.drag * joint.omega / (2.0 * np.pi)
     change = np.where(joint.penalty.inertial, creep, change)
     touches = evaluation.force_t[:, 0].max(axis=1) > 0.0
-    return max(evaluation.drift, float(change[touches].max(initial=0.0)))
+    return max(evaluation.periodicity_error, float(change[touches].max(initial=0.0)))

@@ -64,7 +64,7 @@ class Level:
 
     def unknowns(self, resolution: Resolution) -> int:
         """Unknowns of the balance with other harmonics."""
-        return self.joint.slots.size * (2 * len(resolution.orders) + 1)
+        return self.joint.component_index.size * (2 * len(resolution.orders) + 1)
 
     def may_look_at(self, resolution: Resolution, most: int = MOST_FAR) -> bool:
         """Whether a state of so many more harmonics is so cheap that it may be asked what these miss."""
@@ -186,7 +186,7 @@ class Level:
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        most = MOST_REACHED if self.joint.slots.size <= FEW_PLACES else MOST_FAR
+        most = MOST_REACHED if self.joint.component_index.size <= FEW_PLACES else MOST_FAR
         if self.may_look_at(on_ladder(self.case.resolution, 2), most):
             reaching = steps_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
@@ -252,7 +252,7 @@ class Level:
         """
         structure, penalty = self.joint.structure, self.joint.penalty
         stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
-        moved = structure.harmonic_force / stiffness[self.joint.slots]
+        moved = structure.harmonic_force / stiffness[self.joint.component_index]
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
         return max(SMALL_RESPONSE * float(np.linalg.norm(response)), 1e-300)
 

@@ -125,7 +125,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
 def lighter(refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort) -> Refined | None:
     """The same state with so few harmonics that it has at most so many unknowns; None where there is none."""
     here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
-    while n_unknowns(here.case.resolution, here.joint.slots.size) > most:
+    while n_unknowns(here.case.resolution, here.joint.component_index.size) > most:
         lower = fewer(here.case.resolution, here.case.settings)
         level = here.solve_at(lower, effort) if lower != here.case.resolution else None
         if level is None:
@@ -142,7 +142,7 @@ def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint)
 def _allowed(here: Level, resolution: Resolution) -> bool:
     if not here.case.model.holds(resolution.highest):
         return False
-    most = MOST_OF_FEW if here.joint.slots.size <= NEWTON.small_joint_displacements else MOST_UNKNOWNS
+    most = MOST_OF_FEW if here.joint.component_index.size <= NEWTON.small_joint_displacements else MOST_UNKNOWNS
     if resolution.highest > MOST_HARMONICS:
         # friction alone: motions that hit something take their time in vain
         if not all(order % 2 for order in resolution.orders):

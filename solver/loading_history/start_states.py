@@ -44,7 +44,7 @@ KEEP = 100  # iterations after which the progress is handed out
 
 def follow_branch(
     model: ReducedModel,
-    friction_coefficient: float,
+    friction_coefficient: float | FloatArray | None,
     excitation_amplitude: float,
     frequencies: FloatArray,
     sweep: Direction,
@@ -124,7 +124,7 @@ class _Line:
     def __init__(
         self,
         model: ReducedModel,
-        friction_coefficient: float,
+        friction_coefficient: float | FloatArray | None,
         excitation_amplitude: float,
         sweep: Direction,
         settings: SolverSettings,

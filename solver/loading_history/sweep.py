@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.accuracy.harmonic_levels import COSTLY, LIGHT, fewer, n_unknowns
 from solver.accuracy.refinement import Refined, lighter, refine
-from solver.contact.coulomb import STICK
+from solver.contact.coulomb import STICK, friction_limit
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.loading_history.route import Route, Step
 from solver.newton.linear_solver import JacobianSolver
@@ -251,7 +251,7 @@ class Sweep:
         sticks = (after.evaluation.status_t == STICK).all(axis=1) & ~penalty.inertial
         stiffness = np.where(sticks, penalty.tangential, 0.0)[:, None]
         change = np.linalg.norm((after.history - before.history) * stiffness)
-        limit = self.case.friction_coefficient * float(np.linalg.norm(after.evaluation.force_h[:, 0, 0]))
+        limit = float(np.linalg.norm(friction_limit(self.case.friction_coefficient, after.evaluation.force_h[:, 0, 0])))
         return float(change) / limit if limit > 0.0 else 0.0
 
     def _choose_harmonics(self) -> None:
@@ -272,7 +272,7 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        if n_unknowns(refined.case.resolution, joint.slots.size) > COSTLY:
+        if n_unknowns(refined.case.resolution, joint.component_index.size) > COSTLY:
             refined = lighter(refined, joint.omega, joint.excitation_amplitude, LIGHT, self.effort) or refined
         if refined.case is not self.case:
             self._change_case(refined)

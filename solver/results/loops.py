@@ -1,6 +1,6 @@
 """Fretting loops: force over relative displacement of a contact pair through one period, at phases of their own.
 
-The force is that of the law in time (`law.Marched`), not a series: it has corners and, where a mass turns on its
+The force is that of the law in time (`Marched`), not a series: it has corners and, where a mass turns on its
 slider, jumps, and a series would overshoot there. Between the samples of the state it is interpolated linearly, so that
 it stays within the friction cone; where a phase is one of the samples it is that sample. The displacement is the series
 of the state, which is exact at any phase. Pairs whose mass is marched (`rigid_slider`) move by all harmonics, of which

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
@@ -101,8 +102,11 @@ class Recorder:
         error: estimated local error of the step, as worn volume, m3; None for that of an Euler step, which is its
         difference to the trapezoidal rule.
         """
-        per_work = wear_coefficient / self.model.contact.area
-        rate = wear_coefficient * float(report.slip_work.sum())
+        area = self.model.contact.area
+        gain, rate = (
+            wear_gain(wear_coefficient, area, 1.0),
+            volume_rate(wear_coefficient, float(report.slip_work.sum())),
+        )
         smooth = self.scheme == "adaptive"
         if self._last is None:
             wanted = self.cycles == cycle
@@ -115,9 +119,9 @@ class Recorder:
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)
                 self._truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
-                self._pair_truncation = self._pair_truncation + half * per_work * of.slip_work_error
+                self._pair_truncation = self._pair_truncation + half * gain * of.slip_work_error
         share = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
-        ends = [(of.wear_depth, per_work * of.slip_work) for of in (before_report, report)]
+        ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.slip_work)) for of in (before_report, report)]
         depth = depth_within(share, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
             share = self._worn_share(depth, before_report.wear_depth, report.wear_depth, share)

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.contact.archard import wear_gain, wear_rate
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Balance
@@ -133,14 +134,14 @@ class AdaptiveSteps:
             grown = depth - self._before[1]
             base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
             share = (1.0 + ratio) / (1.0 + 2.0 * ratio)
-        gain = share * length * way.wear_coefficient / area
+        gain = wear_gain(way.wear_coefficient, area, share * length)
         balance = Balance(way.joint, way.point.history, base, gain)
         start = way.predicted(balance, length)
         result = solve_balance(balance, start, way.solver, way.case.settings.tolerance, way.effort, ITERATIONS)
         if not result.converged:
             return None
         new = result.evaluation
-        new_rate = way.wear_coefficient / area * new.slip_work
+        new_rate = wear_rate(way.wear_coefficient, area, new.slip_work)
         if self._before is None:
             error = 0.5 * length * (new_rate - rate)
         else:

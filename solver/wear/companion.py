@@ -161,7 +161,7 @@ class Companion:
         state is found with them.
         """
         way, main = self.way, self.main
-        resolution, n_rel = main.case.resolution, main.joint.slots.size
+        resolution, n_rel = main.case.resolution, main.joint.component_index.size
         if n_unknowns(resolution, n_rel) > COSTLY:
             while n_unknowns(resolution, n_rel) > LIGHT and resolution.highest > 1:
                 resolution = fewer(resolution, AUTOMATIC)

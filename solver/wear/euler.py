@@ -20,7 +20,7 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
 def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray) -> BalanceAt:
     """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24), (25).
 
-    gain: of the whole step, `h k_w / alpha`.
+    gain: `archard.wear_gain` of the whole step.
     """
 
     def balance_at(share: float, history: FloatArray) -> Balance:

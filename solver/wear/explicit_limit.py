@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.contact.archard import wear_growth
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.krylov import ritz_values
@@ -21,20 +22,20 @@ from solver.newton.linear_solver import JacobianSolver
 PRODUCTS = 16  # products of Arnoldi's method, one linear solve each
 
 
-def explicit_step_limit(balance: Balance, at: Evaluation, wear_per_work: FloatArray, solver: JacobianSolver) -> float:
+def explicit_step_limit(balance: Balance, at: Evaluation, gain: FloatArray, solver: JacobianSolver) -> float:
     """Largest stable explicit step h at a state, cycles; inf where the wear rate falls nowhere.
 
-    wear_per_work (n_contact,): `k_w / alpha`, 1/N. The eigenvalues are those that Arnoldi's method knows after
-    `PRODUCTS` solves; complex ones count where the real part is the larger one.
+    gain (n_contact,): `archard.wear_gain` of one cycle, m/J. The eigenvalues are those that Arnoldi's method knows
+    after `PRODUCTS` solves; complex ones count where the real part is the larger one.
     """
-    rate = wear_per_work * at.slip_work
+    rate = wear_growth(gain, at.slip_work)
     if not rate.max(initial=0.0) > 0.0:
         return float("inf")
     frozen = balance_without_wear(balance, at)
     # a step in which the fastest pair wears as much as the joint moves: both Jacobians differ in more than round-off
     step = float(np.abs(at.displacement_h).max()) / float(rate.max())
     plain = frozen.linearise(at)
-    wearing = replace(frozen, wear_gain=step * wear_per_work).linearise(at)
+    wearing = replace(frozen, wear_gain=step * gain).linearise(at)
     shape = at.predicted_h.shape
 
     def product(vector: FloatArray) -> FloatArray:

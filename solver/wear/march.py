@@ -30,7 +30,7 @@ REFRESH = 100  # iterations after which the factorisation kept from step to step
 
 def march_wear(
     model: ReducedModel,
-    friction_coefficient: float,
+    friction_coefficient: float | FloatArray | None,
     start: StartState,
     wear_coefficient: float,
     step: float,

@@ -46,7 +46,7 @@ def moved_share(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> flo
 
 def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[BoolArray, BoolArray, FloatArray, float]:
     """Rows of pressed normals, rows that follow, worn depth on the rows, m, and norm of the normal forces, N."""
-    pair, component = joint.slots // 3, joint.slots % 3
+    pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
     opened = (before.status_t == SEPARATED).all(axis=1)
     free = np.where(component == 0, opened[pair], ~stuck[pair])
