@@ -31,6 +31,7 @@ class ContactInterface:
         not used for the others.
     position (n_contact, 3): m, NaN where unknown.
     surface: text label of each pair, e.g. "intrados".
+    friction_coefficient (n_contact,): of each pair; None where one for all of them is given beside the scene.
     """
 
     dofs: IntArray
@@ -39,6 +40,7 @@ class ContactInterface:
     normal_load: FloatArray
     position: FloatArray
     surface: tuple[str, ...]
+    friction_coefficient: FloatArray | None = None
 
     @property
     def n_contact(self) -> int:

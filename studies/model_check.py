@@ -100,6 +100,8 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
         "normal_load": (contact.normal_load, (n_contact,)),
         "position": (contact.position, (n_contact, 3)),
     }
+    if contact.friction_coefficient is not None:
+        shapes["friction_coefficient"] = (contact.friction_coefficient, (n_contact,))
     for name, (values, shape) in shapes.items():
         _check_shape(f"contact/{name}", values, shape)
         _check_finite(f"contact/{name}", values, nan_allowed=name == "position")
@@ -127,6 +129,11 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
     flat = np.flatnonzero(contact.area <= 0)
     if len(flat):
         raise SceneError("contact/area", f"{contact.area[flat[0]]} at {_at(flat[:1])}", "give a positive area in m2")
+    if contact.friction_coefficient is not None:
+        negative = np.flatnonzero(contact.friction_coefficient < 0)
+        if len(negative):
+            value = contact.friction_coefficient[negative[0]]
+            raise SceneError("contact/friction_coefficient", f"{value} at {_at(negative[:1])}", "give 0 or more")
     loose = np.flatnonzero((dofs[:, 0] < 0) & (contact.normal_load <= 0))
     if len(loose):
         raise SceneError(

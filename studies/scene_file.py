@@ -239,6 +239,7 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         for name, values in absent.items()
     )
     labelled = "contact/surface" in datasets
+    friction = "contact/friction_coefficient"
     return ContactInterface(
         dofs=dofs,
         area=_read_real(datasets, "contact/area"),
@@ -246,6 +247,7 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         normal_load=normal_load,
         position=position,
         surface=_read_text(datasets, "contact/surface") if labelled else ("",) * n_contact,
+        friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
     )
 
 

@@ -30,7 +30,7 @@ from studyrunner.variables import KEPT
 _ROUND_OFF = 1e-10
 
 
-def build_evaluator(model: ReducedModel, friction_coefficient: float) -> Evaluate:
+def build_evaluator(model: ReducedModel, friction_coefficient: float | None) -> Evaluate:
     """The function that does the tasks of a study on this model and gives their results one by one."""
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -43,7 +43,9 @@ def build_evaluator(model: ReducedModel, friction_coefficient: float) -> Evaluat
     return evaluate
 
 
-def follow(model: ReducedModel, friction_coefficient: float, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
+def follow(
+    model: ReducedModel, friction_coefficient: float | None, task: BranchTask, keep: Keep
+) -> Iterator[StartResult]:
     """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.loading_history.start_states import follow_branch
@@ -85,7 +87,9 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
         yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
 
 
-def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
+def march(
+    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep
+) -> Iterator[MarchResult]:
     """The histories of a task, the one of the march itself first.
 
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
@@ -110,7 +114,9 @@ def march(model: ReducedModel, friction_coefficient: float, task: MarchTask, kee
             yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), place=place)
 
 
-def _solve(model: ReducedModel, friction_coefficient: float, task: MarchTask, keep: Keep | None = None) -> WearHistory:
+def _solve(
+    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep | None = None
+) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.march import march_wear
 

@@ -55,7 +55,7 @@ class Job:
     """What every rank needs for the tasks of a study. folder: of the run, which not all ranks need see."""
 
     model: ReducedModel
-    friction_coefficient: float
+    friction_coefficient: float | None
     folder: Path
 
 

@@ -10,15 +10,15 @@ number asks what the samples and the series together can still get wrong:
   is positive, so the Fejer mean of any force that obeys the law lies in the cone, too, which is convex: the truncated
   series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
   that no such force has are seen.
-- energy_error: work of the excitation on the joint, less what the damping takes, less `mu` times normal force times
-  slip as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
+- energy_error: work of the excitation on the joint, less what the damping takes, less the friction work of the slip
+  as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
   these works, the elastic one and what the excitation could do at most times a loss factor of 1e-3 at least: less does
   no structure notice.
-- drift: change of the slip over a period.
+- periodicity_error: change of the slip over a period.
 
 Largest values measured on good states (0 stands for below 1e-12):
 
-| states | H | penetration | tension | cone | energy | drift |
+| states | H | penetration | tension | cone | energy | periodicity |
 |---|---|---|---|---|---|---|
 | slider, 10 N, 160 Hz | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 7e-4, 2e-4, 7e-5, 4e-5, 4e-5, 4e-5 | 1e-11 |
 | two masses, 0.4 to 0.6 rad/s | 1, 3, 5, 11, 21, 41 | 0 | 0 | 0 | 2e-3, 4e-4, 2e-4, 8e-5, 7e-5, 7e-5 | 1e-11 |
@@ -39,6 +39,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.options import ACCURACY
+from solver.contact.alternating_frequency_time import friction_work
+from solver.contact.coulomb import friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.packing import packable
@@ -53,7 +55,8 @@ class Certificate:
 
     residual: scaled residual. penetration: over the largest relative motion. tension: over the largest normal force.
     cone_violation: over the largest friction limit (normal force where there is no friction). energy_error: over the
-    largest work in a period. drift: change of the tangential state over a period, over the largest friction limit.
+    largest work in a period. periodicity_error: change of the tangential state over a period, over the largest friction
+    limit.
     response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated. stable: whether
     small disturbances die out. The last three are not judged here.
     """
@@ -63,7 +66,7 @@ class Certificate:
     tension: float
     cone_violation: float
     energy_error: float
-    drift: float
+    periodicity_error: float
     response_error: float = float("nan")
     wear_rate_error: float = float("nan")
     stable: bool = True
@@ -96,7 +99,8 @@ _MEANING = {
     "tension": "the contact pulls by, as a fraction of the largest normal force,",
     "cone_violation": "friction exceeds its limit by, as a fraction of the largest limit,",
     "energy_error": "the energy of a period is out of balance by, as a fraction of the work done,",
-    "drift": "the slip does not repeat from period to period: it drifts by, as a fraction of the force that drives it,",
+    "periodicity_error": "the slip does not repeat from period to period: it drifts by, as a fraction of the force that"
+    " drives it,",
 }
 
 
@@ -104,19 +108,20 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """What an evaluated state violates, without truncation errors and stability, which need other states."""
     force_t = evaluation.force_t
     friction = joint.friction_coefficient
-    normal = float(force_t[:, 0].max(initial=0.0))
+    largest = force_t[:, 0].max(axis=1, initial=0.0)
+    normal = float(largest.max(initial=0.0))
     # without friction there is no limit to compare with: any tangential force is too much
-    limit = friction * normal if friction > 0.0 else normal
+    limit = float(friction_limit(friction, largest).max(initial=0.0)) if friction.any() else normal
     smooth_t = _fejer_mean(joint, evaluation.force_h)
     both = np.concatenate([force_t, smooth_t], axis=2)
-    excess = np.hypot(both[:, 1], both[:, 2]) - friction * both[:, 0]
+    excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
     return Certificate(
         residual=_residual(joint, evaluation),
         penetration=_penetration(joint, evaluation),
         tension=_relative(float((-both[:, 0]).max(initial=0.0)), normal),
         cone_violation=_relative(float(excess.max(initial=0.0)), limit),
         energy_error=_energy_error(joint, evaluation),
-        drift=_relative(_drift(joint, evaluation), max(limit, _drive(joint, evaluation))),
+        periodicity_error=_relative(_periodicity_error(joint, evaluation), max(limit, _drive(joint, evaluation))),
     )
 
 
@@ -195,7 +200,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     excitation = _work(joint, joint.structure.force_h(), motion)
     damping = _work(joint, joint.structure.apply(motion), motion)
     contact = _work(joint, force, motion)
-    dissipation = joint.friction_coefficient * float(evaluation.slip_work.sum())
+    dissipation = float(friction_work(joint, evaluation).sum())
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # what the excitation could do at most: beside a resonance it does next to nothing
@@ -211,11 +216,11 @@ def _drive(joint: Joint, evaluation: Evaluation) -> float:
     return float(np.abs(driven).max(initial=0.0))
 
 
-def _drift(joint: Joint, evaluation: Evaluation) -> float:
+def _periodicity_error(joint: Joint, evaluation: Evaluation) -> float:
     """Change of the tangential state over the last period, N, of pairs that touch."""
     change = np.hypot(*(evaluation.state_t[:, :, -1] - evaluation.state_t[:, :, 0]).T)
     # the state of an inertial pair is its displacement; what moves it on is the mean force that its drag takes
     creep = change * joint.penalty.drag * joint.omega / (2.0 * np.pi)
     change = np.where(joint.penalty.inertial, creep, change)
     touches = evaluation.force_t[:, 0].max(axis=1) > 0.0
-    return max(evaluation.drift, float(change[touches].max(initial=0.0)))
+    return max(evaluation.periodicity_error, float(change[touches].max(initial=0.0)))

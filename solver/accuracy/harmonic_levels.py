@@ -69,8 +69,8 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
     Judged at real rates, at which the structure has no resonances. omega: rad/s.
     """
     penalty = build_penalty(model, omega, highest)
-    _, slots = relative_indices(model.contact)
-    pair, tangent = slots // 3, slots % 3 > 0
+    _, component_index = relative_indices(model.contact)
+    pair, tangent = component_index // 3, component_index % 3 > 0
     held = np.where(tangent, penalty.tangential[pair], penalty.normal[pair])
     marched = tangent & penalty.inertial[pair]
     for octaves in np.arange(0.0, ACCURACY.octaves_beyond + 0.5, 0.5):

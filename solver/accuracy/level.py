@@ -43,7 +43,7 @@ class Level:
 
     def unknowns(self, resolution: Resolution) -> int:
         """Unknowns of the balance with other harmonics."""
-        return n_unknowns(resolution, self.joint.slots.size)
+        return n_unknowns(resolution, self.joint.component_index.size)
 
     def may_solve(self, resolution: Resolution, most: int) -> bool:
         """Whether the scene holds so many harmonics and their balance has at most so many unknowns."""
@@ -167,7 +167,7 @@ class Level:
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        few = self.joint.slots.size <= ACCURACY.few_displacements
+        few = self.joint.component_index.size <= ACCURACY.few_displacements
         most = ACCURACY.few_far_unknowns if few else ACCURACY.far_unknowns
         if self.may_solve(shifted(self.case.resolution, 2), most):
             reaching = levels_to_reach(
@@ -235,7 +235,7 @@ class Level:
         """
         structure, penalty = self.joint.structure, self.joint.penalty
         stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
-        moved = structure.harmonic_force / stiffness[self.joint.slots]
+        moved = structure.harmonic_force / stiffness[self.joint.component_index]
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
         return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
 

@@ -21,7 +21,7 @@ class AccuracyOptions:
     """Of the largest friction limit. Good states: below 1e-12; a friction coefficient 10 % too large is found."""
     energy_limit: float = 0.05
     """Of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
-    drift_limit: float = 1e-3
+    periodicity_limit: float = 1e-3
     """Of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
     residual_round_off: float = 1e-10
     """Scaled residual: the mean position of a marched mass is held by 1e-5 of its stiffness."""
@@ -126,7 +126,7 @@ class AccuracyOptions:
             "tension": self.tension_limit,
             "cone_violation": self.cone_limit,
             "energy_error": self.energy_limit,
-            "drift": self.drift_limit,
+            "periodicity_error": self.periodicity_limit,
         }
 
 

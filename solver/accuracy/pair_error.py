@@ -18,7 +18,7 @@ def slip_work_error(case: Case, joint: Joint, point: PathPoint, effort: Effort) 
     Zero where there are none to compare with.
     """
     evaluation = point.evaluation
-    costly = n_unknowns(case.resolution, joint.slots.size) > ACCURACY.costly_unknowns
+    costly = n_unknowns(case.resolution, joint.component_index.size) > ACCURACY.costly_unknowns
     wanted = shifted(case.resolution, -1 if costly else 2)
     if wanted == case.resolution or not case.model.holds(wanted.highest):
         return np.zeros(evaluation.slip_work.shape)

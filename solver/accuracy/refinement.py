@@ -142,7 +142,7 @@ def coarse_state(
     omega: rad/s. excitation_amplitude: N. Its error is not known.
     """
     here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
-    while n_unknowns(here.case.resolution, here.joint.slots.size) > most:
+    while n_unknowns(here.case.resolution, here.joint.component_index.size) > most:
         lower = fewer(here.case.resolution, here.case.settings)
         level = here.solve_at(lower, effort) if lower != here.case.resolution else None
         if level is None:
@@ -160,7 +160,7 @@ def _allowed(here: Level, resolution: Resolution) -> bool:
     """Whether "auto" may go on with these harmonics and samples."""
     if not here.case.model.holds(resolution.highest):
         return False
-    small = here.joint.slots.size <= NEWTON.small_joint_displacements
+    small = here.joint.component_index.size <= NEWTON.small_joint_displacements
     most = ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns
     if resolution.highest > ACCURACY.most_mixed_harmonics:
         # friction alone: motions that hit something take more in vain

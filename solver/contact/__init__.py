@@ -1,1 +1,1 @@
-"""The contact law through one period: Coulomb friction with separation, masses on sliders, their tangents."""
+"""Contact laws: Coulomb friction with separation, its march through a period, masses on sliders, Archard's wear law."""

@@ -1,4 +1,7 @@
-"""The contact law of all pairs of a joint through one period: each pair by the kernel that suits it."""
+"""Alternating frequency-time: the predicted force from harmonics to samples, the contact law, its force to harmonics.
+
+All pairs of a joint through one period, each by the kernel that suits it, and the exact derivative of that.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.coulomb import SEPARATED, STICK, march_period, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit
+from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.options import CONTACT
+from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import FloatArray, IntArray
 from solver.structure.joint import Joint
-
-CLOSURE = 1e-10  # of the largest friction limit: the tangential state has repeated
-MOST_PASSES = 400
 
 
 @dataclass(frozen=True)
@@ -22,9 +25,11 @@ class Marched:
 
     predicted_t (n_contact, 3, N): N; tangents of inertial pairs as means over the steps. force_t (n_contact, 3, N): N,
     compression positive, likewise. force_h (n_contact, 3, m): its harmonics, N. state_t (n_contact, 2, N+1): tangential
-    state, its start first, N; for inertial pairs the displacement, m. start (n_contact, 2): what the last pass began
-    with, N; for inertial pairs the velocity, m/s. status_t (n_contact, N). passes (n_contact,). drift: N, change of the
-    tangential state over the last pass. slip_work (n_contact,): integral of normal force times slip, N m.
+    state, its start first, N; for inertial pairs the displacement, m. start (n_contact, 2): what the first period began
+    with, N; for inertial pairs the velocity at the start of the last one, m/s. status_t (n_contact, N). periods
+    (n_contact,): how many were marched. periodicity_error: N, change of the tangential state over the last period.
+    slip_work (n_contact,): J, integral of normal force times slip distance over a period: what wears, no work of any
+    force (`solver.contact.archard`).
     """
 
     predicted_t: FloatArray
@@ -33,42 +38,46 @@ class Marched:
     state_t: FloatArray
     start: FloatArray
     status_t: IntArray
-    passes: IntArray
-    drift: float
+    periods: IntArray
+    periodicity_error: float
     slip_work: FloatArray
 
 
 def march_law(joint: Joint, predicted_h: FloatArray, history: FloatArray) -> Marched:
-    """Motion under a predicted force (n_contact, 3, m), N, from a tangential history (n_contact, 2), m."""
+    """Motion under a predicted force (n_contact, 3, m), N, from a tangential history (n_contact, 2), m.
+
+    Eqs. (11)-(15); for inertial pairs the march of `solver.contact.rigid_slider`.
+    """
     basis, friction = joint.basis, joint.friction_coefficient
     predicted_t = predicted_h @ basis.synthesis
     start = history * joint.penalty.tangential[:, None]
-    limit = friction * max(float(predicted_t[:, 0].max(initial=0.0)), 0.0)
+    limit = friction_limit(friction, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
+    periodicity = CONTACT.periodicity * float(limit.max(initial=0.0))
     inertial = np.flatnonzero(joint.penalty.inertial)
     if inertial.size == 0:
-        force_t, state_t, status_t, passes, drift = march_period(
-            predicted_t, friction, start, CLOSURE * limit, MOST_PASSES
+        force_t, state_t, status_t, periods, error = march_period(
+            predicted_t, friction, start, periodicity, CONTACT.most_periods
         )
-        slip_work = wear_integral(force_t, state_t) / joint.penalty.tangential
+        slip_work = integrate_slip_work(force_t, state_t) / joint.penalty.tangential
         force_h = force_t @ basis.analysis
     else:
         elastic = np.flatnonzero(~joint.penalty.inertial)
-        share = joint.step_share()
-        predicted_t[inertial, 1:] = (predicted_h[inertial, 1:] * share) @ basis.synthesis
+        factor = joint.step_mean_factor()
+        predicted_t[inertial, 1:] = (predicted_h[inertial, 1:] * factor) @ basis.synthesis
         force_t, status_t = np.zeros_like(predicted_t), np.zeros(predicted_t.shape[::2], np.int64)
         state_t = np.zeros((predicted_t.shape[0], 2, basis.n_samples + 1))
-        passes = np.ones(predicted_t.shape[0], np.int64)
-        drift, slip_work = np.zeros(predicted_t.shape[0]), np.zeros(predicted_t.shape[0])
-        force_t[elastic], state_t[elastic], status_t[elastic], passes[elastic], drift[elastic] = march_period(
-            predicted_t[elastic], friction, start[elastic], CLOSURE * limit, MOST_PASSES
+        periods = np.ones(predicted_t.shape[0], np.int64)
+        error, slip_work = np.zeros(predicted_t.shape[0]), np.zeros(predicted_t.shape[0])
+        force_t[elastic], state_t[elastic], status_t[elastic], periods[elastic], error[elastic] = march_period(
+            predicted_t[elastic], friction[elastic], start[elastic], periodicity, CONTACT.most_periods
         )
-        slip_work[elastic] = wear_integral(force_t[elastic], state_t[elastic]) / joint.penalty.tangential[elastic]
-        force_t[inertial], velocity_t, state_t[inertial], status_t[inertial], slip_work[inertial], drift[inertial] = (
-            march_masses(predicted_t[inertial], friction, *_masses(joint, inertial), joint.sample_step)
+        slip_work[elastic] = integrate_slip_work(force_t[elastic], state_t[elastic]) / joint.penalty.tangential[elastic]
+        force_t[inertial], velocity_t, state_t[inertial], status_t[inertial], slip_work[inertial], error[inertial] = (
+            march_masses(predicted_t[inertial], friction[inertial], *_masses(joint, inertial), joint.sample_step)
         )
         start[inertial] = velocity_t[:, :, 0]
         force_h = force_t @ basis.analysis
-        force_h[inertial, 1:] /= share
+        force_h[inertial, 1:] /= factor
     force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
     return Marched(
         predicted_t=predicted_t,
@@ -77,25 +86,30 @@ def march_law(joint: Joint, predicted_h: FloatArray, history: FloatArray) -> Mar
         state_t=state_t,
         start=start,
         status_t=status_t,
-        passes=passes,
-        drift=float(drift.max(initial=0.0)),
+        periods=periods,
+        periodicity_error=float(error.max(initial=0.0)),
         slip_work=slip_work,
     )
 
 
-def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
-    """Exact derivatives with respect to the harmonics of the predicted force of each pair, closure included.
+def friction_work(joint: Joint, at: Marched) -> FloatArray:
+    """Work that friction dissipates in a period (n_contact,), J: it is at its limit wherever a pair slips."""
+    return friction_limit(joint.friction_coefficient, at.slip_work)
 
-    Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the integral of
-    normal force times slip (n_contact, 3m), m.
+
+def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
+    """Exact derivatives with respect to the harmonics of the predicted force of each pair, periodicity included.
+
+    Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
+    (n_contact, 3m), m.
     """
     basis, friction, m = joint.basis, joint.friction_coefficient, joint.basis.synthesis.shape[0]
     n_contact = at.predicted_t.shape[0]
-    force_tangent, slip_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
+    force_tangent, slip_work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
     has_tangent = (joint.contact.dofs[:, 1:] >= 0).any(axis=1)
     # one that sticks and stays closed all period long passes all on, one that is open nothing; the start of a period
     # that was marched more than once may depend on the force even so
-    stuck = (at.status_t == STICK).all(axis=1) & (at.passes == 1)
+    stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
     switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
     harmonics = np.arange(3 * m)
     force_tangent[np.ix_(stuck & joint.has_normal, harmonics[:m], harmonics[:m])] = np.eye(m)
@@ -104,38 +118,38 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
     inertial = np.flatnonzero(joint.penalty.inertial & switching)
     elastic = np.flatnonzero(~joint.penalty.inertial & has_tangent & switching)
     if elastic.size:
-        force_tangent[elastic], slip_tangent[elastic] = march_tangent(
+        force_tangent[elastic], slip_work_tangent[elastic] = march_tangent(
             at.predicted_t[elastic],
-            friction,
+            friction[elastic],
             at.start[elastic],
             at.state_t[elastic],
-            at.passes[elastic],
+            at.periods[elastic],
             joint.line[elastic],
             basis.synthesis,
             basis.analysis,
             joint.has_normal[elastic],
         )
-        slip_tangent[elastic] /= joint.penalty.tangential[elastic, None]
+        slip_work_tangent[elastic] /= joint.penalty.tangential[elastic, None]
     if inertial.size:
-        share = joint.step_share()
-        force_tangent[inertial], slip_tangent[inertial] = mass_tangent(
+        factor = joint.step_mean_factor()
+        force_tangent[inertial], slip_work_tangent[inertial] = mass_tangent(
             at.predicted_t[inertial],
-            friction,
+            friction[inertial],
             *_masses(joint, inertial),
             joint.sample_step,
             at.start[inertial],
             basis.synthesis,
-            basis.synthesis * share[:, None],
-            basis.analysis / share,
+            basis.synthesis * factor[:, None],
+            basis.analysis / factor,
             joint.has_normal[inertial],
         )
     normal = np.flatnonzero(joint.has_normal & switching)
     force_tangent[normal, :m, :m] = mean_normal_tangent(
         at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
     )
-    return force_tangent, slip_tangent
+    return force_tangent, slip_work_tangent
 
 
 def _masses(joint: Joint, inertial: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Mass, drag and line of the inertial pairs, as `inertia.march_masses` takes them."""
+    """Mass, drag and line of the inertial pairs, as `rigid_slider.march_masses` takes them."""
     return joint.penalty.mass[inertial], joint.penalty.drag[inertial], joint.line[inertial]

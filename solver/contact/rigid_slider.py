@@ -22,12 +22,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.contact import archard
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # of a step of a pair with two tangents
-CLOSED = 1e-13  # of the velocity that the force reaches in a period
-MOST_PASSES = 500
+SAME_VELOCITY = 1e-13  # of the velocity that the force reaches in a period: the motion has repeated
+MOST_MASS_PERIODS = 500  # the drag halves what is left in each (`solver.structure.penalty`): far more than it takes
+
+slip_work_rate = njit()(archard.slip_work_rate)
 
 
 @njit(cache=True)
@@ -35,6 +38,8 @@ def step_line(
     force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
 ) -> tuple[float, float, float, float]:
     """One step along one line: mean friction force, velocity after it, and mean velocity and speed over it.
+
+    Coulomb's law on a line, `coulomb.friction_force` with one direction, with its switches resolved inside the step.
 
     gain, loss: `m/dt + c/2` and `m/dt - c/2`, so that `gain after = force - friction + loss before`. `tangent` (3, 3)
     receives the derivatives of (friction, velocity after, mean speed) with respect to (force, velocity, limit).
@@ -65,35 +70,37 @@ def step_line(
         tangent[2, 1] = 0.5 * sign * (1.0 + tangent[1, 1])
         tangent[2, 2] = 0.5 * sign * tangent[1, 2]
         return sign * limit, after, 0.5 * (velocity + after), 0.5 * abs(velocity + after)
-    # the mass comes to rest after the share of the step in which the retarding force takes its momentum
+    # the mass comes to rest after the fraction of the step in which the retarding force takes its momentum
     retarding = limit - sign * force
-    share = sign * loss * velocity / retarding
-    share_force = sign * share / retarding
-    share_velocity = sign * loss / retarding
-    share_limit = -share / retarding
+    fraction = sign * loss * velocity / retarding
+    fraction_force = sign * fraction / retarding
+    fraction_velocity = sign * loss / retarding
+    fraction_limit = -fraction / retarding
     speed = sign * velocity
     if sign * force >= -limit:
         # it stays: what is left of the step holds the force itself
         tangent[0, 0] = 1.0
         tangent[0, 1] = loss
-        tangent[2, 0] = 0.5 * share_force * speed
-        tangent[2, 1] = 0.5 * (share_velocity * speed + share * sign)
-        tangent[2, 2] = 0.5 * share_limit * speed
-        return force + loss * velocity, 0.0, 0.5 * share * velocity, 0.5 * share * speed
-    friction = (2.0 * share - 1.0) * sign * limit
-    tangent[0, 0] = 2.0 * sign * limit * share_force
-    tangent[0, 1] = 2.0 * sign * limit * share_velocity
-    tangent[0, 2] = 2.0 * sign * limit * share_limit + (2.0 * share - 1.0) * sign
+        tangent[2, 0] = 0.5 * fraction_force * speed
+        tangent[2, 1] = 0.5 * (fraction_velocity * speed + fraction * sign)
+        tangent[2, 2] = 0.5 * fraction_limit * speed
+        return force + loss * velocity, 0.0, 0.5 * fraction * velocity, 0.5 * fraction * speed
+    friction = (2.0 * fraction - 1.0) * sign * limit
+    tangent[0, 0] = 2.0 * sign * limit * fraction_force
+    tangent[0, 1] = 2.0 * sign * limit * fraction_velocity
+    tangent[0, 2] = 2.0 * sign * limit * fraction_limit + (2.0 * fraction - 1.0) * sign
     after = (force - friction + loss * velocity) / gain
     tangent[1, 0] = (1.0 - tangent[0, 0]) / gain
     tangent[1, 1] = (loss - tangent[0, 1]) / gain
     tangent[1, 2] = -tangent[0, 2] / gain
     backward = -sign * after
-    tangent[2, 0] = 0.5 * (share_force * (speed - backward) - (1.0 - share) * sign * tangent[1, 0])
-    tangent[2, 1] = 0.5 * (share_velocity * (speed - backward) + share * sign - (1.0 - share) * sign * tangent[1, 1])
-    tangent[2, 2] = 0.5 * (share_limit * (speed - backward) - (1.0 - share) * sign * tangent[1, 2])
-    mean = 0.5 * (share * velocity + (1.0 - share) * after)
-    return friction, after, mean, 0.5 * (share * speed + (1.0 - share) * backward)
+    tangent[2, 0] = 0.5 * (fraction_force * (speed - backward) - (1.0 - fraction) * sign * tangent[1, 0])
+    tangent[2, 1] = 0.5 * (
+        fraction_velocity * (speed - backward) + fraction * sign - (1.0 - fraction) * sign * tangent[1, 1]
+    )
+    tangent[2, 2] = 0.5 * (fraction_limit * (speed - backward) - (1.0 - fraction) * sign * tangent[1, 2])
+    mean = 0.5 * (fraction * velocity + (1.0 - fraction) * after)
+    return friction, after, mean, 0.5 * (fraction * speed + (1.0 - fraction) * backward)
 
 
 @njit(cache=True)
@@ -130,12 +137,12 @@ def step_plane(
             drive[1, k] = loss * inner[1, k]
         drive[0, 0] += 1.0
         drive[1, 1] += 1.0
-        size = np.hypot(drive_1, drive_2)
+        force_1, force_2, sticks = friction_force(drive_1, drive_2, limit)
         before = np.hypot(first, second)
         if before > 0.0:
             for k in range(5):
                 tangent[4, k] += 0.5 * (first * inner[0, k] + second * inner[1, k]) / before / PARTS
-        if size <= limit:
+        if sticks:
             out[0] += drive_1 / PARTS
             out[1] += drive_2 / PARTS
             for k in range(5):
@@ -148,17 +155,15 @@ def step_plane(
             first = 0.0
             second = 0.0
             continue
-        unit_1 = drive_1 / size
-        unit_2 = drive_2 / size
-        ratio = limit / size
+        unit_1, unit_2, ratio = slip_direction(drive_1, drive_2, limit)
+        across_11, across_12, across_22 = across_slip(unit_1, unit_2, ratio)
         for k in range(5):
-            along = unit_1 * drive[0, k] + unit_2 * drive[1, k]
-            friction[0, k] = ratio * (drive[0, k] - unit_1 * along)
-            friction[1, k] = ratio * (drive[1, k] - unit_2 * along)
+            friction[0, k] = across_11 * drive[0, k] + across_12 * drive[1, k]
+            friction[1, k] = across_12 * drive[0, k] + across_22 * drive[1, k]
         friction[0, 4] += unit_1
         friction[1, 4] += unit_2
-        next_1 = (drive_1 - limit * unit_1) / gain
-        next_2 = (drive_2 - limit * unit_2) / gain
+        next_1 = (drive_1 - force_1) / gain
+        next_2 = (drive_2 - force_2) / gain
         after = np.hypot(next_1, next_2)
         for k in range(5):
             inner[0, k] = (drive[0, k] - friction[0, k]) / gain
@@ -167,8 +172,8 @@ def step_plane(
             tangent[1, k] += friction[1, k] / PARTS
             if after > 0.0:
                 tangent[4, k] += 0.5 * (next_1 * inner[0, k] + next_2 * inner[1, k]) / after / PARTS
-        out[0] += limit * unit_1 / PARTS
-        out[1] += limit * unit_2 / PARTS
+        out[0] += force_1 / PARTS
+        out[1] += force_2 / PARTS
         out[4] += 0.5 * (first + next_1) / PARTS
         out[5] += 0.5 * (second + next_2) / PARTS
         out[6] += 0.5 * (before + after) / PARTS
@@ -211,19 +216,37 @@ def step_mass(
 
 @njit(cache=True)
 def march_masses(
-    predicted_t: FloatArray, friction: float, mass: FloatArray, drag: FloatArray, line: IntArray, step: float
+    predicted_t: FloatArray, friction: FloatArray, mass: FloatArray, drag: FloatArray, line: IntArray, step: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
     """March every pair through the period until its velocity repeats.
 
-    predicted_t (n_contact, 3, N): N; the normal one at the samples, the tangential ones as means over the steps around
-    them. mass, drag (n_contact,): kg, N s/m. line (n_contact,): as in `step_mass`. step: dt, s. Returns
+    Parameters
+    ----------
+    predicted_t : array (n_contact, 3, N)
+        Predicted force, N; the normal one at the samples, the tangential ones as means over the steps around them.
+    friction : array (n_contact,)
+        Friction coefficient.
+    mass, drag : array (n_contact,)
+        kg, N s/m.
+    line : array (n_contact,)
+        As in `step_mass`.
+    step : float
+        dt, s.
 
-    - force_t (n_contact, 3, N): contact force, N, the tangential one as the mean over the step;
-    - velocity_t (n_contact, 2, N+1): at the ends of the steps, m/s;
-    - place_t (n_contact, 2, N+1): displacement since the start of the period, m;
-    - status_t (n_contact, N): SEPARATED, STICK, SLIP;
-    - slip_work (n_contact,): integral of normal force times speed over the period, N m;
-    - drift (n_contact,): what is left of the change of the velocity over the last pass, as a force m v / dt, N.
+    Returns
+    -------
+    force_t : array (n_contact, 3, N)
+        Contact force, N, compression positive, the tangential one as the mean over the step.
+    velocity_t : array (n_contact, 2, N+1)
+        At the ends of the steps, m/s.
+    place_t : array (n_contact, 2, N+1)
+        Displacement since the start of the period, m.
+    status_t : array (n_contact, N)
+        SEPARATED, STICK, SLIP.
+    slip_work : array (n_contact,)
+        Integral of normal force times speed over the period, J.
+    periodicity_error : array (n_contact,)
+        What is left of the change of the velocity over the last period, as a force m v / dt, N.
     """
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))
@@ -231,7 +254,7 @@ def march_masses(
     place_t = np.zeros((n_contact, 2, n_samples + 1))
     status_t = np.zeros((n_contact, n_samples), np.int64)
     slip_work = np.zeros(n_contact)
-    drift = np.zeros(n_contact)
+    periodicity_error = np.zeros(n_contact)
     out = np.empty(7)
     tangent = np.empty((5, 5))
     for pair in range(n_contact):
@@ -239,13 +262,14 @@ def march_masses(
         loss = mass[pair] / step - 0.5 * drag[pair]
         largest = np.abs(predicted_t[pair, 1:]).max()
         velocity = np.zeros(2)
-        for _ in range(MOST_PASSES):
+        for _ in range(MOST_MASS_PERIODS):
             velocity_t[pair, :, 0] = velocity
             slip_work[pair] = 0.0
             for n in range(n_samples):
                 normal = max(predicted_t[pair, 0, n], 0.0)
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
-                step_mass(predicted_t[pair, 1:, n], velocity, friction * normal, gain, loss, line[pair], out, tangent)
+                limit = friction_limit(friction[pair], normal)
+                step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line[pair], out, tangent)
                 force_t[pair, 0, n] = normal
                 force_t[pair, 1, n] = out[0]
                 force_t[pair, 2, n] = out[1]
@@ -255,7 +279,7 @@ def march_masses(
                 velocity_t[pair, 1, n + 1] = out[3]
                 place_t[pair, 0, n + 1] = place_t[pair, 0, n] + step * out[4]
                 place_t[pair, 1, n + 1] = place_t[pair, 1, n] + step * out[5]
-                slip_work[pair] += normal * out[6] * step
+                slip_work[pair] += slip_work_rate(normal, out[6]) * step
                 if predicted_t[pair, 0, n] <= 0.0:
                     status_t[pair, n] = SEPARATED
                 elif rests and out[2] == 0.0 and out[3] == 0.0:
@@ -263,7 +287,7 @@ def march_masses(
                 else:
                     status_t[pair, n] = SLIP
             change = np.hypot(velocity[0] - velocity_t[pair, 0, 0], velocity[1] - velocity_t[pair, 1, 0])
-            drift[pair] = change * mass[pair] / step
-            if change * mass[pair] <= CLOSED * largest * step * n_samples:
+            periodicity_error[pair] = change * mass[pair] / step
+            if change * mass[pair] <= SAME_VELOCITY * largest * step * n_samples:
                 break
-    return force_t, velocity_t, place_t, status_t, slip_work, drift
+    return force_t, velocity_t, place_t, status_t, slip_work, periodicity_error

@@ -1,97 +1,69 @@
-"""Derivatives of the contact law through one period, for `coulomb` and `rigid_slider`. Floats and arrays only."""
+"""Exact derivatives through one period, periodicity included, of elastic pairs and masses. Floats and arrays only.
+
+That of a sample is in `coulomb`, that of a step of a mass in `rigid_slider`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from solver.contact.coulomb import PLAIN_PASSES, SLIP, STICK, close, contact_sample
+from solver.contact import archard
+from solver.contact.coulomb import (
+    SEPARATED,
+    SLIP,
+    STICK,
+    advance_tangent,
+    contact_sample,
+    contact_tangent,
+    friction_limit,
+    slip_direction,
+)
+from solver.contact.period_march import PLAIN_PERIODS, solve_periodicity
 from solver.contact.rigid_slider import step_mass
 from solver.model import BoolArray, FloatArray, IntArray
 
-
-@njit(cache=True)
-def state_tangent(
-    dstate: FloatArray,
-    basis: FloatArray,
-    status: int,
-    normal: float,
-    pre_1: float,
-    pre_2: float,
-    friction: float,
-    has_normal: bool,
-    dforce: FloatArray,
-) -> None:
-    """Derivatives of one sample, in place: `dforce` (2, 3m+2) of the tangential force, `dstate` (2, 3m+2) of the state.
-
-    Columns are the harmonics of the predicted force of the pair: normal (m), tangent 1 (m), tangent 2 (m), and the
-    state at the start of the period. `basis` (m,) holds the derivative of a time sample with respect to its harmonics.
-    `dstate` comes in as that of the sample before.
-    """
-    m = basis.size
-    if status == STICK:
-        for column in range(3 * m + 2):
-            dforce[0, column] = -dstate[0, column]
-            dforce[1, column] = -dstate[1, column]
-        for k in range(m):
-            dforce[0, m + k] += basis[k]
-            dforce[1, 2 * m + k] += basis[k]
-        return
-    for column in range(3 * m + 2):
-        dforce[0, column] = 0.0
-        dforce[1, column] = 0.0
-    if status == SLIP and friction * normal > 0.0:
-        size = np.sqrt(pre_1 * pre_1 + pre_2 * pre_2)
-        unit_1 = pre_1 / size
-        unit_2 = pre_2 / size
-        ratio = friction * normal / size
-        across_11 = ratio * (1.0 - unit_1 * unit_1)
-        across_12 = -ratio * unit_1 * unit_2
-        across_22 = ratio * (1.0 - unit_2 * unit_2)
-        for column in range(3 * m + 2):
-            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
-            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-        for k in range(m):
-            if has_normal:
-                dforce[0, k] += friction * unit_1 * basis[k]
-                dforce[1, k] += friction * unit_2 * basis[k]
-            dforce[0, m + k] += across_11 * basis[k]
-            dforce[0, 2 * m + k] += across_12 * basis[k]
-            dforce[1, m + k] += across_12 * basis[k]
-            dforce[1, 2 * m + k] += across_22 * basis[k]
-    for column in range(3 * m + 2):
-        dstate[0, column] = -dforce[0, column]
-        dstate[1, column] = -dforce[1, column]
-    for k in range(m):
-        dstate[0, m + k] += basis[k]
-        dstate[1, 2 * m + k] += basis[k]
+slip_work_slopes = njit()(archard.slip_work_slopes)
 
 
 @njit(cache=True)
 def march_tangent(
     predicted_t: FloatArray,
-    friction: float,
+    friction: FloatArray,
     start: FloatArray,
     state_t: FloatArray,
-    passes: IntArray,
+    periods: IntArray,
     line: IntArray,
     synthesis: FloatArray,
     analysis: FloatArray,
     has_normal: BoolArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivative of what `march_period` and `wear_integral` give, the closure of the period included.
+    """Derivative of what `march_period` and `integrate_slip_work` give, the periodicity included.
 
-    start (n_contact, 2): as in `march_period`. state_t, passes: as it has returned them. line (n_contact,): as in
-    `inertia.step_plane`; a tangent that does not exist is returned as one that sticks. has_normal (n_contact,): False
-    where the normal force is constant. Returns
-
-    - force_tangent (n_contact, 3m, 3m): d(harmonics of the tangential force)/d(harmonics of the predicted force) of
-      each pair, harmonics as in `state_tangent`, dimensionless; the rows of the normal force are zero;
-    - wear_tangent (n_contact, 3m): derivative of the wear integral (N * N), N.
-
-    The last pass gives the derivatives with its start held and those with respect to its start. The start moves with
+    The last period gives the derivatives with its start held and those with respect to its start. The start moves with
     the predicted force as a state that repeats has to; where nothing makes it do so (the pair has come to stick), as it
     has been marched to.
+
+    Parameters
+    ----------
+    predicted_t, friction, start : array
+        As `march_period` was given them.
+    state_t, periods : array
+        As it has returned them.
+    line : array (n_contact,)
+        As in `rigid_slider.step_mass`; a tangent that does not exist is returned as one that sticks.
+    synthesis, analysis : array (m, N), (N, m)
+        Of the Fourier basis.
+    has_normal : array (n_contact,)
+        False where the normal force is constant.
+
+    Returns
+    -------
+    force_tangent : array (n_contact, 3m, 3m)
+        d(harmonics of the tangential force)/d(harmonics of the predicted force) of each pair, harmonics as in
+        `coulomb.advance_tangent`, dimensionless; the rows of the normal force are zero.
+    slip_work_tangent : array (n_contact, 3m)
+        Derivative of the slip work (N * N), N.
     """
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
@@ -99,28 +71,38 @@ def march_tangent(
     # rows of the transposes are contiguous, which is what the loops over columns need
     basis_t = np.ascontiguousarray(synthesis.T)
     force_tangent = np.zeros((n_contact, width, width))
-    wear_tangent = np.zeros((n_contact, width))
+    slip_work_tangent = np.zeros((n_contact, width))
     dstate = np.empty((2, width + 2))
     before_dstate = np.empty((2, width + 2))
     analysis_t = np.ascontiguousarray(analysis.T)
     dforce_t = np.empty((n_samples, 2, width + 2))
     dforce = np.empty((2, width + 2))
-    wear = np.empty(width + 2)
+    work = np.empty(width + 2)
     dstart = np.empty((2, width))
     for pair in range(n_contact):
-        wear[:] = 0.0
+        work[:] = 0.0
         dstate[:, :] = 0.0
         dstate[0, width] = dstate[1, width + 1] = 1.0
         for n in range(n_samples):
             first = state_t[pair, 0, n]
             second = state_t[pair, 1, n]
             normal, _, _, _, _, status = contact_sample(
-                predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction, first, second
+                predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n], friction[pair], first, second
             )
-            pre_1 = predicted_t[pair, 1, n] - first
-            pre_2 = predicted_t[pair, 2, n] - second
+            trial_1 = predicted_t[pair, 1, n] - first
+            trial_2 = predicted_t[pair, 2, n] - second
             before_dstate[:, :] = dstate
-            state_tangent(dstate, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal[pair], dforce_t[n])
+            advance_tangent(
+                dstate,
+                basis_t[n],
+                status,
+                normal,
+                trial_1,
+                trial_2,
+                friction[pair],
+                has_normal[pair],
+                dforce_t[n],
+            )
             step_1 = state_t[pair, 0, n + 1] - first
             step_2 = state_t[pair, 1, n + 1] - second
             slip = np.hypot(step_1, step_2)
@@ -128,25 +110,25 @@ def march_tangent(
                 continue
             before = n - 1 if n > 0 else n_samples - 1
             normal_before = max(predicted_t[pair, 0, before], 0.0)
-            mean = 0.5 * (normal_before + normal)
+            by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
             for column in range(width + 2):
-                wear[column] += mean * (
+                work[column] += by_slip * (
                     step_1 / slip * (dstate[0, column] - before_dstate[0, column])
                     + step_2 / slip * (dstate[1, column] - before_dstate[1, column])
                 )
             if has_normal[pair]:
                 for k in range(m):
                     if normal_before > 0.0:
-                        wear[k] += 0.5 * slip * basis_t[before, k]
+                        work[k] += 0.5 * by_normal * basis_t[before, k]
                     if normal > 0.0:
-                        wear[k] += 0.5 * slip * basis_t[n, k]
+                        work[k] += 0.5 * by_normal * basis_t[n, k]
         start_tangent(
             dstart,
             dstate,
             predicted_t[pair],
-            friction,
+            friction[pair],
             start[pair],
-            min(passes[pair] - 1, PLAIN_PASSES),
+            min(periods[pair] - 1, PLAIN_PERIODS),
             basis_t,
             has_normal[pair],
             dforce,
@@ -166,10 +148,10 @@ def march_tangent(
                             dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
                         )
         for column in range(width):
-            wear_tangent[pair, column] = (
-                wear[column] + wear[width] * dstart[0, column] + wear[width + 1] * dstart[1, column]
+            slip_work_tangent[pair, column] = (
+                work[column] + work[width] * dstart[0, column] + work[width + 1] * dstart[1, column]
             )
-    return force_tangent, wear_tangent
+    return force_tangent, slip_work_tangent
 
 
 @njit(cache=True)
@@ -201,44 +183,44 @@ def start_tangent(
     predicted_t: FloatArray,
     friction: float,
     start: FloatArray,
-    passes: int,
+    periods: int,
     basis_t: FloatArray,
     has_normal: bool,
     dforce: FloatArray,
 ) -> None:
-    """Derivative (2, 3m) of the start of the last pass, into `dstart`; `dstate` (2, 3m+2): that of its end.
+    """Derivative (2, 3m) of the start of the last period, into `dstart`; `dstate` (2, 3m+2): that of its end.
 
-    passes: those to march before the last one where the closure does not say it, 0 where the start is given.
+    periods: those to march before the last one where the periodicity does not say it, 0 where the start is given.
     """
     width = dstart.shape[1]
     dstart[:, :] = 0.0
-    if passes == 0:
+    if periods == 0:
         return
-    influence = dstate[:, width:]
-    _, _, found = close(influence, 0.0, 0.0)
+    monodromy = dstate[:, width:]
+    _, _, found = solve_periodicity(monodromy, 0.0, 0.0)
     if found:
         for column in range(width):
-            first, second, _ = close(influence, dstate[0, column], dstate[1, column])
+            first, second, _ = solve_periodicity(monodromy, dstate[0, column], dstate[1, column])
             dstart[0, column], dstart[1, column] = first, second
         return
     moved = np.zeros_like(dstate)
     first, second = start
-    for _ in range(passes):
+    for _ in range(periods):
         for n in range(predicted_t.shape[1]):
-            pre_1 = predicted_t[1, n] - first
-            pre_2 = predicted_t[2, n] - second
+            trial_1 = predicted_t[1, n] - first
+            trial_2 = predicted_t[2, n] - second
             normal, _, _, first, second, status = contact_sample(
                 predicted_t[0, n], predicted_t[1, n], predicted_t[2, n], friction, first, second
             )
             if status != STICK:
-                state_tangent(moved, basis_t[n], status, normal, pre_1, pre_2, friction, has_normal, dforce)
+                advance_tangent(moved, basis_t[n], status, normal, trial_1, trial_2, friction, has_normal, dforce)
     dstart[:, :] = moved[:, :width]
 
 
 @njit(cache=True)
 def mass_tangent(
     predicted_t: FloatArray,
-    friction: float,
+    friction: FloatArray,
     mass: FloatArray,
     drag: FloatArray,
     line: IntArray,
@@ -251,17 +233,32 @@ def mass_tangent(
 ) -> tuple[FloatArray, FloatArray]:
     """Exact derivative of the periodic motion of `march_masses` with respect to the harmonics of the predicted force.
 
-    start (n_contact, 2): velocity at the start of the period, m/s. synthesis (m, N) gives the normal force at the
-    samples, step_synthesis (m, N) the tangential ones as means over the steps, step_analysis (N, m) their harmonics
-    back from such means. Returns
+    Parameters
+    ----------
+    predicted_t, friction, mass, drag, line, step
+        As `march_masses` was given them.
+    start : array (n_contact, 2)
+        Velocity at the start of the period, m/s.
+    synthesis : array (m, N)
+        Gives the normal force at the samples.
+    step_synthesis : array (m, N)
+        Gives the tangential forces as means over the steps.
+    step_analysis : array (N, m)
+        Gives their harmonics back from such means.
+    has_normal : array (n_contact,)
+        False where the normal force is constant.
 
-    - force_tangent (n_contact, 3m, 3m): as `march_tangent`, without its normal rows, dimensionless;
-    - wear_tangent (n_contact, 3m): of slip_work, m.
+    Returns
+    -------
+    force_tangent : array (n_contact, 3m, 3m)
+        As `march_tangent`, without its normal rows, dimensionless.
+    slip_work_tangent : array (n_contact, 3m)
+        Of the slip work, m.
     """
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
     force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    wear_tangent = np.zeros((n_contact, 3 * m))
+    slip_work_tangent = np.zeros((n_contact, 3 * m))
     point_t = np.ascontiguousarray(synthesis.T)
     mean_t = np.ascontiguousarray(step_synthesis.T)
     out = np.empty(7)
@@ -282,7 +279,8 @@ def mass_tangent(
         work[:] = 0.0
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
-            step_mass(predicted_t[pair, 1:, n], velocity, friction * normal, gain, loss, line[pair], out, local)
+            limit = friction_limit(friction[pair], normal)
+            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line[pair], out, local)
             # entry holds the velocities; both forces and the friction limit have columns of their own
             for row in range(5):
                 first, second = local[row, 2], local[row, 3]
@@ -292,15 +290,17 @@ def mass_tangent(
                     leave[row, m + k] += local[row, 0] * mean_t[n, k]
                     leave[row, 2 * m + k] += local[row, 1] * mean_t[n, k]
                 if normal > 0.0 and has_normal[pair]:
-                    limit = friction * local[row, 4]
+                    # the limit grows with the normal force by the friction coefficient
+                    by_limit = friction[pair] * local[row, 4]
                     for k in range(m):
-                        leave[row, k] += limit * point_t[n, k]
+                        leave[row, k] += by_limit * point_t[n, k]
             dforce_t[n] = leave[:2]
+            by_normal, by_speed = slip_work_slopes(normal, out[6])
             for column in range(3 * m + 2):
-                work[column] += normal * step * leave[4, column]
+                work[column] += by_speed * step * leave[4, column]
             if normal > 0.0 and has_normal[pair]:
                 for k in range(m):
-                    work[k] += out[6] * step * point_t[n, k]
+                    work[k] += by_normal * step * point_t[n, k]
             velocity[0] = out[2]
             velocity[1] = out[3]
             entry[0, :] = leave[2]
@@ -320,5 +320,50 @@ def mass_tangent(
                         + dforce_h[k, component, 3 * m] * first
                         + dforce_h[k, component, 3 * m + 1] * second
                     )
-            wear_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
-    return force_tangent, wear_tangent
+            slip_work_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
+    return force_tangent, slip_work_tangent
+
+
+@njit(cache=True)
+def sample_tangents(
+    predicted_t: FloatArray,
+    friction: FloatArray,
+    state_t: FloatArray,
+    status_t: IntArray,
+    has_normal: BoolArray,
+    stride: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, n of them.
+
+    The normal state is what of the predicted force the pair does not take up. Arrays as in `march_period`. Returns the
+    derivatives with respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state
+    before it (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
+    """
+    n_contact, n_samples = status_t.shape
+    own = np.zeros((n_samples // stride, n_contact, 3, 3))
+    carried = np.zeros((n_samples // stride, n_contact, 2, 2))
+    for pair in range(n_contact):
+        for place in range(n_samples // stride):
+            n = place * stride
+            status = status_t[pair, n]
+            trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
+            trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
+            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
+                status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
+            )
+            across = carried[place, pair]
+            across[0, 0], across[1, 1] = across_11, across_22
+            if status == SLIP:
+                # entry 12 of `coulomb.across_slip` but for the order of its products, as the preconditioner rounds it
+                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
+                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
+                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
+            if status == SEPARATED:
+                own[place, pair, 0, 0] = 1.0
+            for i in range(2):
+                own[place, pair, 1 + i, 1 + i] = 1.0
+                for j in range(2):
+                    own[place, pair, 1 + i, 1 + j] -= across[i, j]
+            if has_normal[pair]:
+                own[place, pair, 1, 0], own[place, pair, 2, 0] = -pull_1, -pull_2
+    return own, carried

@@ -172,7 +172,7 @@ def _relieved(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:
 def _free_motion(balance: Balance) -> FloatArray:
     """Predicted force (n_rel, 2H+1), N, of the vibration that the excitation would cause without the joint."""
     joint = balance.joint
-    amplitudes = np.zeros((joint.slots.size, joint.basis.n_harmonics), complex)
+    amplitudes = np.zeros((joint.component_index.size, joint.basis.n_harmonics), complex)
     amplitudes[:, 0] = np.linalg.lstsq(joint.structure.dynamic_stiffness[0], joint.structure.harmonic_force)[0]
-    motion = joint.to_pairs(from_complex(np.zeros(joint.slots.size), amplitudes))
-    return joint.to_relative(joint.surplus(motion))
+    motion = joint.to_pairs(from_complex(np.zeros(joint.component_index.size), amplitudes))
+    return joint.to_relative(joint.force_correction(motion))

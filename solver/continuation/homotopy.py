@@ -56,24 +56,26 @@ def solve_from_less_friction(
     Returns
     -------
     PathPoint or None
-        The parameter of the point is the friction coefficient. None where no state is found.
+        The parameter of the point is the largest friction coefficient; those of all pairs are raised in proportion.
+        None where no state is found.
     """
     target = balance.joint.friction_coefficient
+    largest = float(target.max(initial=0.0))
 
     def balance_at(logarithm: float, _: FloatArray) -> Balance:
         friction = target if logarithm == 0.0 else target * float(np.exp(logarithm))
         return replace(balance, joint=replace(balance.joint, friction_coefficient=friction))
 
-    friction = min(target, CONTINUATION.moderate_friction)
+    friction = min(largest, CONTINUATION.moderate_friction)
     for _ in range(CONTINUATION.friction_attempts):
-        logarithm = float(np.log(friction / target)) if friction < target else 0.0
+        logarithm = float(np.log(friction / largest)) if friction < largest else 0.0
         less = balance_at(logarithm, balance.history)
         result = solve_balance(less, start, solver, tolerance, effort, CONTINUATION.cold_iterations)
         if result.converged:
             lower = PathPoint(logarithm, result.evaluation, balance.history)
             point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, effort, keep_history=True)
             if arrived:
-                return PathPoint(target, point.evaluation, point.history)
+                return PathPoint(largest, point.evaluation, point.history)
         friction *= CONTINUATION.friction_reduction
     return None
 
@@ -152,7 +154,7 @@ def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexAr
     """
     unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
     unit[:, :, 1::2] = 1.0
-    penalty = to_complex(joint.to_relative(joint.surplus(unit)))[:, places]
+    penalty = to_complex(joint.to_relative(joint.force_correction(unit)))[:, places]
     return np.stack([np.diag(1.0 / column) for column in penalty.T]), np.linalg.inv(
         joint.structure.dynamic_stiffness[places]
     ).astype(complex)

@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
+from solver.contact.archard import wear_growth, wear_growth_tangent
+from solver.harmonic_balance.options import BALANCE
 from solver.model import ComplexArray, FloatArray, IntArray, Matrix
 from solver.packing import packable
 from solver.structure.joint import Joint
@@ -33,8 +35,8 @@ class Balance:
     """A periodic problem: a joint, the history of its pairs and the wear.
 
     history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start
-    of the slow step; the same all period, Eq. (6). wear_gain (n_contact,): `h k_w / alpha`, 1/N; zero where W does not
-    grow with the motion.
+    of the slow step; the same all period, Eq. (6). wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; zero
+    where W does not grow with the motion.
     """
 
     joint: Joint
@@ -48,20 +50,23 @@ class Balance:
         return cls(joint, history, wear_depth, np.zeros_like(wear_depth))
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
-        """Predicted force (n_rel, m), N, that gives a motion, m, and contact force, N, (n_contact, 3, m) of a state."""
+        """Predicted force (n_rel, m), N, Eq. (10), that gives a motion, m, and contact force, N, (n_contact, 3, m)."""
         motion = displacement_h.copy()
         motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
         held = self.joint.penalty.inertial
         motion[held, 1:, 0] -= self.history[held]
-        return self.joint.to_relative(force_h + self.joint.surplus(motion))
+        return self.joint.to_relative(force_h + self.joint.force_correction(motion))
 
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
-        """Residual and everything that it passes through, for a predicted force (n_rel, 2H+1), N."""
+        """Residual, Eq. (8), and everything that it passes through, for a predicted force (n_rel, 2H+1), N.
+
+        Eqs. (11)-(15) give the contact force, Eq. (12) the motion, Eq. (24) the wear depth where it grows with it.
+        """
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
         pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
         marched = march_law(joint, pairs, self.history)
-        wear_depth = self.wear_depth + self.wear_gain * marched.slip_work
+        wear_depth = self.wear_depth + wear_growth(self.wear_gain, marched.slip_work)
         displacement_h = joint.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         inertial = joint.penalty.inertial
@@ -82,11 +87,11 @@ class Balance:
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18): closure of the history and wear included."""
         joint = self.joint
-        force_tangent, slip_tangent = law_tangent(joint, at)
+        force_tangent, slip_work_tangent = law_tangent(joint, at)
         m = joint.basis.synthesis.shape[0]
-        surplus = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
-        motion_tangent = joint.motion(surplus).reshape(-1, 3 * m, 3 * m)
-        motion_tangent[:, 0, :] += self.wear_gain[:, None] * slip_tangent
+        correction_tangent = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
+        motion_tangent = joint.motion(correction_tangent).reshape(-1, 3 * m, 3 * m)
+        motion_tangent[:, 0, :] += wear_growth_tangent(self.wear_gain, slip_work_tangent)
         return Linearisation(joint, at, force_tangent, motion_tangent)
 
 
@@ -120,8 +125,7 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
     static = max(float(np.linalg.norm(reduced_force[:, 0])), float(np.linalg.norm(contact_force[:, 0])), moving)
     if static == 0.0:
         return 1.0, 1.0
-    # below this share of the preload the vibration is lost in round-off
-    return static, max(moving, 1e-6 * static)
+    return static, max(moving, BALANCE.least_vibration * static)
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,8 @@ class Linearisation:
 
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return np.flatnonzero(np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2)) > 1e-14)
+        change = np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2))
+        return np.flatnonzero(change > BALANCE.passive)
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
@@ -199,8 +204,8 @@ class Linearisation:
 
     def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         """Rows of `pairs`, and for each its place in `pairs` and its component."""
-        rows = np.flatnonzero(np.isin(self.joint.slots // 3, pairs))
-        return rows, np.searchsorted(pairs, self.joint.slots[rows] // 3), self.joint.slots[rows] % 3
+        rows = np.flatnonzero(np.isin(self.joint.component_index // 3, pairs))
+        return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
 
     def _spread(
         self, stiffness: Matrix, rows: IntArray, pair: IntArray, component: IntArray, motion: Matrix

@@ -12,22 +12,20 @@ from __future__ import annotations
 import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray
 from solver.structure.condensation import build_structure
 from solver.structure.fourier import build_basis, from_complex, to_complex
-from solver.structure.joint import Joint, step_share
-
-PEAK_POINTS = 1024  # in a period, at which the largest response is looked for
-TAIL = 3  # times the highest harmonic: up to there eight samples a harmonic tell the harmonics of the force
+from solver.structure.joint import Joint, step_mean_factor
 
 
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
     """Largest magnitudes over a period of the responses (n_response,), m, the static ones included."""
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
-    response_t = response_h @ build_basis(joint.basis.orders, PEAK_POINTS).synthesis
+    response_t = response_h @ build_basis(joint.basis.orders, BALANCE.peak_points).synthesis
     orders = tail_orders(joint)
     if orders:
-        response_t = response_t + tail_h(joint, evaluation, orders) @ build_basis(orders, PEAK_POINTS).synthesis
+        response_t = response_t + tail_h(joint, evaluation, orders) @ build_basis(orders, BALANCE.peak_points).synthesis
     return np.asarray(np.abs(response_t).max(axis=1))
 
 
@@ -39,7 +37,7 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
     if not orders or not joint.penalty.inertial.any():
         return ()
     stride = 2 if orders[-1] > 1 and all(order % 2 for order in orders) else 1
-    last = min(TAIL * orders[-1], joint.basis.n_samples // 2 - orders[-1], PEAK_POINTS // 4)
+    last = min(BALANCE.tail_orders * orders[-1], joint.basis.n_samples // 2 - orders[-1], BALANCE.peak_points // 4)
     return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
 
 
@@ -55,7 +53,7 @@ def tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> Flo
     marched, n_samples = joint.penalty.inertial, joint.basis.n_samples
     force_h = np.zeros((marched.size, 3, 2 * len(orders) + 1))
     mean_h = evaluation.force_t[marched, 1:] @ build_basis(orders, n_samples).analysis
-    force_h[marched, 1:] = mean_h / step_share(orders, n_samples)
+    force_h[marched, 1:] = mean_h / step_mean_factor(orders, n_samples)
     force = to_complex(joint.to_relative(force_h)).T[:, :, None]
     moved = -np.linalg.solve(structure.dynamic_stiffness, force)
     return from_complex(still, np.matmul(structure.dynamic_response, moved)[:, :, 0].T)

@@ -38,7 +38,7 @@ from solver.structure.joint import Case, build_case
 
 def follow_branch(
     model: ReducedModel,
-    friction_coefficient: float,
+    friction_coefficient: float | FloatArray | None,
     excitation_amplitude: float,
     frequencies: FloatArray,
     sweep: Direction,
@@ -147,7 +147,7 @@ class FrequencySweep:
     def __init__(
         self,
         model: ReducedModel,
-        friction_coefficient: float,
+        friction_coefficient: float | FloatArray | None,
         excitation_amplitude: float,
         sweep: Direction,
         settings: SolverSettings,

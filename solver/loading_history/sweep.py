@@ -21,7 +21,7 @@ import numpy as np
 from solver.accuracy.harmonic_levels import fewer, n_unknowns
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.refinement import Refined, coarse_state, refine
-from solver.contact.coulomb import STICK
+from solver.contact.coulomb import STICK, friction_limit
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.loading_history.options import LOADING
 from solver.loading_history.route import Route, Step
@@ -252,7 +252,7 @@ class Sweep:
         sticks = (after.evaluation.status_t == STICK).all(axis=1) & ~penalty.inertial
         stiffness = np.where(sticks, penalty.tangential, 0.0)[:, None]
         change = np.linalg.norm((after.history - before.history) * stiffness)
-        limit = self.case.friction_coefficient * float(np.linalg.norm(after.evaluation.force_h[:, 0, 0]))
+        limit = float(np.linalg.norm(friction_limit(self.case.friction_coefficient, after.evaluation.force_h[:, 0, 0])))
         return float(change) / limit if limit > 0.0 else 0.0
 
     def _choose_harmonics(self) -> None:
@@ -273,7 +273,7 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        if n_unknowns(refined.case.resolution, joint.slots.size) > ACCURACY.costly_unknowns:
+        if n_unknowns(refined.case.resolution, joint.component_index.size) > ACCURACY.costly_unknowns:
             most = ACCURACY.coarse_unknowns
             refined = coarse_state(refined, joint.omega, joint.excitation_amplitude, most, self.effort) or refined
         if refined.case is not self.case:

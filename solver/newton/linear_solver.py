@@ -29,7 +29,7 @@ class JacobianSolver:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N."""
         m = right.shape[1]
         pairs = tangent.active()
-        rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+        rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
         step = np.zeros_like(right)
         if rows.size:
             if rows.size * m <= NEWTON.dense_unknowns:
@@ -45,7 +45,7 @@ class JacobianSolver:
     def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Steps (n_rel, m) for two right sides; a small system is factorised once."""
         pairs = tangent.active()
-        rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+        rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
         if not rows.size or rows.size * first.shape[1] > NEWTON.dense_unknowns:
             return self.solve(tangent, first), self.solve(tangent, second)
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
@@ -91,7 +91,7 @@ class JacobianSolver:
 
     def _eigenvalues(self, factor: SignedFactor, tangent: Linearisation, m: int) -> ComplexArray:
         """Outlying eigenvalues of J P^-1."""
-        full = np.zeros((tangent.joint.slots.size, m))
+        full = np.zeros((tangent.joint.component_index.size, m))
 
         def product(vector: FloatArray) -> FloatArray:
             full[factor.rows] = factor.solve(vector.reshape(factor.rows.size, m))
@@ -115,7 +115,7 @@ class JacobianSolver:
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve removes the effect of `NEWTON.neutral_shift`."""
-        padded = np.zeros((tangent.joint.slots.size, right.shape[1]))
+        padded = np.zeros((tangent.joint.component_index.size, right.shape[1]))
         padded[rows] = right
         first = factor.solve(padded)
         # the rows of all other pairs follow from these
@@ -134,7 +134,7 @@ class JacobianSolver:
         restarts: int,
     ) -> tuple[FloatArray, bool]:
         """Solution (n_rows, m) by GMRES, and whether it was found."""
-        full = np.zeros((tangent.joint.slots.size, right.shape[1]))
+        full = np.zeros((tangent.joint.component_index.size, right.shape[1]))
         position = np.searchsorted(factor.rows, rows)
         padded = np.zeros((factor.rows.size, right.shape[1]))
 

@@ -27,8 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from solver.contact.alternating_frequency_time import Marched
-from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.contact.tangent import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON
@@ -90,12 +89,12 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     try:
         march = build_march(tangent)
         added, seen = resonances(joint)
-        both = [march.solve(column.reshape(joint.slots.size, -1)) for column in added]
+        both = [march.solve(column.reshape(joint.component_index.size, -1)) for column in added]
         steps, states = (np.reshape([part[place] for part in both], added.shape).T for place in (0, 1))
         bent = np.linalg.solve((np.eye(len(seen)) + seen @ states).T, steps.T).T
     except np.linalg.LinAlgError:
         return None
-    return PeriodFactor(march, seen, bent, np.arange(joint.contact.n_contact), np.arange(joint.slots.size))
+    return PeriodFactor(march, seen, bent, np.arange(joint.contact.n_contact), np.arange(joint.component_index.size))
 
 
 def build_march(tangent: Linearisation) -> SampleMarch:
@@ -105,11 +104,14 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     n_samples, highest = joint.basis.n_samples, max(joint.basis.orders, default=0)
     while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
         n_samples //= 2
-    own, carried = sample_tangents(joint, tangent.at, joint.basis.n_samples // n_samples)
+    at, stride = tangent.at, joint.basis.n_samples // n_samples
+    own, carried = sample_tangents(
+        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
+    )
     n_contact, size = joint.contact.n_contact, 3 * joint.contact.n_contact
     coupling = np.zeros((size, size))
-    coupling[np.ix_(joint.slots, joint.slots)] = stiffness_of_most(joint) / _penalty(joint)
-    coupling[joint.slots, joint.slots] -= 1.0
+    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / _penalty(joint)
+    coupling[joint.component_index, joint.component_index] -= 1.0
     blocks = np.ascontiguousarray(coupling.reshape(size, n_contact, 3).transpose(1, 0, 2))
     matrix = np.empty((n_samples, size, size))
     for sample in range(n_samples):
@@ -130,7 +132,7 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
     added, seen : array (k, n_rel (2H+1))
         Rows of `U^T` and `V^T`, dimensionless.
     """
-    structure, n_rel, m = joint.structure, joint.slots.size, joint.basis.synthesis.shape[0]
+    structure, n_rel, m = joint.structure, joint.component_index.size, joint.basis.synthesis.shape[0]
     most, penalty = stiffness_of_most(joint), _penalty(joint)
     added, seen = [], []
     for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
@@ -159,7 +161,7 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
 def _penalty(joint: Joint) -> FloatArray:
     """Penalty (n_rel,), N/m, of each relative displacement."""
     penalty = joint.penalty
-    return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.slots]
+    return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.component_index]
 
 
 def stiffness_of_most(joint: Joint) -> FloatArray:
@@ -168,36 +170,6 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
     return np.asarray(
         np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
     )
-
-
-def sample_tangents(joint: Joint, at: Marched, stride: int) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, Eqs. (13)-(15).
-
-    The normal force is that of the sample alone.
-
-    Returns
-    -------
-    own : array (n, n_contact, 3, 3)
-        With respect to the predicted force of the sample, dimensionless.
-    carried : array (n, n_contact, 2, 2)
-        With respect to the tangential state before the sample, dimensionless.
-    """
-    status = at.status_t[:, ::stride].T
-    normal = at.predicted_t[:, 0, ::stride].T
-    ahead = (at.predicted_t[:, 1:, ::stride] - at.state_t[:, :, :-1:stride]).transpose(2, 0, 1)
-    size = np.linalg.norm(ahead, axis=2)
-    unit = ahead / np.where(size > 0.0, size, 1.0)[:, :, None]
-    slips = status == SLIP
-    limit = np.where(slips, joint.friction_coefficient * normal, 0.0)
-    ratio = limit / np.where(size > 0.0, size, 1.0)
-    across = ratio[:, :, None, None] * (np.eye(2) - unit[:, :, :, None] * unit[:, :, None, :])
-    own, carried = np.zeros((*status.shape, 3, 3)), across
-    own[:, :, 0, 0] = status == SEPARATED
-    own[:, :, 1:, 1:] = np.where((status == STICK)[:, :, None, None], 0.0, np.eye(2) - across)
-    pushed = slips & joint.has_normal
-    own[:, :, 1:, 0] = np.where(pushed[:, :, None], -joint.friction_coefficient * unit, 0.0)
-    carried[status == STICK] = np.eye(2)
-    return own, carried
 
 
 @njit(cache=True)

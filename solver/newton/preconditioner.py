@@ -83,14 +83,14 @@ def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor
 
 
 def _slip_space(tangent: Linearisation) -> SlipSpace | None:
-    few = tangent.joint.slots.size <= NEWTON.small_joint_displacements
+    few = tangent.joint.component_index.size <= NEWTON.small_joint_displacements
     exact = NEWTON.exact_directions_of_few if few else NEWTON.exact_directions
     return find_slip_space(tangent, exact, NEWTON.partial_directions, NEWTON.partial_cutoff)
 
 
 def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:
     """Factorisation of the rows and columns of `pairs`; singular matrices give infinities, not errors."""
-    rows = np.flatnonzero(np.isin(tangent.joint.slots // 3, pairs))
+    rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
     n_harmonics = tangent.joint.basis.n_harmonics
     n_low = n_harmonics
     while n_low > 0 and rows.size * (2 * n_low + 1) > NEWTON.low_unknowns:

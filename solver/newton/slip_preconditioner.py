@@ -68,7 +68,7 @@ def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: 
     joint = tangent.joint
     m = joint.basis.synthesis.shape[0]
     present = np.zeros(3 * joint.contact.n_contact, bool)
-    present[joint.slots] = True
+    present[joint.component_index] = True
     columns = np.repeat(present.reshape(-1, 3), m, axis=1)
     held_back = np.eye(3 * m) - tangent.force_tangent
     # the static normal motion carries the wear, which is one more row
@@ -145,7 +145,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
     matrix[np.diag_indices_from(matrix)] += NEWTON.neutral_shift
     place = 0
     present = np.zeros((3 * joint.contact.n_contact, m), bool)
-    present[joint.slots] = True
+    present[joint.component_index] = True
     for pair, basis, own in zip(space.pairs, space.bases, held, strict=True):
         rank = basis.shape[1]
         here = _rows(joint, int(pair))
@@ -164,7 +164,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
         rank = basis.shape[1]
         there[place, :rank], kept[place, :rank] = basis.T, True
         back[place, : 3 * m, :rank], back[place, 3 * m :, :rank] = motion, force
-    every = np.arange(joint.contact.n_contact), np.arange(joint.slots.size)
+    every = np.arange(joint.contact.n_contact), np.arange(joint.component_index.size)
     return SlipFactor(joint, space, there, kept, back, cast("tuple[FloatArray, IntArray]", factor), *every)
 
 
@@ -179,12 +179,12 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
     """`Z_r D V` (n_rel, m, size) of the motion of all pairs of a slip space."""
     m = joint.basis.synthesis.shape[0]
     structure = joint.structure
-    pushed = np.empty((joint.slots.size, m, space.size))
+    pushed = np.empty((joint.component_index.size, m, space.size))
     place = 0
     for pair, motion in zip(space.pairs, moved, strict=True):
         rank = motion.shape[1]
         here = _rows(joint, int(pair))
-        harmonics = motion.reshape(3, m, rank)[joint.slots[here] % 3]
+        harmonics = motion.reshape(3, m, rank)[joint.component_index[here] % 3]
         columns = slice(place, place + rank)
         pushed[:, 0, columns] = structure.static_stiffness[:, here] @ harmonics[:, 0]
         if m > 1:
@@ -198,4 +198,4 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
 
 def _rows(joint: Joint, pair: int) -> IntArray:
     """Places of a pair's relative displacements, in the order of its components."""
-    return np.flatnonzero(joint.slots // 3 == pair)
+    return np.flatnonzero(joint.component_index // 3 == pair)

@@ -8,6 +8,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
+from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import attributes, set_attributes
@@ -109,8 +110,11 @@ class Recorder:
             Estimated local error of the step, as worn volume, m3; None for that of an Euler step, which is its
             difference to the trapezoidal rule.
         """
-        per_work = wear_coefficient / self.model.contact.area
-        rate = wear_coefficient * float(report.slip_work.sum())
+        area = self.model.contact.area
+        gain, rate = (
+            wear_gain(wear_coefficient, area, 1.0),
+            volume_rate(wear_coefficient, float(report.slip_work.sum())),
+        )
         smooth = self.scheme == "adaptive"
         if self.last is None:
             wanted = self.cycles == cycle
@@ -123,9 +127,9 @@ class Recorder:
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)
                 self.truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
-                self.pair_truncation = self.pair_truncation + half * per_work * of.slip_work_error
+                self.pair_truncation = self.pair_truncation + half * gain * of.slip_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
-        ends = [(of.wear_depth, per_work * of.slip_work) for of in (before_report, report)]
+        ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.slip_work)) for of in (before_report, report)]
         depth = depth_within(fraction, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
             fraction = self._worn_fraction(depth, before_report.wear_depth, report.wear_depth, fraction)

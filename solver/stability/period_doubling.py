@@ -71,7 +71,7 @@ def doubles_period(case: Case, joint: Joint, evaluation: Evaluation, effort: Eff
 
 
 def _unknowns(joint: Joint, orders: tuple[int, ...]) -> int:
-    return joint.slots.size * (4 * max(orders) + 1)
+    return joint.component_index.size * (4 * max(orders) + 1)
 
 
 def two_periods(orders: tuple[int, ...]) -> tuple[int, ...]:

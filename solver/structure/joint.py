@@ -18,19 +18,21 @@ from solver.structure.penalty import Penalty, build_penalty, static_penalty
 class Joint:
     """Everything that stays the same while a periodic state is sought, with H harmonics.
 
-    model: what the structure was condensed from.
-    slots (n_rel,): place `3 pair + component` of each relative displacement. has_normal (n_contact,): False where the
-    normal force is constant. line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
+    model: what the structure was condensed from. omega: rad/s. excitation_amplitude: N.
+    friction_coefficient (n_contact,): of each pair.
+    component_index (n_rel,): `3 pair + component` of each relative displacement.
+    has_normal (n_contact,): False where the normal force is constant.
+    line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
     """
 
     model: ReducedModel
     omega: float
     excitation_amplitude: float
-    friction_coefficient: float
+    friction_coefficient: FloatArray
     structure: CondensedStructure
     contact: ContactInterface
     basis: FourierBasis
-    slots: IntArray
+    component_index: IntArray
     penalty: Penalty
     has_normal: BoolArray
     line: IntArray
@@ -45,9 +47,9 @@ class Joint:
         """Time between two samples, s."""
         return 2.0 * np.pi / (self.omega * self.basis.n_samples)
 
-    def step_share(self) -> FloatArray:
+    def step_mean_factor(self) -> FloatArray:
         """Harmonics (2H+1,) of the mean over a step around each sample, over those of the samples."""
-        return step_share(self.basis.orders, self.basis.n_samples)
+        return step_mean_factor(self.basis.orders, self.basis.n_samples)
 
     def _inertial_compliance(self) -> ComplexArray:
         """Displacement per force (n_inertial, H), m/N, of the marched masses, exactly as the steps see it."""
@@ -57,30 +59,30 @@ class Joint:
         impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
         return cast("ComplexArray", np.sin(angle) / angle / (1j * self.omega * orders * impedance))
 
-    def motion(self, surplus: FloatArray) -> FloatArray:
-        """Motion (n_contact, 3, 2H+1, ...), m, from the predicted force beyond the contact force, same shape, N.
+    def motion(self, force_correction: FloatArray) -> FloatArray:
+        """Motion (n_contact, 3, 2H+1, ...), m, from the predicted less the contact force, N, of the same shape.
 
         Linear; Eq. (12) divided by the penalty, for inertial pairs Newton's law. The mean position of inertial pairs is
         relative to their history.
         """
-        shape = (-1,) + (1,) * (surplus.ndim - 2)
-        moved = np.empty_like(surplus)
-        moved[:, 0] = surplus[:, 0] / self.penalty.normal.reshape(shape)
-        moved[:, 1:] = surplus[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
-        if self.penalty.inertial.any() and surplus.shape[2] > 1:
-            self._move_masses(surplus, moved)
+        shape = (-1,) + (1,) * (force_correction.ndim - 2)
+        moved = np.empty_like(force_correction)
+        moved[:, 0] = force_correction[:, 0] / self.penalty.normal.reshape(shape)
+        moved[:, 1:] = force_correction[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
+        if self.penalty.inertial.any() and force_correction.shape[2] > 1:
+            self._move_masses(force_correction, moved)
         return moved
 
-    def _move_masses(self, surplus: FloatArray, moved: FloatArray) -> None:
+    def _move_masses(self, force_correction: FloatArray, moved: FloatArray) -> None:
         fast = self.penalty.inertial
         # harmonics last, as `to_complex` has them
-        force = np.moveaxis(surplus[fast, 1:], 2, -1)
+        force = np.moveaxis(force_correction[fast, 1:], 2, -1)
         compliance = self._inertial_compliance().reshape((-1,) + (1,) * (force.ndim - 2) + (self.basis.n_harmonics,))
         mean = force[..., 0] / self.penalty.mean[fast].reshape((-1,) + (1,) * (force.ndim - 2))
         moved[fast, 1:] = np.moveaxis(from_complex(mean, compliance * to_complex(force)), -1, 2)
 
-    def surplus(self, motion: FloatArray) -> FloatArray:
-        """Predicted force beyond the contact force, N, from a motion (n_contact, 3, 2H+1), m; undoes `motion`."""
+    def force_correction(self, motion: FloatArray) -> FloatArray:
+        """Predicted less contact force, N, from a motion (n_contact, 3, 2H+1), m, Eqs. (10), (12); undoes `motion`."""
         force = np.empty_like(motion)
         force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
         force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]
@@ -93,31 +95,32 @@ class Joint:
     def to_pairs(self, values: FloatArray) -> FloatArray:
         """(n_contact, 3, m) from (n_rel, m): zero where a pair has no such displacement."""
         spread = np.zeros((3 * self.contact.n_contact, values.shape[1]))
-        spread[self.slots] = values
+        spread[self.component_index] = values
         return spread.reshape(self.contact.n_contact, 3, values.shape[1])
 
     def to_relative(self, values: FloatArray) -> FloatArray:
         """(n_rel, m) from (n_contact, 3, m)."""
-        return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.slots]
+        return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.component_index]
 
 
-def step_share(orders: tuple[int, ...], n_samples: int) -> FloatArray:
+def step_mean_factor(orders: tuple[int, ...], n_samples: int) -> FloatArray:
     """Harmonics (2H+1,) of the mean over a step around each of the samples, over those of the samples."""
-    share = np.ones(2 * len(orders) + 1)
+    factor = np.ones(2 * len(orders) + 1)
     angle = np.pi * np.array(orders) / n_samples
-    share[1::2] = share[2::2] = np.sin(angle) / angle
-    return share
+    factor[1::2] = factor[2::2] = np.sin(angle) / angle
+    return factor
 
 
 @dataclass(frozen=True)
 class Case:
     """What all states of one computation have in common; `joint` gives the joint at a frequency and amplitude.
 
-    penalty_omega: rad/s, where the penalty is taken. resolution: harmonics and samples in use.
+    friction_coefficient (n_contact,): of each pair. penalty_omega: rad/s, where the penalty is taken. resolution:
+    harmonics and samples in use.
     """
 
     model: ReducedModel
-    friction_coefficient: float
+    friction_coefficient: FloatArray
     penalty_omega: float
     penalty: Penalty
     settings: SolverSettings
@@ -128,7 +131,7 @@ class Case:
 
         Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
         """
-        _, slots = relative_indices(self.model.contact)
+        _, component_index = relative_indices(self.model.contact)
         tangents = self.model.contact.dofs[:, 1:] >= 0
         one = tangents.sum(axis=1) == 1
         return Joint(
@@ -139,7 +142,7 @@ class Case:
             structure=build_structure(self.model, omega, excitation_amplitude, self.resolution.orders),
             contact=self.model.contact,
             basis=build_basis(self.resolution.orders, self.resolution.samples),
-            slots=slots,
+            component_index=component_index,
             penalty=self.penalty,
             has_normal=self.model.contact.dofs[:, 0] >= 0,
             line=np.where(one, np.argmax(tangents, axis=1), -1),
@@ -155,18 +158,47 @@ class Case:
 
 def build_case(
     model: ReducedModel,
-    friction_coefficient: float,
+    friction_coefficient: float | FloatArray | None,
     omega: float,
     settings: SolverSettings,
     resolution: Resolution | None = None,
 ) -> Case:
-    """Case of a scene; omega, rad/s, is where the penalty is taken: the same for states that are compared.
+    """Case of a scene.
 
-    resolution: to begin with; by default the first one that the settings allow.
+    Parameters
+    ----------
+    model : ReducedModel
+        The scene.
+    friction_coefficient : float, array (n_contact,) or None
+        One for all pairs or one of each; None where the scene has one of each pair.
+    omega : float
+        Where the penalty is taken, rad/s: the same for states that are compared.
+    settings : SolverSettings
+        Of the solver.
+    resolution : Resolution, optional
+        To begin with; by default the first one that the settings allow.
+
+    Raises
+    ------
+    ValueError
+        Where the friction coefficient is given twice or not at all, or is not one of each pair.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
-    return Case(model, friction_coefficient, omega, penalty, settings, chosen)
+    return Case(model, friction_of_pairs(model, friction_coefficient), omega, penalty, settings, chosen)
+
+
+def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
+    """Friction coefficient (n_contact,) of each pair; arguments and errors as in `build_case`."""
+    own, n_contact = model.contact.friction_coefficient, model.contact.n_contact
+    if own is None and friction_coefficient is None:
+        raise ValueError("friction_coefficient is missing: the scene has none of its own")
+    if own is not None and friction_coefficient is not None:
+        raise ValueError("friction_coefficient is given twice: the scene has one of each pair, give None")
+    given = np.asarray(friction_coefficient if own is None else own, np.float64)
+    if given.shape not in ((), (n_contact,)):
+        raise ValueError(f"friction_coefficient has shape {given.shape}: give a number or shape ({n_contact},)")
+    return np.array(np.broadcast_to(given, (n_contact,)))
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:

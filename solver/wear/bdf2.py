@@ -26,6 +26,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from solver.contact.archard import wear_gain, wear_rate
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Balance
@@ -135,7 +136,7 @@ class AdaptiveSteps:
             grown = depth - self.before[1]
             base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
             factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
-        gain = factor * length * trajectory.wear_coefficient / area
+        gain = wear_gain(trajectory.wear_coefficient, area, factor * length)
         balance = Balance(trajectory.joint, trajectory.point.history, base, gain)
         start = trajectory.predicted(balance, length)
         result = solve_balance(
@@ -149,7 +150,7 @@ class AdaptiveSteps:
         if not result.converged:
             return None
         new = result.evaluation
-        new_rate = trajectory.wear_coefficient / area * new.slip_work
+        new_rate = wear_rate(trajectory.wear_coefficient, area, new.slip_work)
         if self.before is None:
             error = 0.5 * length * (new_rate - rate)
         else:

@@ -176,7 +176,7 @@ class Companion:
         state is found with them.
         """
         trajectory, main = self.trajectory, self.main
-        resolution, n_rel = main.case.resolution, main.joint.slots.size
+        resolution, n_rel = main.case.resolution, main.joint.component_index.size
         if n_unknowns(resolution, n_rel) > ACCURACY.costly_unknowns:
             while n_unknowns(resolution, n_rel) > ACCURACY.coarse_unknowns and resolution.highest > 1:
                 resolution = fewer(resolution, AUTOMATIC)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from solver.contact.archard import wear_gain, wear_rate
 from solver.harmonic_balance.converged import BalanceAt
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
@@ -21,7 +22,7 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
 def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray) -> BalanceAt:
     """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24) to (26).
 
-    gain: of the whole step, `h k_w / alpha`.
+    gain: `archard.wear_gain` of the whole step.
     """
 
     def balance_at(fraction: float, history: FloatArray) -> Balance:
@@ -51,5 +52,5 @@ def euler_step(joint: Joint, scheme: Scheme, before: Evaluation, length: float, 
     """
     area, depth = joint.contact.area, before.wear_depth
     if scheme == "explicit":
-        return held_wear(joint, depth, depth + length * (wear_coefficient / area * before.slip_work))
-    return implicit_wear(joint, depth, length * wear_coefficient / area)
+        return held_wear(joint, depth, depth + length * wear_rate(wear_coefficient, area, before.slip_work))
+    return implicit_wear(joint, depth, wear_gain(wear_coefficient, area, length))

@@ -25,7 +25,7 @@ from solver.wear.trajectory import Trajectory
 
 def march_wear(
     model: ReducedModel,
-    friction_coefficient: float,
+    friction_coefficient: float | FloatArray | None,
     start: StartState,
     wear_coefficient: float,
     step: float,

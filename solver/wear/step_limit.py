@@ -21,6 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.contact.archard import wear_growth
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, FloatArray
@@ -30,7 +31,7 @@ from solver.structure.joint import Joint
 from solver.wear.options import WEAR
 
 
-def explicit_step_limit(joint: Joint, at: Evaluation, wear_per_work: FloatArray, solver: JacobianSolver) -> float:
+def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, solver: JacobianSolver) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
     The eigenvalues are those that Arnoldi's method knows after `arnoldi_products` solves; complex ones count where the
@@ -40,8 +41,8 @@ def explicit_step_limit(joint: Joint, at: Evaluation, wear_per_work: FloatArray,
     ----------
     joint, at
         The joint and its converged state.
-    wear_per_work
-        (n_contact,), `k_w / alpha`, 1/N.
+    gain
+        (n_contact,), `archard.wear_gain` of one cycle, m/J.
     solver
         Solves with the Jacobian of the state.
 
@@ -50,14 +51,14 @@ def explicit_step_limit(joint: Joint, at: Evaluation, wear_per_work: FloatArray,
     float
         h, cycles; inf where the wear rate falls nowhere.
     """
-    rate = wear_per_work * at.slip_work
+    rate = wear_growth(gain, at.slip_work)
     if not rate.max(initial=0.0) > 0.0:
         return float("inf")
     frozen = Balance.frozen(joint, at.history, at.wear_depth)
     # a step in which the fastest pair wears as much as the joint moves: both Jacobians differ in more than round-off
     step = float(np.abs(at.displacement_h).max()) / float(rate.max())
     plain = frozen.linearise(at)
-    wearing = replace(frozen, wear_gain=step * wear_per_work).linearise(at)
+    wearing = replace(frozen, wear_gain=step * gain).linearise(at)
     shape = at.predicted_h.shape
 
     def product(vector: FloatArray) -> FloatArray:
@@ -98,7 +99,7 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> 
 
 def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[BoolArray, BoolArray, FloatArray, float]:
     """Rows of pressed normals, rows that follow, worn depth on the rows, m, and norm of the normal forces, N."""
-    pair, component = joint.slots // 3, joint.slots % 3
+    pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
     opened = (before.status_t == SEPARATED).all(axis=1)
     free = np.where(component == 0, opened[pair], ~stuck[pair])

@@ -13,6 +13,7 @@ from solver.accuracy.options import ACCURACY
 from solver.accuracy.pair_error import slip_work_error
 from solver.accuracy.period_events import lacks_even
 from solver.accuracy.refinement import refine
+from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history, vibration_change
@@ -206,7 +207,7 @@ class Trajectory:
 
     def rate(self) -> FloatArray:
         """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21), (25)."""
-        return self.wear_coefficient / self.joint.contact.area * self.point.evaluation.slip_work
+        return wear_rate(self.wear_coefficient, self.joint.contact.area, self.point.evaluation.slip_work)
 
     def wears(self) -> bool:
         """Whether anything wears at all, more than round-off of the slip that the static load has caused."""
@@ -305,10 +306,10 @@ class Trajectory:
         motion = self.point.evaluation.displacement_h[:, 1:]
         pressed = np.abs(self.point.evaluation.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
-        self.largest_rate = max(self.largest_rate, self.wear_coefficient * moved)
+        self.largest_rate = max(self.largest_rate, volume_rate(self.wear_coefficient, moved))
         if np.isnan(self.step_limit) and self.wears():
-            per_work = self.wear_coefficient / self.joint.contact.area
-            self.step_limit = explicit_step_limit(self.joint, self.point.evaluation, per_work, self.solver)
+            gain = wear_gain(self.wear_coefficient, self.joint.contact.area, 1.0)
+            self.step_limit = explicit_step_limit(self.joint, self.point.evaluation, gain, self.solver)
 
     def predicted(self, balance: Balance, length: float) -> FloatArray:
         """Predicted force (n_rel, m), N, to begin a step with: extrapolated over the last step, or that of now."""

@@ -16,6 +16,7 @@ _SAID = {
     "contact/area": "weight of the pair, m2",
     "contact/gap": "initial gap, m",
     "contact/normal_load": "constant normal force of pairs without a closing displacement, N, compression positive",
+    "contact/friction_coefficient": "friction coefficient of the pair",
     "contact/position": "position of the pair, m",
     "contact/surface": "label of the surface of the pair",
     "mass": "mass matrix, kg",

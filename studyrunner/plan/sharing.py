@@ -1,7 +1,9 @@
 """Which choices of wear coefficient, step and scheme have the same wear history, so that it is computed once, and why.
 
-The wear equation is dW/dt = k_w f(W): with s k_w and the step h / s the same states follow each other, each at the
-count t / s. A march computes the history of the largest k_w; the others are read from it at the counts s t.
+Where the rate of the wear law is proportional to its coefficient (`WearLaw.proportional`), as Archard's is, the wear
+equation is dW/dt = k_w f(W), Eq. (7): with s k_w and the step h / s the same states follow each other, each at the
+count t / s. A march computes the history of the largest k_w; the others are read from it at the counts s t. With any
+other law histories of different k_w have nothing in common.
 """
 
 from __future__ import annotations
@@ -82,7 +84,7 @@ class Sharing:
 
 def share_histories(study: Study) -> Sharing:
     """The histories that are computed once, for a reason that the study itself shows; all with `shortcuts = false`."""
-    axes, slow_time = study.axes, study.slow_time
+    axes, slow_time, proportional = study.axes, study.slow_time, study.wear_law.proportional
     choices = itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme)))
     if not study.solver.shortcuts:
         return Sharing(tuple(Alike(((choice,),)) for choice in choices), Counter())
@@ -95,7 +97,7 @@ def share_histories(study: Study) -> Sharing:
         scheme = axes.scheme[place]
         if study.cycles_kept[-1] == 0.0:
             idle.setdefault(("cycles", wear), []).append(choice)
-        elif axes.wear_coefficient[wear] == 0.0:
+        elif proportional and axes.wear_coefficient[wear] == 0.0:
             idle.setdefault(("wear_coefficient", wear), []).append(choice)
         elif scheme == "adaptive":
             idle.setdefault(("adaptive steps", wear), []).append(choice)
@@ -111,6 +113,10 @@ def share_histories(study: Study) -> Sharing:
             adaptive.append(tuple(members))
         else:
             marches.append(Alike((tuple(members),), held=cause != "largest_depth"))
+    if not proportional:
+        marches += [Alike((same,)) for same in adaptive]
+        marches += [Alike(((choice,),)) for choice in itertools.chain.from_iterable(fixed.values())]
+        adaptive, fixed = [], {}
     if adaptive:
         farthest_first = sorted(adaptive, key=lambda members: -axes.wear_coefficient[members[0][0]])
         marches.append(Alike(tuple(farthest_first)))

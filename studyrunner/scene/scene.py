@@ -68,7 +68,19 @@ def _build(study: Study) -> ReducedModel:
         # h5py is loaded for scene files only: the bundled scenes do without it.
         from studies.scene_file import read_scene
 
-        return read_scene(scene.path, given, scene.group)
+        model = read_scene(scene.path, given, scene.group)
+    _check_friction(study, model)
+    return model
+
+
+def _check_friction(study: Study, model: ReducedModel) -> None:
+    """Raises UserError where study and scene file both say what the friction coefficient is, or neither does."""
+    key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
+    if own is None and value is None:
+        raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
+    if own is not None and value is not None:
+        remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
+        raise UserError(study.source, key, value, remedy)
 
 
 def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:
@@ -156,6 +168,8 @@ def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
             yield f"{nodal_diameter} {name}", getattr(linear, name)
     for name in ("dofs", "area", "gap", "normal_load", "position"):
         yield name, getattr(model.contact, name)
+    if model.contact.friction_coefficient is not None:
+        yield "friction_coefficient", model.contact.friction_coefficient
     texts = "\n".join((*model.contact.surface, "", *model.response_names))
     yield "texts", np.frombuffer(texts.encode(), dtype=np.uint8)
     yield "sectors", np.array([model.n_sectors, model.nodal_diameter], dtype=np.int64)

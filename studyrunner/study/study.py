@@ -11,6 +11,7 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, TypeAdapter, model_validator
 
+from solver.contact.archard import ARCHARD, WearLaw
 from solver.settings import Automatic
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
@@ -152,9 +153,9 @@ class OutputsSection(Section):
 
 
 class SceneFileParameters(Section):
-    """[scene] of a scene file: the file says all the rest."""
+    """[scene] of a scene file: the file says all the rest, and this as well where it has one of each pair."""
 
-    friction_coefficient: NotNegative = Field(description="a number, 0 or more")
+    friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more")
 
 
 class SceneSection(Section):
@@ -250,9 +251,15 @@ class Study(Section):
         return (study_file,) if self.scene.path is None else (study_file, self.scene.path)
 
     @property
-    def friction_coefficient(self) -> float:
-        """Coulomb's coefficient of the scene."""
-        return float(dict(self.scene.parameters)["friction_coefficient"])
+    def friction_coefficient(self) -> float | None:
+        """Coulomb's coefficient of all pairs; None where the scene file has one of each pair."""
+        value = dict(self.scene.parameters)["friction_coefficient"]
+        return None if value is None else float(value)
+
+    @property
+    def wear_law(self) -> WearLaw:
+        """What is to be known of the wear law."""
+        return ARCHARD
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:

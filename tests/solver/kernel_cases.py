@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from solver.contact.coulomb import march_period, mean_normal_force, mean_normal_tangent, wear_integral
+from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, FloatArray, IntArray
@@ -96,13 +97,15 @@ def mass_case(n_contact: int, seed: int, basis: FourierBasis = MASS_BASIS, opens
 def run_masses(
     case: MassCase, predicted_h: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
-    return march_masses(case.predicted_t(predicted_h), FRICTION, case.mass, case.drag, case.line, case.step)
+    return march_masses(
+        case.predicted_t(predicted_h), friction_of(predicted_h), case.mass, case.drag, case.line, case.step
+    )
 
 
 def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     return mass_tangent(
         case.predicted_t(case.predicted_h),
-        FRICTION,
+        friction_of(case.predicted_h),
         case.mass,
         case.drag,
         case.line,
@@ -115,6 +118,11 @@ def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, Float
     )
 
 
+def friction_of(predicted: FloatArray) -> FloatArray:
+    """Friction coefficient (n_contact,) of the pairs of a predicted force (n_contact, ...)."""
+    return np.full(len(predicted), FRICTION)
+
+
 def both_tangents(n_contact: int) -> np.ndarray:
     """Lines (n_contact,) of pairs with two tangents."""
     return np.full(n_contact, -1)
@@ -122,13 +130,14 @@ def both_tangents(n_contact: int) -> np.ndarray:
 
 def kernel_results() -> dict[str, FloatArray]:
     case = kernel_case(3, BASIS.n_samples, seed=20)
-    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 6)
+    friction = friction_of(case.predicted_t)
+    force_t, state_t, status_t, periods, error = march_period(case.predicted_t, friction, case.start, 1e-9, 6)
     force_tangent, wear_tangent = march_tangent(
         case.predicted_t,
-        FRICTION,
+        friction,
         case.start,
         state_t,
-        passes,
+        periods,
         both_tangents(3),
         BASIS.synthesis,
         BASIS.analysis,
@@ -141,9 +150,9 @@ def kernel_results() -> dict[str, FloatArray]:
         "force": force_t,
         "state": state_t,
         "status": status_t,
-        "passes": passes,
-        "drift": drift,
-        "wear": wear_integral(force_t, state_t),
+        "periods": periods,
+        "error": error,
+        "wear": integrate_slip_work(force_t, state_t),
         "mean_normal": mean_normal_force(case.predicted_t),
         "normal_tangent": mean_normal_tangent(case.predicted_t, BASIS.synthesis, BASIS.analysis, case.has_normal),
         "force_tangent": force_tangent,

@@ -150,9 +150,9 @@ def random_balance(
     gain = random.uniform(0.1, 0.3, n_contact) / PRELOAD if wear else np.zeros(n_contact)
     balance = Balance(joint, history, random.uniform(0.0, 2e-6, n_contact), gain)
     order = np.concatenate([[0], np.repeat(resolution.orders, 2)])
-    predicted = random.normal(size=(joint.slots.size, order.size))
+    predicted = random.normal(size=(joint.component_index.size, order.size))
     predicted *= 1.2 * PRELOAD / (1.0 + order) ** 1.5
-    predicted[joint.slots % 3 == 0, 0] += PRELOAD
+    predicted[joint.component_index % 3 == 0, 0] += PRELOAD
     return balance, predicted
 
 

@@ -82,7 +82,7 @@ def test_dense_of_some_pairs_is_a_block_of_the_whole() -> None:
     whole = tangent.dense(np.arange(6))
     m = predicted.shape[1]
     pairs = np.array([1, 3, 4])
-    chosen = np.flatnonzero(np.repeat(np.isin(balance.joint.slots // 3, pairs), m))
+    chosen = np.flatnonzero(np.repeat(np.isin(balance.joint.component_index // 3, pairs), m))
     # the order of sums depends on the size of the products: round-off
     assert tangent.dense(pairs) == pytest.approx(whole[np.ix_(chosen, chosen)], abs=1e-14 * np.abs(whole).max())
 
@@ -123,7 +123,7 @@ def mass_balance(free: str, seed: int, wear: bool, resolution: Resolution) -> tu
     model = with_free_masses(random_model(seed, MODELS["mixed"]), MASSES[free])
     balance, predicted = random_balance(model, SETTINGS, seed + 100, wear=wear, resolution=resolution)
     assert np.flatnonzero(balance.joint.penalty.inertial).tolist() == MASSES[free]
-    predicted[balance.joint.slots % 3 == 0, 1:] *= 2.0  # so that pairs open
+    predicted[balance.joint.component_index % 3 == 0, 1:] *= 2.0  # so that pairs open
     return balance, predicted
 
 

@@ -179,10 +179,10 @@ def test_a_slip_that_does_not_repeat_is_caught() -> None:
     joint, evaluation = random_state(1)
     slipping = int(np.argmax(evaluation.slip_work))
     state_t = evaluation.state_t.copy()
-    limit = joint.friction_coefficient * evaluation.force_t[:, 0].max()
+    limit = float(joint.friction_coefficient[0]) * evaluation.force_t[:, 0].max()
     state_t[slipping, 0] += 0.02 * limit * np.linspace(0.0, 1.0, state_t.shape[2])
-    assert failing(joint, replace(evaluation, state_t=state_t)) == {"drift"}
-    assert failing(joint, replace(evaluation, drift=0.02 * limit)) == {"drift"}
+    assert failing(joint, replace(evaluation, state_t=state_t)) == {"periodicity_error"}
+    assert failing(joint, replace(evaluation, periodicity_error=0.02 * limit)) == {"periodicity_error"}
 
 
 def test_a_pull_is_caught_in_the_samples_and_in_the_series() -> None:
@@ -223,7 +223,13 @@ def test_pairs_out_of_reach_have_nothing_to_violate() -> None:
     point = first_point(case, OMEGA, 10.0, np.zeros(2))
     certificate = certify(case.joint(OMEGA, 10.0), point.evaluation)
     assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
-    assert certificate.penetration == certificate.tension == certificate.cone_violation == certificate.drift == 0.0
+    assert (
+        certificate.penetration
+        == certificate.tension
+        == certificate.cone_violation
+        == certificate.periodicity_error
+        == 0.0
+    )
 
 
 @pytest.mark.parametrize("name", ["residual", *ACCURACY.violation_limits])

@@ -67,7 +67,7 @@ def test_between_its_folds_the_branch_is_unstable() -> None:
 def test_a_joint_that_is_open_or_stuck_all_over_is_stable() -> None:
     for seed, level in ((1, -1e6), (2, 1e6)):
         balance, predicted = random_balance(random_model(seed), SolverSettings(3, 24), seed, wear=False)
-        predicted[balance.joint.slots % 3 == 0, 0] = level
+        predicted[balance.joint.component_index % 3 == 0, 0] = level
         at = balance.evaluate(predicted)
         assert (at.status_t == (0 if level < 0 else 1)).all()
         assert is_stable(balance.linearise(at), JacobianSolver())

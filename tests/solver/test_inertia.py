@@ -315,11 +315,11 @@ def test_a_straight_motion_in_the_plane_is_that_along_the_line() -> None:
 
 def test_a_period_is_marched_until_its_velocity_repeats() -> None:
     case = mass_case(12, 3)
-    _, velocity_t, place_t, status_t, _, drift = run_masses(case, case.predicted_h)
+    _, velocity_t, place_t, status_t, _, error = run_masses(case, case.predicted_h)
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
     largest = np.abs(velocity_t).max(axis=(1, 2))
     assert (np.abs(velocity_t[:, :, -1] - velocity_t[:, :, 0]).max(axis=1) <= 1e-11 * largest).all()
-    assert (drift <= 1e-9 * np.abs(case.predicted_h).max()).all()
+    assert (error <= 1e-9 * np.abs(case.predicted_h).max()).all()
     assert not place_t[:, :, 0].any()
 
 
@@ -328,10 +328,10 @@ def test_a_velocity_that_only_the_drag_forgets_repeats_too() -> None:
     case = mass_case(3, 4, opens=False)
     weak = case.predicted_h.copy()
     weak[:, 0] *= 1e-9
-    _, velocity_t, _, _, _, drift = run_masses(case, weak)
+    _, velocity_t, _, _, _, error = run_masses(case, weak)
     largest = np.abs(velocity_t).max(axis=(1, 2))
     assert (np.abs(velocity_t[:, :, -1] - velocity_t[:, :, 0]).max(axis=1) <= 1e-11 * largest).all()
-    assert (drift < 1e-9).all()
+    assert (error < 1e-9).all()
 
 
 def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
@@ -339,9 +339,9 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
     held = case.predicted_h.copy()
     held[:, 0] = 0.0
     held[:, 0, 0] = 1e3
-    force_t, velocity_t, place_t, status_t, slip_work, drift = run_masses(case, held)
+    force_t, velocity_t, place_t, status_t, slip_work, error = run_masses(case, held)
     assert (status_t == STICK).all()
-    for exactly_zero in (velocity_t, place_t, slip_work, drift):
+    for exactly_zero in (velocity_t, place_t, slip_work, error):
         assert not exactly_zero.any()
     assert force_t == pytest.approx(case.predicted_t(held), rel=1e-14)
 

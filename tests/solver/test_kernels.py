@@ -13,16 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.coulomb import (
-    SEPARATED,
-    SLIP,
-    STICK,
-    contact_sample,
-    march_period,
-    mean_normal_force,
-    mean_normal_tangent,
-    wear_integral,
-)
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
+from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.tangent import march_tangent
 from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
@@ -32,9 +25,16 @@ from tests.solver.kernel_cases import (
     PERIODS,
     KernelCase,
     both_tangents,
+    friction_of,
     kernel_case,
     kernel_results,
 )
+
+
+def marched(case: KernelCase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Predicted force, friction coefficients and start state, as `march_period` takes them."""
+    return case.predicted_t, friction_of(case.start), case.start
+
 
 number = st.integers(-(10**8), 10**8).map(lambda count: 1e-6 * count)  # N; no squares that underflow
 friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
@@ -77,39 +77,39 @@ def test_the_three_states_of_a_sample() -> None:
     assert contact_sample(4.0, 4.0, 5.0, 0.0, 1.0, 1.0) == (4.0, 0.0, 0.0, 4.0, 5.0, SLIP)
 
 
-@pytest.mark.parametrize("most_passes", [1, 2, 5])
-def test_displacement_level_is_that_of_the_plain_twin(most_passes: int) -> None:
+@pytest.mark.parametrize("most_periods", [1, 2, 5])
+def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None:
     case = kernel_case(4, 24, seed=1)
-    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 0.0, most_passes)
+    force_t, state_t, status_t, periods, error = march_period(*marched(case), 0.0, most_periods)
     for pair in range(4):
-        force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, case.start[pair], passes[pair])
+        force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, case.start[pair], periods[pair])
         assert force_t[pair] == pytest.approx(force, abs=1e-11)
         assert state_t[pair] == pytest.approx(slip, abs=1e-11)
         assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
-        assert drift[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
-    assert passes.max() <= most_passes
+        assert error[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
+    assert periods.max() <= most_periods
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
 
 
 def test_a_period_is_marched_until_its_state_repeats() -> None:
     # Separation forgets the history within one pass, slip under constant pressure within two.
     case = kernel_case(6, 48, seed=3)
-    *_, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 50)
-    assert (drift <= 1e-9).all()
-    assert (passes >= 2).all()
-    again = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 60)
-    assert np.array_equal(again[3], passes)
+    *_, periods, error = march_period(*marched(case), 1e-9, 50)
+    assert (error <= 1e-9).all()
+    assert (periods >= 2).all()
+    again = march_period(*marched(case), 1e-9, 60)
+    assert np.array_equal(again[3], periods)
 
 
 def test_a_stuck_pair_keeps_its_history_and_wears_exactly_zero() -> None:
     case = kernel_case(3, 64, seed=4)
     predicted = case.predicted_t.copy()
     predicted[:, 0] = 1e3  # far above what the tangents need
-    force_t, state_t, status_t, passes, drift = march_period(predicted, FRICTION, case.start, 0.0, 8)
+    force_t, state_t, status_t, periods, error = march_period(predicted, friction_of(predicted), case.start, 0.0, 8)
     assert (status_t == STICK).all()
-    assert np.array_equal(wear_integral(force_t, state_t), np.zeros(3))
-    assert np.array_equal(passes, np.ones(3))
-    assert not drift.any()
+    assert np.array_equal(integrate_slip_work(force_t, state_t), np.zeros(3))
+    assert np.array_equal(periods, np.ones(3))
+    assert not error.any()
     assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
 
 
@@ -120,10 +120,10 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     predicted = np.zeros((1, 3, n))
     predicted[0, 0] = pressure
     predicted[0, 1] = amplitude * np.cos(2 * np.pi * np.arange(n) / n)
-    force_t, state_t, _, _, drift = march_period(predicted, FRICTION, np.full((1, 2), 3.0), 1e-12, 8)
-    assert drift[0] == pytest.approx(0, abs=1e-12)
+    force_t, state_t, _, _, error = march_period(predicted, friction_of(predicted), np.full((1, 2), 3.0), 1e-12, 8)
+    assert error[0] == pytest.approx(0, abs=1e-12)
     expected = 4 * pressure * (amplitude - FRICTION * pressure)
-    assert wear_integral(force_t, state_t)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert integrate_slip_work(force_t, state_t)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
     work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
     assert work <= FRICTION * expected * (1 + 1e-12)
@@ -136,7 +136,7 @@ def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_incr
     state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
     state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
     expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6]
-    assert wear_integral(force_t, state_t) == pytest.approx(expected, rel=1e-15, abs=0.0)
+    assert integrate_slip_work(force_t, state_t) == pytest.approx(expected, rel=1e-15, abs=0.0)
 
 
 def test_a_pair_that_stays_pressed_keeps_its_samples_of_the_normal_force() -> None:
@@ -171,7 +171,7 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
 
 
 def derivative_error(
-    case: KernelCase, n_contact: int, closure: float = 0.0, most_passes: int = PERIODS
+    case: KernelCase, n_contact: int, closure: float = 0.0, most_periods: int = PERIODS
 ) -> tuple[float, float, float]:
     """Largest error of the tangents against central differences relative to their size, and the switches' distance."""
     basis = BASIS
@@ -179,19 +179,21 @@ def derivative_error(
 
     def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, *_ = march_period(predicted_t, FRICTION, case.start, closure, most_passes)
+        force_t, state_t, status_t, *_ = march_period(
+            predicted_t, friction_of(case.start), case.start, closure, most_periods
+        )
         force_h = force_t @ basis.analysis
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
-        return force_h, wear_integral(force_t, state_t), status_t
+        return force_h, integrate_slip_work(force_t, state_t), status_t
 
     predicted_t = case.predicted_h @ basis.synthesis
-    _, state_t, _, passes, _ = march_period(predicted_t, FRICTION, case.start, closure, most_passes)
+    _, state_t, _, periods, _ = march_period(predicted_t, friction_of(case.start), case.start, closure, most_periods)
     force_tangent, wear_tangent = march_tangent(
         predicted_t,
-        FRICTION,
+        friction_of(predicted_t),
         case.start,
         state_t,
-        passes,
+        periods,
         both_tangents(n_contact),
         basis.synthesis,
         basis.analysis,
@@ -233,8 +235,8 @@ def test_tangents_are_those_of_central_differences(seed: int) -> None:
 def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
     # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
     case = kernel_case(4, BASIS.n_samples, seed=10)
-    _, state_t, *_ = march_period(case.predicted_t, FRICTION, case.start, 1e-12, PERIODS)
-    arguments = (case.predicted_t, FRICTION, case.start, state_t)
+    _, state_t, *_ = march_period(*marched(case), 1e-12, PERIODS)
+    arguments = (case.predicted_t, friction_of(case.predicted_t), case.start, state_t)
     rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
     one, _ = march_tangent(*arguments, np.full(4, 1), both_tangents(4), *rest)
     two, _ = march_tangent(*arguments, np.full(4, 2), both_tangents(4), *rest)
@@ -247,9 +249,9 @@ def test_a_pair_with_one_tangent_has_the_tangent_of_one_with_two_that_moves_alon
     case = kernel_case(4, BASIS.n_samples, seed=10)
     predicted_t, start = case.predicted_t.copy(), case.start.copy()
     predicted_t[:, 2 - line] = start[:, 1 - line] = 0.0
-    _, state_t, status_t, passes, _ = march_period(predicted_t, FRICTION, start, 1e-12, PERIODS)
+    _, state_t, status_t, periods, _ = march_period(predicted_t, friction_of(predicted_t), start, 1e-12, PERIODS)
     assert len(np.unique(status_t)) == 3
-    arguments = (predicted_t, FRICTION, start, state_t, passes)
+    arguments = (predicted_t, friction_of(predicted_t), start, state_t, periods)
     rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
     two, two_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, both_tangents(4), *rest))
     one, one_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, np.full(4, line), *rest))
@@ -275,8 +277,8 @@ def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
 @pytest.mark.parametrize("seed", [31, 33])
 def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int) -> None:
     case = slowly_closing(seed)
-    force_t, state_t, status_t, passes, drift = march_period(case.predicted_t, FRICTION, case.start, 1e-9, 400)
-    assert (drift <= 1e-9).all()
+    force_t, state_t, status_t, periods, error = march_period(*marched(case), 1e-9, 400)
+    assert (error <= 1e-9).all()
     slowest = 0
     for pair in range(force_t.shape[0]):
         plain = 1
@@ -292,12 +294,12 @@ def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int)
         assert state_t[pair] == pytest.approx(slip, abs=1e-6)
         assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
     assert slowest > 40
-    assert passes.max() < 20
+    assert periods.max() < 20
 
 
 @pytest.mark.parametrize("seed", [31, 33])
 def test_tangents_of_a_slow_closure_are_those_of_central_differences(seed: int) -> None:
-    force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_passes=400)
+    force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_periods=400)
     assert force_error < 1e-6
     assert wear_error < 1e-6 * max(wear_size, 1.0)
 
@@ -306,17 +308,19 @@ def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
     basis = build_basis((), 1)
     predicted_t = np.array([[[2.0], [0.5], [3.0]]])
     start = np.zeros((1, 2))
-    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 1)
+    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 1)
     assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
     everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
-    tangent, _ = march_tangent(predicted_t, FRICTION, start, state_t, np.array([1]), both_tangents(1), *everything)
+    tangent, _ = march_tangent(
+        predicted_t, friction_of(predicted_t), start, state_t, np.array([1]), both_tangents(1), *everything
+    )
     # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
     along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
     across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))
     assert tangent[0, 1:] == pytest.approx(np.column_stack([FRICTION * along, across]), rel=1e-12)
     assert mean_normal_tangent(predicted_t, *everything)[0, 0] == pytest.approx([1.0])
-    force_t, state_t, *_ = march_period(predicted_t, FRICTION, start, 0.0, 8)
-    assert wear_integral(force_t, state_t)[0] == 0.0
+    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 8)
+    assert integrate_slip_work(force_t, state_t)[0] == 0.0
 
 
 def test_kernels_give_the_same_numbers_without_compilation(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_pairs_that_stay_stuck_are_left_out_and_found_again() -> None:
     # in steps ever more pairs are pressed so that they neither slip nor open, then they are let go again
     for held in (0, 5, 10, 14, 10, 2, 0):
         changed = predicted.copy()
-        closing = (joint.slots // 3 < held) & (joint.slots % 3 == 0)
+        closing = (joint.component_index // 3 < held) & (joint.component_index % 3 == 0)
         changed[closing, 0] += 100.0 * PRELOAD
         tangent = balance.linearise(balance.evaluate(changed))
         assert tangent.active().size <= 14 - held

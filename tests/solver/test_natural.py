@@ -105,7 +105,7 @@ def test_the_history_is_the_corrected_slip_at_the_end_of_the_period() -> None:
     case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
     joint = case.joint(OMEGA, 60.0)
     balance = Balance.frozen(joint, np.full((2, 2), 1e-6), np.zeros(2))
-    at = balance.evaluate(np.random.default_rng(3).normal(size=(joint.slots.size, 7)) * 100.0)
+    at = balance.evaluate(np.random.default_rng(3).normal(size=(joint.component_index.size, 7)) * 100.0)
     expected = at.state_t[:, :, -1] / joint.penalty.tangential[:, None]
     assert final_history(balance, at) == pytest.approx(expected, rel=1e-15, abs=0.0)
 
@@ -115,7 +115,7 @@ def test_the_history_of_a_mass_on_a_slider_is_its_mean_position() -> None:
     joint = case.joint(1000.0, 10.0)
     assert joint.penalty.inertial.all()
     balance = Balance.frozen(joint, np.array([[2e-5, 0.0]]), np.zeros(1))
-    at = balance.evaluate(np.random.default_rng(4).normal(size=(joint.slots.size, 7)) * 10.0)
+    at = balance.evaluate(np.random.default_rng(4).normal(size=(joint.component_index.size, 7)) * 10.0)
     assert np.array_equal(final_history(balance, at), at.displacement_h[:, 1:, 0])
 
 

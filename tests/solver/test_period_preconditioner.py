@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
+from solver.contact.tangent import sample_tangents
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
 from solver.newton import period_preconditioner, preconditioner
@@ -19,7 +20,6 @@ from solver.newton.period_preconditioner import (
     build_period_factor,
     march_samples,
     resonances,
-    sample_tangents,
     stiffness_of_most,
 )
 from solver.newton.preconditioner import HarmonicFactor, build_factor, build_harmonic_factor
@@ -51,7 +51,7 @@ def states_at(joint: Joint, predicted: FloatArray, before: FloatArray) -> FloatA
     """State (n_contact, 3), N, behind one sample: predicted forces (n_contact, 3), tangential states (n_contact, 2)."""
     state = np.zeros_like(predicted)
     for pair in range(len(predicted)):
-        normal, _, _, *tangents, _ = contact_sample(*predicted[pair], joint.friction_coefficient, *before[pair])
+        normal, _, _, *tangents, _ = contact_sample(*predicted[pair], joint.friction_coefficient[pair], *before[pair])
         state[pair] = predicted[pair, 0] - normal, *tangents
     return state
 
@@ -60,13 +60,15 @@ def states_at(joint: Joint, predicted: FloatArray, before: FloatArray) -> FloatA
 def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
     balance, predicted = case(11)
     joint, at = balance.joint, balance.evaluate(predicted)
-    own, carried = sample_tangents(joint, at, stride)
+    own, carried = sample_tangents(
+        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
+    )
     assert own.shape[0] == at.status_t[:, ::stride].shape[1]
     assert set(at.status_t[:, ::stride].ravel()) == {SEPARATED, STICK, SLIP}
     random, checked = np.random.default_rng(2), 0
     for place, sample in enumerate(range(0, at.status_t.shape[1], stride)):
         now, before = at.predicted_t[:, :, sample], at.state_t[:, :, sample]
-        step = random.normal(size=now.shape) * (joint.to_pairs(np.ones((joint.slots.size, 1)))[:, :, 0])
+        step = random.normal(size=now.shape) * (joint.to_pairs(np.ones((joint.component_index.size, 1)))[:, :, 0])
         moved = random.normal(size=before.shape)
         ahead, behind = (states_at(joint, now + h * step, before + h * moved) for h in (1e-5, -1e-5))
         expected = np.einsum("pij,pj->pi", own[place], step)
@@ -108,9 +110,9 @@ def test_the_march_solves_what_it_says_sample_by_sample() -> None:
 
 def differing(joint: Joint) -> FloatArray:
     """What the stiffnesses of the harmonics differ by, over the penalty: matrix over (displacement, harmonic)."""
-    n_rel, m = joint.slots.size, joint.basis.synthesis.shape[0]
+    n_rel, m = joint.component_index.size, joint.basis.synthesis.shape[0]
     penalty = joint.penalty
-    size = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.slots]
+    size = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.component_index]
     matrix = np.zeros((n_rel * m, n_rel * m))
     for column, unit in enumerate(np.eye(n_rel * m).reshape(-1, n_rel, m)):
         motion = unit / size[:, None]
@@ -206,7 +208,7 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
     idle = np.zeros(model.contact.n_contact)
     balance = Balance.frozen(joint, np.zeros((model.contact.n_contact, 2)), idle)
     predicted = joint.structure.force_h()
-    predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.slots.size, 2))
+    predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.component_index.size, 2))
     tangent = tangent_of(balance, predicted)
     status = tangent.at.status_t
     assert all((status == one).any(axis=1).sum() >= 10 for one in (SEPARATED, SLIP))

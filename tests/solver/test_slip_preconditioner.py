@@ -25,7 +25,7 @@ MANY = 10**6
 def case(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
     """12 pairs of all kinds, of which the last three stay pressed and stuck."""
     balance, predicted = random_balance(random_model(seed, KINDS, 4), SETTINGS, seed, wear=wear)
-    pressed = (balance.joint.slots // 3 >= 9) & (balance.joint.slots % 3 == 0)
+    pressed = (balance.joint.component_index // 3 >= 9) & (balance.joint.component_index % 3 == 0)
     predicted = predicted.copy()
     predicted[pressed, 0] += 100.0 * PRELOAD
     return balance, predicted
@@ -101,8 +101,8 @@ def test_a_slip_space_that_is_too_large_is_left_to_the_harmonics(monkeypatch: py
 def test_where_everything_sticks_there_is_no_slip_space() -> None:
     balance, predicted = case(9, wear=False)
     pressed = predicted.copy()
-    pressed[balance.joint.slots % 3 == 0, 0] += 1e4 * PRELOAD
-    constant = ~balance.joint.has_normal[balance.joint.slots // 3]
+    pressed[balance.joint.component_index % 3 == 0, 0] += 1e4 * PRELOAD
+    constant = ~balance.joint.has_normal[balance.joint.component_index // 3]
     pressed[constant] = 0.0
     tangent = tangent_of(balance, pressed)
     space = find_slip_space(tangent, MANY, 0, 0.0)

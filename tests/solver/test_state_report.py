@@ -12,7 +12,7 @@ from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.response_peak import PEAK_POINTS
+from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import Effort
 from solver.results.history import PeriodicState
@@ -187,7 +187,7 @@ def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds: str, seed
     assert along == pytest.approx(sizes, abs=1e-9 * max(sizes.max(), 1.0))
     assert not slip[:, :][np.repeat((at.status_t == 1)[:, None], 2, axis=1)].any()
     # what the state repeats, and what the statuses mean
-    assert at.drift <= 1e-9 * max(float(normal.max()), 1.0)
+    assert at.periodicity_error <= 1e-9 * max(float(normal.max()), 1.0)
     for pair in range(normal.shape[0]):
         expected = status(at.predicted_t[pair], FRICTION, at.state_t[pair, :, :-1])
         assert np.array_equal(at.status_t[pair], expected)
@@ -207,7 +207,7 @@ def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     motion = full_motion(model, state)
     assert report.response == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
     static = np.real(model.linear[0].response @ motion.displacement[0])
-    phase = 2 * np.pi * np.arange(PEAK_POINTS) / PEAK_POINTS
+    phase = 2 * np.pi * np.arange(BALANCE.peak_points) / BALANCE.peak_points
     waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
     assert report.mean_pressure == pytest.approx(

@@ -86,6 +86,8 @@ def attribute(name: str, value: object) -> Change:
     return change
 
 
+FRICTION = "contact/friction_coefficient"
+
 WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (drop("stiffness"), "stiffness", "missing"),
     (drop("mass"), "mass", "missing"),
@@ -133,6 +135,26 @@ WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (poke("contact/area", 2, 0.0), "contact/area", "0.0 at index 2"),
     (poke("contact/area", 0, np.nan), "contact/area", "nan"),
     (put("contact/area", np.ones(4)), "contact/area", "shape (4,)"),
+    (put(FRICTION, np.full(2, 0.5)), FRICTION, "shape (2,)"),
+    (put(FRICTION, np.full((3, 1), 0.5)), FRICTION, "shape (3, 1)"),
+    (put(FRICTION, 0.5), FRICTION, "single value"),
+    (
+        put(FRICTION, np.array([0.5, 0.5, -0.1])),
+        FRICTION,
+        "-0.1 at index 2",
+    ),
+    (
+        put(FRICTION, np.array([0.5, np.nan, 0.5])),
+        FRICTION,
+        "nan at index 1",
+    ),
+    (
+        put(FRICTION, np.array([np.inf, 0.5, 0.5])),
+        FRICTION,
+        "inf at index 0",
+    ),
+    (put(FRICTION, np.full(3, 0.5j)), FRICTION, "complex"),
+    (put(FRICTION, ["a", "b", "c"]), FRICTION, "type"),
     (put("contact/position", np.ones((3, 2))), "contact/position", "shape (3, 2)"),
     (put("contact/dofs", np.array([0, 1, 2])), "contact/dofs", "shape (3,)"),
     (put("contact/dofs", np.zeros((0, 3), dtype=int)), "contact/dofs", "shape (0, 3)"),

@@ -103,6 +103,23 @@ def groups(path: Path | str) -> dict[str, object]:
     return found
 
 
+def test_a_result_keeps_the_friction_coefficient_of_each_pair(folder: Path) -> None:
+    assert main(["sdof_slider", "--write-scene", "slider.h5"]) == 0
+    Path("slider.toml").write_text(SLIDER, encoding="utf-8")
+    assert main(["slider.toml", "-o", "one.nc"]) == 0
+    with h5py.File("slider.h5", "r+") as file:
+        file["contact/friction_coefficient"] = [0.5]
+    Path("slider.toml").write_text(SLIDER.replace("friction_coefficient = 0.5\n", ""), encoding="utf-8")
+    assert main(["slider.toml", "-o", "own.nc"]) == 0
+    assert groups("own.nc")["contact/friction_coefficient"] == [0.5]
+    Path("slider.h5").unlink()
+    assert main(["own.nc", "-o", "again.nc"]) == 0
+    one, own, again = (contents(name) for name in ("one.nc", "own.nc", "again.nc"))
+    for name in one.data_vars:
+        np.testing.assert_array_equal(own[name], one[name])
+    xr.testing.assert_identical(again.drop_attrs(), own.drop_attrs())
+
+
 @pytest.mark.parametrize("wave", [(), WAVE], ids=["standing", "travelling"])
 def test_a_written_scene_gives_the_same_result(wave: tuple[str, ...], folder: Path) -> None:
     assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS, *wave)]) == 0

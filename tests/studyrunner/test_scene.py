@@ -5,13 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from solver.model import ReducedModel, needed_nodal_diameters
 from studies.scene_file import write_scene
 from studyrunner.cli import main
-from studyrunner.scene.scene import AUTOMATIC_HARMONICS_OF_A_WAVE, build_study_scene, describe_scene, largest_harmonics
-from studyrunner.study.study_file import read_study
+from studyrunner.scene.scene import (
+    AUTOMATIC_HARMONICS_OF_A_WAVE,
+    build_study_scene,
+    describe_scene,
+    largest_harmonics,
+    write_study_scene,
+)
+from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studies.scene_models import plain, sector
 
@@ -81,6 +88,48 @@ def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file: str, capsys:
 def test_a_number_of_harmonics_needs_its_nodal_diameters(override: str, wave_file: str) -> None:
     with pytest.raises(UserError, match=r"wave\.h5: nd/12 = missing: give this group, .* fewer than 4 harmonics"):
         build_study_scene(read_study(wave_file, [override]))
+
+
+@pytest.fixture
+def rough_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Study of a scene file with a friction coefficient for each pair."""
+    monkeypatch.chdir(tmp_path)
+    model = plain()
+    own = np.array([0.2, 0.3, 0.4])
+    write_scene(replace(model, contact=replace(model.contact, friction_coefficient=own)), tmp_path / "wave.h5")
+    (tmp_path / "s.toml").write_text(STUDY.replace("friction_coefficient = 0.3\n", ""), encoding="utf-8")
+    return "s.toml"
+
+
+def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file: str) -> None:
+    study = read_study(rough_file)
+    assert study.friction_coefficient is None
+    assert build_study_scene(study).contact.friction_coefficient.tolist() == [0.2, 0.3, 0.4]
+    assert "friction_coefficient" not in format_study(study)
+    write_study_scene(study, Path("again.h5"))
+    again = build_study_scene(read_study(rough_file, ["scene.model=again.h5"]))
+    assert describe_scene(again).digest == describe_scene(build_study_scene(study)).digest
+
+
+def test_other_friction_coefficients_are_another_scene(rough_file: str) -> None:
+    model = build_study_scene(read_study(rough_file))
+    digests = {
+        describe_scene(replace(model, contact=replace(model.contact, friction_coefficient=own))).digest
+        for own in (None, np.array([0.2, 0.3, 0.4]), np.array([0.2, 0.3, 0.5]))
+    }
+    assert len(digests) == 3
+
+
+def test_the_friction_coefficient_is_given_once(rough_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([rough_file, "--plan", "--set", "scene.friction_coefficient=0.3"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "s.toml: scene.friction_coefficient = 0.3: remove it" in line
+    assert "contact/friction_coefficient" in line
+    write_scene(plain(), Path("wave.h5"))
+    assert main([rough_file, "--plan"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "s.toml: scene.friction_coefficient" in line
+    assert "missing: give it, or contact/friction_coefficient in the scene file" in line
 
 
 def test_a_written_scene_with_automatic_harmonics_is_the_same_scene(tmp_path: Path) -> None:

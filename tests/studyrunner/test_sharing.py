@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver.contact.archard import WearLaw
 from solver.outcome import Outcome
 from solver.packing import pack
 from solver.results.history import StartState, WearHistory
@@ -167,6 +168,23 @@ def test_rtol_shares_branches_where_nothing_uses_it(overrides: tuple[str, ...], 
     n_marches = sum(len(line) for line in plan.marches)
     assert sum(item.n_points for item in plan.left_out) == plan.n_points - n_marches
     assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_branches in (1, 5))
+
+
+def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = study_with(["0", "1e-12", "2e-12"], ["100", "200"], SCHEMES)
+    assert len(share_histories(study).marches) < 15
+    monkeypatch.setattr(Study, "wear_law", WearLaw("other", proportional=False))
+    sharing = share_histories(study)
+    # adaptive steps do not depend on the step axis, whatever the law is
+    assert len(sharing.marches) == 3 * (2 + 2 + 1)
+    for found in sharing.marches:
+        choices = list(itertools.chain.from_iterable(found.histories))
+        assert len({wear for wear, _, _ in choices}) == 1
+        assert not found.held
+    left_out = {item.reason: item.n_points for item in sharing.left_out(1, 18)}
+    assert list(left_out.values()) == [3]
+    unworn = study_with(["0", "1e-12"], ["100", "200"], SCHEMES, "slow_time.cycles=0")
+    assert all(found.held for found in share_histories(unworn).marches)
 
 
 ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")

@@ -1,0 +1,142 @@
+"""Elastic pairs through one period: force, state and slip work, until the state repeats. Floats and arrays only.
+
+The law of a sample is in `coulomb`. The state at the start of a period is history. The period is marched again from
+where it ended until it repeats, and at least twice where anything slips or opens. Slip whose direction varies closes
+slowly, by a factor a period: after a few periods the start is taken from Newton's method on the periodicity, with the
+monodromy of the march, and the march then has to confirm it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from solver.contact import archard
+from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
+from solver.model import FloatArray, IntArray
+
+PLAIN_PERIODS = 4  # before Newton's method is used on the periodicity; most pairs repeat within two
+SMALLEST_DETERMINANT = 1e-9  # of 1 - monodromy: below it something does not fade from period to period, and is marched
+
+slip_work_rate = njit()(archard.slip_work_rate)
+
+
+@njit(cache=True)
+def march_period(
+    predicted_t: FloatArray,
+    friction: FloatArray,
+    start: FloatArray,
+    periodicity: float,
+    most_periods: int,
+) -> tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray]:
+    """March every pair through the period until its tangential state repeats, Eqs. (11)-(15).
+
+    Parameters
+    ----------
+    predicted_t : array (n_contact, 3, N)
+        Predicted force, N, normal first.
+    friction : array (n_contact,)
+        Friction coefficient.
+    start : array (n_contact, 2)
+        Tangential state at the start of the first period, N.
+    periodicity : float
+        Accepted difference of the state over a period, N.
+    most_periods : int
+        Periods after which a state that does not repeat is taken as it is.
+
+    Returns
+    -------
+    force_t : array (n_contact, 3, N)
+        Contact force, N, compression positive.
+    state_t : array (n_contact, 2, N+1)
+        Tangential state of the last period, its start first, N.
+    status_t : array (n_contact, N)
+        SEPARATED, STICK, SLIP.
+    periods : array (n_contact,)
+        Number of periods marched.
+    periodicity_error : array (n_contact,)
+        What is left of the change of the state over the last period, N.
+    """
+    n_contact, _, n_samples = predicted_t.shape
+    force_t = np.zeros((n_contact, 3, n_samples))
+    state_t = np.zeros((n_contact, 2, n_samples + 1))
+    status_t = np.zeros((n_contact, n_samples), np.int64)
+    periods = np.zeros(n_contact, np.int64)
+    periodicity_error = np.zeros(n_contact)
+    monodromy = np.zeros((2, 2))
+    for pair in range(n_contact):
+        first = start[pair, 0]
+        second = start[pair, 1]
+        before = np.inf
+        for period in range(most_periods):
+            state_t[pair, 0, 0] = first
+            state_t[pair, 1, 0] = second
+            moved = False
+            tracked = period >= PLAIN_PERIODS
+            monodromy[:, :] = 0.0
+            monodromy[0, 0] = monodromy[1, 1] = 1.0
+            for n in range(n_samples):
+                trial_1 = predicted_t[pair, 1, n] - first
+                trial_2 = predicted_t[pair, 2, n] - second
+                normal, force_1, force_2, first, second, status = contact_sample(
+                    predicted_t[pair, 0, n],
+                    predicted_t[pair, 1, n],
+                    predicted_t[pair, 2, n],
+                    friction[pair],
+                    first,
+                    second,
+                )
+                force_t[pair, 0, n] = normal
+                force_t[pair, 1, n] = force_1
+                force_t[pair, 2, n] = force_2
+                state_t[pair, 0, n + 1] = first
+                state_t[pair, 1, n + 1] = second
+                status_t[pair, n] = status
+                moved = moved or status != STICK
+                if tracked and status != STICK:
+                    advance_monodromy(monodromy, status, normal, trial_1, trial_2, friction[pair])
+            periods[pair] = period + 1
+            change_1, change_2 = first - state_t[pair, 0, 0], second - state_t[pair, 1, 0]
+            periodicity_error[pair] = np.hypot(change_1, change_2)
+            if not moved or (period > 0 and periodicity_error[pair] <= periodicity):
+                break
+            # a plain period never takes the state further away; one from a start that Newton's method gave may
+            if tracked and periodicity_error[pair] < 0.5 * before:
+                before = periodicity_error[pair]
+                missing_1, missing_2, found = solve_periodicity(monodromy, change_1, change_2)
+                if found:
+                    first = state_t[pair, 0, 0] + missing_1
+                    second = state_t[pair, 1, 0] + missing_2
+            else:
+                before = np.inf
+    return force_t, state_t, status_t, periods, periodicity_error
+
+
+@njit(cache=True)
+def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -> tuple[float, float, bool]:
+    """Solution of `(I - monodromy) x = change`, and whether there is one that means anything."""
+    a, b = 1.0 - monodromy[0, 0], -monodromy[0, 1]
+    c, d = -monodromy[1, 0], 1.0 - monodromy[1, 1]
+    determinant = a * d - b * c
+    if determinant <= SMALLEST_DETERMINANT:
+        return 0.0, 0.0, False
+    return (d * change_1 - b * change_2) / determinant, (a * change_2 - c * change_1) / determinant, True
+
+
+@njit(cache=True)
+def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
+    """Slip work of a period, as force times state: N * N, (n_contact,); divided by the tangential penalty it is in J.
+
+    Eqs. (7), (21) with the sliding velocity (the print has the displacement), integrated as normal force times
+    increments of the corrected slip. The trapezoidal rule takes the force of both ends of an increment.
+    """
+    n_contact, _, n_samples = force_t.shape
+    integral = np.zeros(n_contact)
+    for pair in range(n_contact):
+        for n in range(n_samples):
+            before = n - 1 if n > 0 else n_samples - 1
+            slip = np.hypot(
+                state_t[pair, 0, n + 1] - state_t[pair, 0, n], state_t[pair, 1, n + 1] - state_t[pair, 1, n]
+            )
+            integral[pair] += slip_work_rate(0.5 * (force_t[pair, 0, before] + force_t[pair, 0, n]), slip)
+    return integral

@@ -1,0 +1,150 @@
+"""A friction coefficient for each pair: equal ones are one for all, different ones are those of joints of their own."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from solver.accuracy.certificate import certify
+from solver.harmonic_balance.dlft import Balance
+from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.results.history import PeriodicState, WearHistory
+from solver.settings import SolverSettings
+from solver.structure.joint import build_case, friction_of_pairs
+from solver.wear.march import march_wear
+from studies.scenes.den_hartog import DenHartogSlider
+from tests.solver.models import OMEGA, branch_states, first_point, random_balance, random_model, scene
+
+SETTINGS = SolverSettings(5, 128)
+KINDS = ("3d", "one_tangent", "constant_load")
+
+
+def side_by_side(one: ReducedModel, other: ReducedModel) -> ReducedModel:
+    """Two structures that have nothing to do with each other as one."""
+
+    def blocks(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        whole = np.zeros((len(first) + len(second), first.shape[1] + second.shape[1]), np.result_type(first, second))
+        whole[: len(first), : first.shape[1]], whole[len(first) :, first.shape[1] :] = first, second
+        return whole
+
+    a, b = one.linear[0], other.linear[0]
+    matrices = ("mass", "damping", "stiffness", "response")
+    linear = LinearModel(
+        **{name: blocks(getattr(a, name), getattr(b, name)) for name in matrices},
+        load_static=np.append(a.load_static, b.load_static),
+        load_harmonic=np.append(a.load_harmonic, b.load_harmonic),
+    )
+    beyond = np.where(other.contact.dofs < 0, -1, other.contact.dofs + len(a.load_static))
+    joined = ("area", "gap", "normal_load", "position")
+    contact = ContactInterface(
+        dofs=np.concatenate([one.contact.dofs, beyond]),
+        **{name: np.concatenate([getattr(one.contact, name), getattr(other.contact, name)]) for name in joined},
+        surface=(*one.contact.surface, *other.contact.surface),
+    )
+    names = (*(f"{name} 1" for name in one.response_names), *(f"{name} 2" for name in other.response_names))
+    return ReducedModel({0: linear}, contact, names)
+
+
+def with_own_friction(model: ReducedModel, friction: list[float]) -> ReducedModel:
+    return replace(model, contact=replace(model.contact, friction_coefficient=np.array(friction)))
+
+
+def assert_same_bits(one: object, other: object, but: tuple[str, ...] = ()) -> None:
+    for field in fields(one):
+        values, others = getattr(one, field.name), getattr(other, field.name)
+        if field.name not in but:
+            np.testing.assert_array_equal(values, others, err_msg=field.name)
+
+
+def history_of(model: ReducedModel, friction: float | np.ndarray | None) -> WearHistory:
+    (start,) = branch_states(model, friction, 10.0, [1000.0], SETTINGS)
+    cycles = np.array([0.0, 1000.0, 2000.0])
+    return march_wear(model, friction, start, 1e-11, 1000.0, "implicit", cycles, SETTINGS)
+
+
+def test_equal_coefficients_give_the_bits_of_one_for_all() -> None:
+    model, bent = random_model(3, KINDS), random_model(3, KINDS)
+    balance, predicted = random_balance(model, SETTINGS, 3, wear=True)
+    case = build_case(bent, np.full(3, 0.4), OMEGA, SETTINGS)
+    other = replace(balance, joint=case.joint(OMEGA, 60.0))
+    at, beside = balance.evaluate(predicted), other.evaluate(predicted)
+    assert_same_bits(at, beside)
+    tangent, its = balance.linearise(at), other.linearise(beside)
+    np.testing.assert_array_equal(tangent.force_tangent, its.force_tangent)
+    np.testing.assert_array_equal(tangent.motion_tangent, its.motion_tangent)
+    assert certify(balance.joint, at) == certify(other.joint, beside)
+
+
+def test_a_history_of_a_scene_with_its_own_coefficients_has_the_bits_of_one_for_all() -> None:
+    model = scene("sdof_slider")
+    expected = history_of(model, 0.5)
+    assert expected.worn_volume[-1] > 0.0
+    assert_same_bits(history_of(model, np.full(1, 0.5)), expected, ("run_time",))
+    assert_same_bits(history_of(with_own_friction(model, [0.5]), None), expected, ("run_time",))
+
+
+def state_at(model: ReducedModel, friction: float | np.ndarray) -> PeriodicState:
+    (start,) = branch_states(model, friction, 10.0, [1000.0], SolverSettings(9, 256, 1e-10))
+    assert start.state is not None
+    return start.state
+
+
+def test_two_sliders_with_their_own_coefficients_are_those_that_stand_alone() -> None:
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    friction = np.array([0.3, 0.6])
+    both = state_at(side_by_side(model, model), friction)
+    for pair in range(2):
+        alone = state_at(model, float(friction[pair]))
+        size = np.abs(alone.displacement_h).max()
+        assert both.displacement_h[pair] == pytest.approx(alone.displacement_h[0], abs=1e-6 * size)
+        slider = DenHartogSlider(0.1, 1.6e5, 10.0, 1000.0)
+        exact = slider.first_harmonic(np.array(friction[pair] * 10.0))
+        assert np.hypot(*both.displacement_h[pair, 1, 1:3]) == pytest.approx(float(np.abs(exact)), rel=2e-3)
+
+
+def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone() -> None:
+    models = [random_model(seed, ("3d",)) for seed in (1, 2)]
+    friction = np.array([0.2, 0.45])
+    settings = SolverSettings(3, 64, 1e-10)
+    whole = build_case(side_by_side(*models), friction, OMEGA, settings)
+    assert not whole.penalty.inertial.any()
+    both = first_point(whole, OMEGA, 60.0, np.zeros(2)).evaluation
+    for pair, model in enumerate(models):
+        alone = first_point(
+            build_case(model, float(friction[pair]), OMEGA, settings), OMEGA, 60.0, np.zeros(1)
+        ).evaluation
+        for name in ("force_h", "displacement_h", "slip_work"):
+            expected = getattr(alone, name)[0]
+            assert getattr(both, name)[pair] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
+    assert both.slip_work.min() > 0.0
+
+
+def test_the_jacobian_of_different_coefficients_is_that_of_central_differences() -> None:
+    balance, predicted = random_balance(random_model(4, KINDS), SETTINGS, 4, wear=True)
+    joint = replace(balance.joint, friction_coefficient=np.array([0.0, 0.3, 0.7]))
+    balance = Balance(joint, balance.history, balance.wear_depth, balance.wear_gain)
+    tangent = balance.linearise(balance.evaluate(predicted))
+    random, size = np.random.default_rng(1), np.abs(predicted).max()
+    for _ in range(5):
+        step = random.normal(size=predicted.shape)
+        ahead, behind = (balance.evaluate(predicted + sign * 1e-6 * size * step).residual for sign in (1.0, -1.0))
+        difference = (ahead - behind) / (2e-6 * size)
+        assert np.abs(tangent.apply(step) - difference).max() < 1e-5 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize(
+    ("own", "given", "message"),
+    [
+        (None, None, "missing"),
+        ([0.1, 0.2, 0.3], 0.5, "given twice"),
+        (None, np.full(2, 0.5), r"shape \(2,\).* shape \(3,\)"),
+        (None, np.full((3, 1), 0.5), r"shape \(3, 1\)"),
+    ],
+)
+def test_coefficients_that_are_not_one_of_each_pair_are_refused(own: object, given: object, message: str) -> None:
+    model = random_model(3, KINDS)
+    model = model if own is None else with_own_friction(model, own)
+    with pytest.raises(ValueError, match=message):
+        friction_of_pairs(model, given)
