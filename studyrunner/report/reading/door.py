@@ -7,7 +7,6 @@ than a label. What the report does not draw is left outside.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -171,7 +170,10 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
 
 def _is_choice(text: str) -> bool:
     """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
-    return text == "auto" or re.fullmatch(r"[0-9.e+-]{1,32}", text) is not None
+    try:
+        return text == "auto" or math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:

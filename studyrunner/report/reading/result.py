@@ -26,6 +26,9 @@ CONVERGED = 0
 _COMPLETE = ("converged", "inaccurate", "sensitive")
 """Words of the outcomes of points that were computed to the last cycle."""
 
+NO_VOLUME = 1e-24
+"""m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
+
 Point = Mapping[str, int]
 """Index along each axis. Where axes are left out, all values along them are meant."""
 
