@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import line_style
 from studyrunner.report.reading.flanks import cell_edges
-from studyrunner.report.reading.result import Result, units_of
-from studyrunner.report.reading.units import scale_for, show_power
+from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.units import scale_for, show_power, units_of
 
 _DECADES = 30.0
 _MANY = 60
