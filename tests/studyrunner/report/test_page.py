@@ -20,7 +20,7 @@ from studyrunner.report.page.data import MOST_POINTS
 from studyrunner.report.page.page import inline_svg, write_page
 from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 
-EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'"
+EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'{{ 7 * 7 }}{% endif %}"
 
 
 class Reader(HTMLParser):
