@@ -57,7 +57,15 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse_options(arguments: Sequence[str]) -> Options:
-    """The command line. Raises UserError; SystemExit after --help."""
+    """The command line.
+
+    Raises
+    ------
+    UserError
+        Where it is wrong.
+    SystemExit
+        After --help.
+    """
     parser = _Parser(
         prog="study-report",
         description=_DESCRIPTION,

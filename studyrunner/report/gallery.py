@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterator
 from studyrunner.report.drawing import Drawing, Missing, Table, style
 from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
-from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes
+from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
 from studyrunner.report.figures.response import draw_responses
 from studyrunner.report.figures.sector import draw_sector
-from studyrunner.report.figures.stability import list_branches, list_stability
 from studyrunner.report.figures.volume import draw_volumes
-from studyrunner.report.precision.errors import study_precision
+from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.reading.result import Result
 

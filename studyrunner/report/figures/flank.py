@@ -13,8 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, new_panels, set_from_zero
-from studyrunner.report.reading.flanks import LONE, Flank, find_flanks
-from studyrunner.report.reading.frequency_course import cell_edges
+from studyrunner.report.reading.flanks import LONE, Flank, cell_edges, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count

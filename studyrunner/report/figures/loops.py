@@ -151,7 +151,7 @@ def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
         panel.set_ylabel(load.label("normal force"))
 
     figure = _grid(loops, 1, draw, ends)
-    open_part = [f"pair {loop.pair} {_open_share(loop)}" for loop in loops]
+    open_part = [f"pair {loop.pair} {_open_fraction(loop)}" for loop in loops]
     text = as_sentences(
         f"Normal force through a period; where it is zero the pair is open: {', '.join(open_part)}",
         tail,
@@ -160,10 +160,10 @@ def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
     return Drawing("normal_load", "Normal load through a period", text, figure)
 
 
-def _open_share(loop: _Loop) -> str:
-    """Share of the period without load at the first and the last cycle count, of the samples in the file."""
-    shares = np.mean(loop.force["normal"][:, :-1] <= 0.0, axis=1)
-    return ", then ".join(f"{100.0 * share:.0f} %" for share in shares)
+def _open_fraction(loop: _Loop) -> str:
+    """Fraction of the period without load at the first and the last cycle count, of the samples in the file."""
+    fractions = np.mean(loop.force["normal"][:, :-1] <= 0.0, axis=1)
+    return ", then ".join(f"{100.0 * fraction:.0f} %" for fraction in fractions)
 
 
 def _draw_motion(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, mark_failed, new_panels, set_from_zero
-from studyrunner.report.reading.frequency_course import Course, find_course
+from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.reading.result import Choice, Point, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count

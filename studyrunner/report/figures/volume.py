@@ -21,9 +21,10 @@ from studyrunner.report.drawing import (
     new_panels,
     set_from_zero,
 )
+from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
-from studyrunner.report.reading.frequency_course import Course, cell_edges, find_course
-from studyrunner.report.reading.result import Choice, Result, as_sentences
+from studyrunner.report.reading.flanks import cell_edges
+from studyrunner.report.reading.result import NO_VOLUME, Choice, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
 
@@ -31,9 +32,6 @@ _MOST_LINES = 6
 _MOST_MAPS = 4
 _MANY_CELLS = 300
 _SEEN = 1e-3
-
-NO_VOLUME = 1e-24
-"""m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
 
 
 def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.report.drawing import COLOURS
 from studyrunner.report.page.panels import build_panels
-from studyrunner.report.reading.result import CONVERGED, Result, units_of
-from studyrunner.report.reading.units import scale_for
+from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
 COURSES = (
@@ -59,8 +59,8 @@ MOST_POINTS = 20_000
 _LINES = ("scheme", "sweep")
 _FEWEST_MAP_CYCLES = 11
 _FEWEST_LOOP_CYCLES = 2
-_SHARE_OF_COURSES = 0.5
-_SHARE_OF_LOOPS = 0.25
+_FRACTION_OF_COURSES = 0.5
+_FRACTION_OF_LOOPS = 0.25
 _CHARACTERS_A_FLOAT = 16.0 / 3.0
 _BYTES_A_BLOCK = 32e6
 
@@ -100,12 +100,12 @@ def build_page_data(result: Result, limit: float) -> PageData:
     remarks = {str(place): text for place, text in _remarks(result)}
     floats -= len(json.dumps(remarks)) / _CHARACTERS_A_FLOAT
     floats -= sum(len(str(entry["data"])) for entry in points.values()) / _CHARACTERS_A_FLOAT
-    kept = _fit_courses(result, _SHARE_OF_COURSES * floats, notes)
+    kept = _fit_courses(result, _FRACTION_OF_COURSES * floats, notes)
     if kept is None:
         return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
     courses = {name: _variable(result, name, kept) for name in COURSES if result.has(name)}
     floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
-    loops, used = _loops(result, kept.cycles, _SHARE_OF_LOOPS * floats, notes)
+    loops, used = _loops(result, kept.cycles, _FRACTION_OF_LOOPS * floats, notes)
     maps = _maps(result, kept.cycles, floats - used, notes)
     shown = [result.shown_point()[name] for name in result.axes]
     content = {

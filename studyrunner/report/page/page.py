@@ -1,6 +1,7 @@
 """One HTML page of a result, with everything inside: opens from a disk, without a network.
 
-Texts of the file are escaped. The page runs only its own scripts, named by their hashes in its security policy.
+Templates put it together and escape all texts; only pictures, scripts, the style sheet and the numbers are taken as
+they are. The page runs only its own scripts, named by their hashes in its security policy.
 """
 
 from __future__ import annotations
@@ -12,21 +13,15 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from html import escape
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.sections import (
-    figure_section,
-    interactive_section,
-    missing_section,
-    study_section,
-    table_section,
-)
+from studyrunner.report.page.data import PageData, build_page_data
+from studyrunner.report.page.study import describe_study
 from studyrunner.report.reading.result import Result
 from studyrunner.user_error import show_text
 
@@ -36,7 +31,7 @@ DATA_LIMIT = 4e6
 PAGE_LIMIT = 9.8e6
 """Bytes that a page is to stay below; its drawings and numbers make room."""
 
-_SCRIPTS = ("page_numbers.js", "page_plots.js", "page.js")  # each uses what stands in those before it
+_SCRIPTS = ("numbers.js", "plots.js", "page.js")  # each uses what stands in those before it
 _DRAWINGS_LIMIT = 3e6
 _FEWEST_DATA = 0.5e6
 _SVG = "http://www.w3.org/2000/svg"
@@ -47,15 +42,16 @@ _UNWANTED = {f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"}
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page. markup: SVG or an image, n_bytes long."""
+    """A drawing as it stands on the page: as an SVG element, or as the base64 of a PNG file where there is one."""
 
     drawing: Drawing
-    markup: str
+    svg: str
+    png: str = ""
 
     @property
     def n_bytes(self) -> int:
         """Length in the page."""
-        return len(self.markup.encode())
+        return len((self.png or self.svg).encode())
 
 
 @dataclass(frozen=True)
@@ -69,9 +65,21 @@ class Summary:
 
 
 def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path: Path) -> Summary:
-    """Write the page `path`, and beside it `<name>.svg` and `<name>.png` of each drawing; the folder exists.
+    """Write the page, and beside it `<name>.svg` and `<name>.png` of each drawing.
 
-    The page replaces an older one when it is complete. OSError where something cannot be written.
+    Parameters
+    ----------
+    result
+        The file that is shown.
+    items
+        What the page shows beside the interactive part, in its order.
+    path
+        Of the page, in a folder that exists. An older page is replaced when the new one is complete.
+
+    Raises
+    ------
+    OSError
+        Where something cannot be written.
     """
     folder = path.parent
     parts = _within_limit([_save(item, folder) if isinstance(item, Drawing) else item for item in items], folder)
@@ -121,9 +129,7 @@ def _within_limit(parts: Sequence[Shown | Missing | Table], folder: Path) -> lis
         part = parts[place]
         if isinstance(part, Shown):
             image = base64.b64encode((folder / f"{part.drawing.name}.png").read_bytes()).decode("ascii")
-            label = escape(part.drawing.title)
-            pixels = Shown(part.drawing, f'<img alt="{label}" src="data:image/png;base64,{image}">')
-            parts[place] = min(part, pixels, key=_size)
+            parts[place] = min(part, replace(part, png=image), key=_size)
     return parts
 
 
@@ -132,54 +138,39 @@ def _size(part: Shown | Missing | Table) -> int:
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:
+    """The page as text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    body = [study_section(result), ""]
-    for part in parts:
-        if isinstance(part, Shown):
-            body.append(figure_section(part.drawing, part.markup))
-        elif isinstance(part, Table):
-            body.append(table_section(part))
-    body.append(missing_section([part for part in parts if isinstance(part, Missing)]))
-    style = _own_file("page.css")
-    scripts = [_normal(get_plotlyjs()), _normal("\n".join(map(_own_file, _SCRIPTS)))]
-    fixed = sum(len(text.encode()) for text in (*body, style, *scripts))
-    data = build_page_data(result, min(DATA_LIMIT, max(PAGE_LIMIT - fixed, _FEWEST_DATA)))
-    body[1] = interactive_section(data)
-    if data.content is None:
-        scripts = []
-    else:
-        body.append(f'<script type="application/json" id="page-data">{_json(data.content)}</script>')
-    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts) or "'none'"
-    policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
-    title = escape(result.title)
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="only light">',
-            f"<title>{title}</title>",
-            f"<style>\n{style}</style>",
-            "</head>",
-            "<body>",
-            f"<header><h1>{title}</h1><p>Report of <code>{escape(show_text(result.path.name))}</code></p></header>",
-            "<main>",
-            *body,
-            "</main>",
-            *(f"<script>{script}</script>" for script in scripts),
-            "</body>",
-            "</html>",
-            "",
-        ]
+    blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    loader = PackageLoader("studyrunner.report.page", ".")
+    template = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks).get_template(
+        "page.html"
     )
+    scripts = [_normal(get_plotlyjs()), _normal("\n".join(map(_own_file, _SCRIPTS)))]
+    shown: dict[str, Any] = {
+        "title": result.title,
+        "file": show_text(result.path.name),
+        "css": _own_file("page.css"),
+        "study": describe_study(result),
+        "parts": parts,
+        "missing": [part for part in parts if isinstance(part, Missing)],
+    }
+
+    def render(data: PageData) -> str:
+        """The page with these numbers; without scripts where there are none."""
+        own = scripts if data.content is not None else []
+        hashes = " ".join(f"'sha256-{_digest(script)}'" for script in own) or "'none'"
+        policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
+        numbers = _json(data.content) if own else ""
+        return template.render(shown, policy=policy, scripts=own, data=numbers, notes=data.notes)
+
+    fixed = sum(len(text.encode()) for text in (render(PageData(None, ())), *scripts))
+    return render(build_page_data(result, min(DATA_LIMIT, max(PAGE_LIMIT - fixed, _FEWEST_DATA))))
 
 
 def _own_file(name: str) -> str:
-    return resources.files("studyrunner.report.page").joinpath(name).read_text(encoding="utf-8")
+    return resources.files("studyrunner.report.page").joinpath("browser", name).read_text(encoding="utf-8")
 
 
 def _normal(script: str) -> str:

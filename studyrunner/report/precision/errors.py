@@ -6,330 +6,265 @@ resolved, and nothing is concluded from it but that the setting is at most as wr
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
-from studyrunner.report.figures.volume import NO_VOLUME
 from studyrunner.report.precision.settings import (
     ADAPTIVE,
     AUTO,
     EXPLICIT,
     KEYS,
-    Failure,
-    Run,
-    Runs,
+    OF_TIME,
     Setting,
-    read_runs,
-    varying_keys,
+    family,
 )
-from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.result import NO_VOLUME
+
+FloatArray = NDArray[np.float64]
 
 RESOLVED = 3.0
 """An error counts from so many times the uncertainty of the reference on."""
 
-_ROUND_OFF = 1e-12
+QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
+"""What is compared, in words."""
 
-VOLUME, RESPONSE = "volume", "response"
-QUANTITIES = (VOLUME, RESPONSE)
+ROUND_OFF = 1e-12
+"""Smaller relative errors are none."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured against. Uncertainties and differences are relative.
+    """What errors are measured against.
 
-    setting: None for the exact answer. volume, response: uncertainty of the final worn volume and of the response
-    there, infinite where nothing is known of it. volume_difference, response_difference: largest difference to the
-    settings that are coarser by one value of one key; NaN where there is none.
+    setting: None for the exact answer. worn: final worn volume, m3. uncertainty: relative, of each of `QUANTITIES`,
+    infinite where nothing is known of it. difference: largest relative difference to the settings that are coarser by
+    one value of one key; NaN where there is none.
     """
 
-    run: Run = field(repr=False)
     setting: Setting | None
-    volume: float
-    response: float
-    volume_difference: float = float("nan")
-    response_difference: float = float("nan")
-
-    @property
-    def wears(self) -> bool:
-        """Whether anything is worn at the end."""
-        return bool(self.run.worn[-1] > NO_VOLUME)
-
-    def uncertainty(self, quantity: str) -> float:
-        """Of worn volume or response."""
-        return float(getattr(self, quantity))
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One setting at one point against the reference; relative errors, NaN where there is nothing to compare.
-
-    volume: of the final worn volume; infinite where the reference wears nothing. course: largest difference of the worn
-    volume at any cycle count, over the final worn volume. response: of the amplitudes at the last cycle count.
-    """
-
-    setting: Setting
-    run_time: float
-    volume: float
-    course: float
-    response: float
-    volume_resolved: bool
-    response_resolved: bool
-    oscillates: bool
-
-    def error(self, quantity: str) -> float:
-        """Of worn volume or response."""
-        return float(getattr(self, quantity))
-
-    def resolved(self, quantity: str) -> bool:
-        """Whether that error is clearly more than the uncertainty of the reference."""
-        return bool(getattr(self, f"{quantity}_resolved"))
+    worn: float
+    uncertainty: Mapping[str, float]
+    difference: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One point of the axes that are no settings.
+    """One point of the axes that are no settings: what each setting gave there.
 
-    measured: all settings but the reference, the quickest first. reference: None where no setting has a result.
+    label: the point in words, empty where nothing but settings varies. cycles: at the end. settings: with their rows in
+    `computed` and `values`, the same at all points. computed (n_setting,): whether to the last cycle. values
+    (n_setting, more): `run_time` in CPU seconds, `error_estimate` and `response_error` relative, `harmonics_used` and
+    `samples_used` by the last state, `step_limit` in cycles, `rtol` in effect, `oscillates` 0 or 1, `worn_volume`
+    (n_setting, n_cycle) in m3 and `response_amplitude` (n_setting, n_cycle, n_response) in m; NaN where the file does
+    not say. failures: words of the outcomes of what was not computed. exact: the exact worn volume and amplitude, None
+    where the file holds none.
     """
 
-    runs: Runs = field(repr=False)
-    reference: Reference | None
-    measured: tuple[Measured, ...]
+    label: str
+    cycles: float
+    settings: Mapping[Setting, int] = field(repr=False)
+    computed: NDArray[np.bool_] = field(repr=False)
+    values: Mapping[str, FloatArray] = field(repr=False)
+    failures: Mapping[Setting, str]
+    exact: tuple[FloatArray, FloatArray] | None = field(repr=False)
+
+    @cached_property
+    def results(self) -> list[Setting]:
+        """Settings that were computed to the last cycle."""
+        return [setting for setting, row in self.settings.items() if self.computed[row]]
 
     @property
-    def label(self) -> str:
-        """The point in words."""
-        return self.runs.label
+    def steady(self) -> list[Setting]:
+        """Of them, those whose wear rate does not oscillate; all where it does in each."""
+        return [each for each in self.results if not self.number("oscillates", each)] or self.results
 
-    @property
-    def failures(self) -> tuple[Failure, ...]:
-        """Settings without a result."""
-        return self.runs.failures
+    @cached_property
+    def finest(self) -> Setting | None:
+        """The finest setting that has a result and does not oscillate; None where no setting has a result.
 
-    @property
+        It has the most harmonics, then the most samples, then the smallest tolerances; of those, the adaptive scheme
+        with the smallest `rtol` or the implicit one with the smallest step, whichever estimates the smaller error; the
+        explicit one with the smallest step where there is no other.
+        """
+        if not self.results:
+            return None
+        ranks = {setting: self._rank(setting) for setting in self.steady}
+        best = [setting for setting, rank in ranks.items() if rank == max(ranks.values())]
+        adaptive = [setting for setting in best if setting.scheme == ADAPTIVE]
+        fixed = [setting for setting in best if setting.scheme not in (ADAPTIVE, EXPLICIT)]
+        chosen = [min(adaptive, key=lambda setting: setting.rtol or 0.0)] if adaptive else []
+        if fixed or not adaptive:
+            chosen.append(min(fixed or best, key=lambda setting: setting.step or 0.0))
+        return min(chosen, key=lambda setting: _or_inf(self.number("error_estimate", setting)))
+
+    @cached_property
+    def reference(self) -> Reference | None:
+        """The exact answer, or the finest setting; None where no setting has a result."""
+        if self.finest is None:
+            return None
+        if self.exact is not None:
+            nothing, unknown = dict.fromkeys(QUANTITIES, 0.0), dict.fromkeys(QUANTITIES, math.nan)
+            return Reference(None, float(self.exact[0][-1]), nothing, unknown)
+        return _describe_finest(self, self.finest)
+
+    @cached_property
+    def errors(self) -> dict[str, FloatArray]:
+        """Errors (n_setting,) against the reference, see `compare`; NaN for the reference itself."""
+        if self.reference is None:
+            return {name: np.full(len(self.settings), np.nan) for name in (*QUANTITIES, "course")}
+        errors = self.compare(self.reference.setting)
+        return {name: np.where(self.compared, error, np.nan) for name, error in errors.items()}
+
+    @cached_property
+    def compared(self) -> NDArray[np.bool_]:
+        """Which settings are compared with the reference (n_setting,)."""
+        reference = None if self.reference is None else self.reference.setting
+        others: NDArray[np.bool_] = np.array([setting != reference for setting in self.settings])
+        return self.computed & others
+
+    @cached_property
+    def measured(self) -> pd.DataFrame:
+        """A row for each `Setting` but the reference, the quickest first: its `errors`, `run_time` in CPU seconds.
+
+        `oscillates`: whether its wear rate does. `volume_resolved`, `response_resolved`: whether an error is clearly
+        more than the uncertainty of the reference.
+        """
+        table = pd.DataFrame(self.errors, index=pd.Index(list(self.settings), dtype=object))
+        table["run_time"], table["oscillates"] = self.values["run_time"], self.values["oscillates"]
+        for name in QUANTITIES:
+            table[f"{name}_resolved"] = table[name] >= RESOLVED * self.uncertainty(name)
+        return table[self.compared].sort_values("run_time", kind="stable").astype({"oscillates": bool})
+
+    @cached_property
     def quantities(self) -> tuple[str, ...]:
         """What there is to compare; not the wear where there is none, or where the file does not hold it."""
-        return tuple(name for name in QUANTITIES if any(np.isfinite(item.error(name)) for item in self.measured))
+        return tuple(name for name in QUANTITIES if np.isfinite(self.errors[name]).any())
 
     @property
     def differs(self) -> bool:
         """Whether anything but round-off depends on the setting."""
-        return any(_ROUND_OFF < item.error(name) < np.inf for name in self.quantities for item in self.measured)
+        return any(self.clear_errors(name).size for name in self.quantities)
 
-    def line(self, scheme: str | None, quantity: str) -> tuple[Measured, ...]:
-        """The settings of one scheme with an error that is a number, the quickest first."""
-        own = (item for item in self.measured if item.setting.scheme == scheme)
-        return tuple(item for item in own if np.isfinite(item.error(quantity)))
+    def number(self, name: str, setting: Setting) -> float:
+        """One of `values` of a setting."""
+        return float(self.values[name][self.settings[setting]])
 
-    def front(self, quantity: str, scheme: str | None = None) -> tuple[Measured, ...]:
+    def clear_errors(self, quantity: str) -> FloatArray:
+        """Errors that are numbers and more than round-off."""
+        errors = self.errors[quantity]
+        return errors[(errors > ROUND_OFF) & (errors < np.inf)]
+
+    def uncertainty(self, quantity: str) -> float:
+        """Of the reference."""
+        return float("inf") if self.reference is None else self.reference.uncertainty[quantity]
+
+    def front(self, quantity: str, scheme: str | None = None) -> pd.DataFrame:
         """Settings than which no quicker one is as exact; of all schemes, or of one.
 
         An error that is not resolved counts as the smallest that would be.
         """
-        assert self.reference is not None
-        floor = RESOLVED * self.reference.uncertainty(quantity)
-        schemes = {item.setting.scheme for item in self.measured} if scheme is None else {scheme}
-        items = [item for item in self.measured if item.setting.scheme in schemes]
-        return pareto_front(items, [max(item.error(quantity), floor) for item in items])
+        own = [scheme in (None, setting.scheme) for setting in self.measured.index]
+        errors = self.measured[quantity].clip(lower=RESOLVED * self.uncertainty(quantity))
+        return pareto_front(self.measured[own], errors[own])
 
+    def compare(self, against: Setting | None) -> dict[str, FloatArray]:
+        """Relative errors (n_setting,) against one setting, or against the exact answer; NaN where there is nothing.
 
-@dataclass(frozen=True)
-class Precision:
-    """What a result file says about the settings it compares.
+        Returns
+        -------
+        dict
+            `volume`: of the final worn volume; infinite where the answer wears nothing. `course`: largest difference of
+            the worn volume at any cycle count, over the final worn volume. `response`: of the last amplitudes, all
+            responses in one norm.
+        """
+        own, amplitude = self.values["worn_volume"], self.values["response_amplitude"][:, -1]
+        if against is None and self.exact is not None:
+            worn, response = self.exact[0], self.exact[1][-1]
+        else:
+            place = self.settings[against or Setting()]
+            worn, response = own[place], amplitude[place]
+        # of nothing there is no fraction: what wears all the same is infinitely wrong
+        volume, course = np.where(own[:, -1] > NO_VOLUME, np.inf, np.nan), np.full(len(own), np.nan)
+        if worn[-1] > NO_VOLUME:
+            difference = np.abs(own - worn) / worn[-1]
+            volume, course = difference[:, -1], difference.max(axis=1)
+        size = float(np.linalg.norm(response))
+        away = np.linalg.norm(amplitude - response, axis=-1) / (size if size > 0.0 else np.nan)
+        return {"volume": volume, "course": course, "response": away}
 
-    keys: settings of several values. points: in the order of the file. shared: whether the time of some point may be
-    that of a march which computed other points, too.
-    """
+    def _rank(self, setting: Setting) -> tuple[float, ...]:
+        """Harmonics, samples and tolerances as numbers, the highest the finest.
 
-    result: Result = field(repr=False)
-    keys: tuple[str, ...]
-    points: tuple[Point, ...]
-    shared: bool
-
-    @property
-    def schemes(self) -> tuple[str | None, ...]:
-        """Schemes in the order of the file."""
-        runs = [item for point in self.points for item in point.measured]
-        known = [str(name) for name in self.result.dataset["scheme"].values] if "scheme" in self.result.axes else []
-        present = {item.setting.scheme for item in runs}
-        return tuple(name for name in (*known, None) if name in present)
-
-    @property
-    def outcomes(self) -> Counter[str]:
-        """How many settings failed at how many points, by the word of their outcome."""
-        counts: Counter[str] = Counter()
-        for point in self.points:
-            counts.update(point.runs.outcomes)
-        return counts
-
-
-def study_precision(result: Result) -> Precision | None:
-    """What the settings of a file cost and how wrong they are; None where it does not compare at least two with a third
-    one, or with the exact answer.
-    """
-    keys = varying_keys(result)
-    if not keys or not (result.has("worn_volume") or result.has("response_amplitude")):
-        return None
-    points = tuple(measure(runs) for runs in read_runs(result))
-    if max(len(point.measured) for point in points) < 2:
-        return None
-    wears = result.dataset.sizes.get("wear_coefficient", 1) > 1 and result.cycles[-1] > 0.0
-    shortcuts = bool(result.study.get("solver", {}).get("shortcuts", True))
-    return Precision(result, keys, points, shared=shortcuts and wears)
-
-
-def measure(runs: Runs) -> Point:
-    """Errors of all settings at one point."""
-    reference = find_reference(runs)
-    if reference is None:
-        return Point(runs, None, ())
-    measured = [_measure(run, reference) for run in runs.runs if run.setting != reference.setting]
-    return Point(runs, reference, tuple(sorted(measured, key=lambda item: item.run_time)))
-
-
-def find_reference(runs: Runs) -> Reference | None:
-    """The exact answer, or the finest setting; None where no setting has a result."""
-    return finest_reference(runs) if runs.exact is None else Reference(runs.exact, None, 0.0, 0.0)
-
-
-def finest_reference(runs: Runs) -> Reference | None:
-    """The finest setting that has a result and does not oscillate; None where no setting has a result.
-
-    It has the most harmonics, then the most samples, then the smallest tolerances; of those, the adaptive scheme with
-    the smallest `rtol` or the implicit one with the smallest step, whichever estimates the smaller error; the explicit
-    one with the smallest step where there is no other.
-    """
-    steady = [run for run in runs.runs if not run.oscillates] or list(runs.runs)
-    if not steady:
-        return None
-    resolution = _Resolution(steady)
-    finest = max(resolution.rank(run) for run in steady)
-    best = finest_in_time([run for run in steady if resolution.rank(run) == finest])
-    differences = [difference(run, best) for run in _neighbours(best, steady)]
-    most = [max((pair[place] for pair in differences), default=float("nan")) for place in range(len(QUANTITIES))]
-    volume = best.error_estimate if np.isfinite(best.error_estimate) else most[0]
-    response = _response_uncertainty(best, volume, most[1])
-    return Reference(best, best.setting, _or_inf(volume), _or_inf(response), *most)
-
-
-def finest_in_time(runs: Sequence[Run]) -> Run:
-    """Of runs that differ in their wear steps only, the one that is nearest to the limit of small steps."""
-    chosen = []
-    adaptive = [run for run in runs if run.setting.scheme == ADAPTIVE]
-    fixed = [run for run in runs if run.setting.scheme not in (ADAPTIVE, EXPLICIT)]
-    if adaptive:
-        chosen.append(min(adaptive, key=lambda run: run.setting.rtol or 0.0))
-    if fixed or not adaptive:
-        chosen.append(min(fixed or runs, key=lambda run: run.setting.step or 0.0))
-    return min(chosen, key=lambda run: _or_inf(run.error_estimate))
-
-
-def pareto_front(items: Sequence[Measured], errors: Sequence[float]) -> tuple[Measured, ...]:
-    """Items, the quickest first, whose error is smaller than that of every quicker one; NaN never is."""
-    found: list[Measured] = []
-    least = np.inf
-    for error, item in sorted(zip(errors, items, strict=True), key=lambda entry: (entry[1].run_time, entry[0])):
-        if error < least:
-            found.append(item)
-            least = error
-    return tuple(found)
-
-
-class _Resolution:
-    """Ranks of harmonics, samples and tolerances, the highest the finest.
-
-    Where numbers and "auto" are compared, automatic ones rank by what the last state took.
-    """
-
-    def __init__(self, runs: Iterable[Run]) -> None:
-        values = [(run.setting.harmonics, run.setting.samples) for run in runs]
-        self.mixed = [len({value == AUTO for value in column}) > 1 for column in zip(*values, strict=True)]
-
-    def rank(self, run: Run) -> tuple[float, ...]:
-        """The higher the finer."""
-        setting = run.setting
+        Where numbers and "auto" are compared, automatic ones rank by what the last state took.
+        """
         numbers = []
-        for value, used, mixed in zip((setting.harmonics, setting.samples), run.used, self.mixed, strict=True):
+        for key in ("harmonics", "samples"):
+            value = getattr(setting, key)
             if value == AUTO:
-                numbers.append(used if mixed else 0.0)
-            else:
-                numbers.append(float(value or 0.0))
-        rtol = setting.rtol if setting.automatic and setting.rtol is not None else 0.0
+                mixed = any(getattr(other, key) != AUTO for other in self.settings)
+                value = np.nan_to_num(self.number(f"{key}_used", setting)) if mixed else 0.0
+            numbers.append(float(value or 0.0))
+        rtol = (setting.rtol or 0.0) if AUTO in (setting.harmonics, setting.samples) else 0.0
         return (*numbers, -(setting.tolerance or 0.0), -rtol)
 
 
-def _neighbours(best: Run, runs: Sequence[Run]) -> list[Run]:
-    """For each key the next coarser run that differs in it only; for the scheme, the implicit one of least step."""
+def pareto_front(runs: pd.DataFrame, errors: pd.Series) -> pd.DataFrame:
+    """Runs, the quickest first, whose error is smaller than that of every quicker one; NaN never is."""
+    ordered = runs.assign(_error=errors).dropna(subset="_error").sort_values(["run_time", "_error"])
+    least = ordered["_error"].cummin().shift(fill_value=np.inf)
+    return ordered[ordered["_error"] < least].drop(columns="_error")
+
+
+def _describe_finest(point: Point, finest: Setting) -> Reference:
+    """The finest setting as reference."""
+    best = {name: values[point.settings[finest]] for name, values in point.values.items()}
+    errors = point.compare(finest)
+    nearest = [point.settings[setting] for setting in _neighbours(finest, point.steady)]
+    most = {name: float(np.fmax.reduce(errors[name][nearest], initial=math.nan)) for name in QUANTITIES}
+    volume = float(best["error_estimate"])
+    volume = volume if math.isfinite(volume) else most["volume"]
+    response = _response_uncertainty(best, volume)
+    response = response if math.isfinite(response) else most["response"]
+    uncertainty = {"volume": _or_inf(volume), "response": _or_inf(response)}
+    return Reference(finest, float(best["worn_volume"][-1]), uncertainty, most)
+
+
+def _response_uncertainty(best: Mapping[str, FloatArray], volume: float) -> float:
+    """That of the truncated harmonics and that of the worn volume, which changes the response as it did lately.
+
+    NaN where the file does not say enough.
+    """
+    worn, response = best["worn_volume"], best["response_amplitude"]
+    if not worn[-1] > NO_VOLUME:
+        return float(best["response_error"])
+    before, size = np.flatnonzero(worn < worn[-1]), float(np.linalg.norm(response[-1]))
+    if not before.size or size == 0.0:
+        return math.nan
+    grown = 1.0 - worn[before[-1]] / worn[-1]
+    changed = float(np.linalg.norm(response[-1] - response[before[-1]])) / size
+    return float(best["response_error"] + changed / grown * volume)
+
+
+def _neighbours(finest: Setting, settings: Sequence[Setting]) -> list[Setting]:
+    """For each key the next coarser setting that differs in it only; for the scheme, the implicit one of least step."""
     found = []
     for key in KEYS[1:]:
-        own = getattr(best.setting, key)
-        if not isinstance(own, int | float):
-            continue
-        like = [run for run in runs if run.setting.without(key) == best.setting.without(key)]
-        values = {getattr(run.setting, key): run for run in like if isinstance(getattr(run.setting, key), int | float)}
-        coarser = [value for value in values if (value < own if key in ("harmonics", "samples") else value > own)]
-        if coarser:
-            found.append(values[max(coarser) if key in ("harmonics", "samples") else min(coarser)])
-    if best.setting.scheme == ADAPTIVE:
-        open_keys = ("scheme", "step", "rtol")
-        fixed = [run for run in runs if run.setting.without(*open_keys) == best.setting.without(*open_keys)]
-        fixed = [run for run in fixed if run.setting.scheme not in (ADAPTIVE, EXPLICIT)]
-        if fixed:
-            found.append(min(fixed, key=lambda run: run.setting.step or 0.0))
+        own, finer = getattr(finest, key), 1.0 if key in ("harmonics", "samples") else -1.0
+        if isinstance(own, float):
+            like = [setting for setting in family(settings, finest, key) if isinstance(getattr(setting, key), float)]
+            values = {finer * getattr(setting, key): setting for setting in like}
+            found += [values[value] for value in sorted(values) if value < finer * own][-1:]
+    if finest.scheme == ADAPTIVE:
+        fixed = [each for each in family(settings, finest, *OF_TIME) if each.scheme not in (ADAPTIVE, EXPLICIT)]
+        found += sorted(fixed, key=lambda setting: setting.step or 0.0)[:1]
     return found
 
 
-def _measure(run: Run, reference: Reference) -> Measured:
-    volume, response = difference(run, reference.run)
-    course = float("nan")
-    if reference.wears:
-        course = float(np.abs(run.worn - reference.run.worn).max() / reference.run.worn[-1])
-    return Measured(
-        setting=run.setting,
-        run_time=run.run_time,
-        volume=volume,
-        course=course,
-        response=response,
-        volume_resolved=volume >= RESOLVED * reference.volume,
-        response_resolved=response >= RESOLVED * reference.response,
-        oscillates=run.oscillates,
-    )
-
-
-def difference(run: Run, reference: Run) -> tuple[float, float]:
-    """Relative difference of the final worn volume and of the last response amplitudes, all responses in one norm."""
-    worn, true = float(run.worn[-1]), float(reference.worn[-1])
-    # of nothing there is no share: what wears all the same is infinitely wrong
-    volume = float("inf") if worn > NO_VOLUME else float("nan")
-    if true > NO_VOLUME:
-        volume = abs(worn - true) / true
-    size = float(np.linalg.norm(reference.response[-1]))
-    response = float(np.linalg.norm(run.response[-1] - reference.response[-1]))
-    return volume, response / size if size > 0.0 else float("nan")
-
-
-def _response_uncertainty(best: Run, volume: float, difference: float) -> float:
-    """That of the truncated harmonics and that of the worn volume, which changes the response as it did lately.
-
-    Where the file does not say enough: the difference to the nearest settings.
-    """
-    if not np.isfinite(best.response_error):
-        return difference
-    if not best.worn[-1] > NO_VOLUME:
-        return best.response_error
-    before = np.flatnonzero(best.worn < best.worn[-1])
-    if not before.size:
-        return difference
-    grown = 1.0 - best.worn[before[-1]] / best.worn[-1]
-    size = float(np.linalg.norm(best.response[-1]))
-    if size == 0.0:
-        return difference
-    changed = float(np.linalg.norm(best.response[-1] - best.response[before[-1]])) / size
-    return best.response_error + float(changed / grown) * volume
-
-
 def _or_inf(value: float) -> float:
-    return float(value) if np.isfinite(value) else float("inf")
+    return float(value) if math.isfinite(value) else math.inf

@@ -6,40 +6,36 @@ import math
 from collections.abc import Iterator, Sequence
 
 from studyrunner.report.drawing import Table
-from studyrunner.report.precision.errors import QUANTITIES, VOLUME, Point, Precision, Reference
+from studyrunner.report.precision.comparison import Precision
+from studyrunner.report.precision.errors import QUANTITIES, Point
 from studyrunner.report.precision.findings import (
-    FAITHFUL,
     STEPS_TO_OSCILLATE,
+    TARGETS,
     Order,
     Recommendation,
     find_orders,
     find_stable_step,
-    recommendations,
+    recommend,
     show_percent,
 )
-from studyrunner.report.precision.settings import KEYS
-from studyrunner.report.reading.result import as_sentences
+from studyrunner.report.reading.result import NO_VOLUME, as_sentences
 from studyrunner.report.reading.units import show_number
-
-NAMES = {"volume": "final worn volume", "response": "response at the end"}
-"""The quantities in words."""
 
 _DASH = "\N{EN DASH}"
 
 
 def list_precision(precision: Precision, shown: Sequence[Point]) -> Iterator[Table]:
-    """All tables; those of orders and of all settings for the points shown only."""
+    """All tables, of the points shown; the recommended settings also of all points together."""
     yield _table_of_recommendations(precision, shown)
     yield from _table_of_orders(precision, shown)
-    yield from _table_of_stable_steps(precision)
+    yield from _table_of_stable_steps(shown)
     for number, point in enumerate(shown, start=1):
         yield _table_of_settings(precision, point, number)
 
 
 def reference_words(precision: Precision, point: Point) -> str:
     """What the errors at a point are measured against."""
-    assert point.reference is not None
-    if point.reference.setting is None:
+    if point.reference is None or point.reference.setting is None:
         return "the exact answer"
     return f"the finest setting of the file ({point.reference.setting.describe(precision.keys)})"
 
@@ -47,29 +43,26 @@ def reference_words(precision: Precision, point: Point) -> str:
 def how_known(point: Point) -> str:
     """How well the reference is known; empty where it is exact."""
     reference = point.reference
-    assert reference is not None
-    if reference.setting is None:
+    if reference is None or reference.setting is None:
         return ""
-    quantities = [name for name in QUANTITIES if name in point.quantities]
-    known = " and ".join(f"{show_percent(reference.uncertainty(name))} in the {NAMES[name]}" for name in quantities)
+    known = " and ".join(
+        f"{show_percent(reference.uncertainty[name])} in the {QUANTITIES[name]}" for name in point.quantities
+    )
     words = f"The reference{f' at {point.label}' if point.label else ''} is known to {known} by its own estimate"
-    if math.isnan(reference.response_difference) and math.isnan(reference.volume_difference):
+    if all(map(math.isnan, reference.difference.values())):
         return words
-    changes = " and ".join(show_percent(_difference(reference, name)) for name in quantities)
+    changes = " and ".join(show_percent(reference.difference[name]) for name in point.quantities)
     return f"{words}; the next coarser settings differ from it by up to {changes}"
 
 
-def _difference(reference: Reference, quantity: str) -> float:
-    return reference.volume_difference if quantity == VOLUME else reference.response_difference
-
-
 def _table_of_recommendations(precision: Precision, shown: Sequence[Point]) -> Table:
-    others = {point.label for point in precision.points} - {point.label for point in shown}
+    compared = [point for point in precision.points if point.compared.any()]
+    groups = [(point.label or _DASH, [point]) for point in shown]
+    groups += [("all points", compared)] if len(compared) > 1 else []
     rows = [
-        (label or _DASH, show_percent(item.target), *_recommended(precision, item))
-        for label, items in recommendations(precision)
-        for item in items
-        if label not in others
+        (label, show_percent(target), *_recommended(precision, recommend(points, target)))
+        for label, points in groups
+        for target in TARGETS
     ]
     note = (
         "The cheapest setting whose errors of worn volume and response are both below the target, the uncertainty of"
@@ -81,13 +74,12 @@ def _table_of_recommendations(precision: Precision, shown: Sequence[Point]) -> T
 
 
 def _recommended(precision: Precision, item: Recommendation) -> tuple[str, str, str, str, str]:
+    known = f"the reference is known to {show_percent(item.reference)} only"
     if item.setting is None:
-        remark = "none of the settings"
-        if item.reference > item.target:
-            remark += f"; the reference is known to {show_percent(item.reference)} only"
+        remark = f"none of the settings; {known}" if item.reference > item.target else "none of the settings"
         return ("none", _DASH, _DASH, _DASH, remark)
-    remark = "" if item.certain else f"not certain: the reference is known to {show_percent(item.reference)} only"
     errors = (show_percent(item.volume), show_percent(item.response))
+    remark = "" if item.certain else f"not certain: {known}"
     return (item.setting.describe(precision.keys), f"{item.run_time:.3g}", *errors, remark)
 
 
@@ -97,12 +89,9 @@ def _table_of_orders(precision: Precision, shown: Sequence[Point]) -> Iterator[T
             point.label or _DASH,
             order.key,
             order.setting.describe(precision.keys) or _DASH,
-            NAMES[order.quantity],
-            _DASH if math.isnan(order.order) else f"{order.order:.2f}",
-            _used(order) if not math.isnan(order.order) else order.reason,
-            ", ".join(
-                f"{show_number(v, 4)}: {show_percent(e)}" for v, e in zip(order.values, order.errors, strict=True)
-            ),
+            QUANTITIES[order.quantity],
+            *_fitted(order),
+            ", ".join(f"{_cycles(value)}: {show_percent(error)}" for value, error in order.errors.items()),
         )
         for point in shown
         for order in find_orders(point)
@@ -117,36 +106,30 @@ def _table_of_orders(precision: Precision, shown: Sequence[Point]) -> Iterator[T
         yield Table("precision_orders", "Observed orders of convergence", columns, tuple(rows), note)
 
 
-def _errors(order: Order) -> str:
-    pairs = zip(order.values, order.errors, strict=True)
-    return ", ".join(f"{show_number(value, 4)}: {show_percent(error)}" for value, error in pairs)
+def _fitted(order: Order) -> tuple[str, str]:
+    if math.isnan(order.order):
+        return _DASH, order.reason
+    return f"{order.order:.2f}", f"{_cycles(order.used[0])} to {_cycles(order.used[-1])} ({len(order.used)} values)"
 
 
-def _used(order: Order) -> str:
-    low, high = (show_number(value, 4) for value in (order.used[0], order.used[-1]))
-    return f"{low} to {high} ({len(order.used)} values)"
-
-
-def _table_of_stable_steps(precision: Precision) -> Iterator[Table]:
+def _table_of_stable_steps(shown: Sequence[Point]) -> Iterator[Table]:
     rows = []
-    for point in precision.points:
+    for point in shown:
         found = find_stable_step(point)
-        if found is None or not point.reference or not point.reference.wears:
+        if found is None or point.reference is None or not point.reference.worn > NO_VOLUME:
             continue
         predicted = "no limit" if found.predicted == math.inf else _cycles(found.predicted)
         unjudged = ", ".join(map(_cycles, found.unjudged)) or _DASH
-        steps = map(_cycles, (found.largest, found.smallest_unstable, found.faithful))
-        row = (point.label or _DASH, predicted, *steps, unjudged)
-        rows.append(row)
+        rows.append(
+            (point.label or _DASH, predicted, _cycles(found.largest), _cycles(found.smallest_unstable), unjudged)
+        )
     if rows:
         note = (
             "Steps in cycles, with the finest harmonics and samples. The limit is predicted at cycle 0 and changes as"
             " the joint wears; a step oscillates where the wear rate of any pair does at any time, also of one that"
-            f" wears little. A step of which there are fewer than {STEPS_TO_OSCILLATE} in the march is not judged. As"
-            f" exact as implicit: at most {FAITHFUL:.0f} times as wrong in the worn volume with the same step."
+            f" wears little. A step of which there are fewer than {STEPS_TO_OSCILLATE} in the march is not judged."
         )
-        named = ("largest stable", "smallest that oscillates or fails", "as exact as implicit", "not judged")
-        columns = ("point", "predicted limit", *named)
+        columns = ("point", "predicted limit", "largest stable", "smallest that oscillates or fails", "not judged")
         yield Table("precision_stable_steps", "Largest stable explicit step", columns, tuple(rows), note)
 
 
@@ -155,20 +138,18 @@ def _cycles(value: float) -> str:
 
 
 def _table_of_settings(precision: Precision, point: Point, number: int) -> Table:
-    keys = [key for key in KEYS if key in precision.keys]
-    fronts = {name: point.front(name) for name in point.quantities}
+    fronts = {name: point.front(name).index for name in point.quantities}
     rows = []
-    for item in point.measured:
-        remarks = [f"front of {NAMES[name]}" for name, front in fronts.items() if item in front]
-        remarks += [f"{NAMES[name]} not resolved" for name in fronts if not item.resolved(name)]
+    for item in point.measured.itertuples():
+        remarks = [f"front of {QUANTITIES[name]}" for name, front in fronts.items() if item.Index in front]
+        remarks += [f"{QUANTITIES[name]} not resolved" for name in fronts if not getattr(item, f"{name}_resolved")]
         remarks += ["oscillates"] * item.oscillates
-        errors = (show_percent(item.volume), show_percent(item.course), show_percent(item.response))
-        settings = (item.setting.words(key) for key in keys)
+        errors = map(show_percent, (item.volume, item.course, item.response))
+        settings = map(item.Index.words, precision.keys)
         rows.append((*settings, f"{item.run_time:.3g}", *errors, ", ".join(remarks)))
-    for failure in point.failures:
-        settings = (failure.setting.words(key) for key in keys)
-        rows.append((*settings, _DASH, _DASH, _DASH, _DASH, f"failed: {failure.word.replace('_', ' ')}"))
-    columns = (*keys, "CPU time (s)", "worn volume", "worn volume, any count", "response", "remark")
+    for setting, word in point.failures.items():
+        rows.append((*map(setting.words, precision.keys), *[_DASH] * 4, f"failed: {word.replace('_', ' ')}"))
+    columns = (*precision.keys, "CPU time (s)", "worn volume", "worn volume, any count", "response", "remark")
     title = "All settings" + (f" at {point.label}" if point.label else "")
     note = as_sentences(f"Relative errors against {reference_words(precision, point)}", how_known(point))
     return Table(f"precision_settings_{number}", title, columns, tuple(rows), note)

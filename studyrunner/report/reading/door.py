@@ -7,7 +7,6 @@ than a label. What the report does not draw is left outside.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -40,9 +39,19 @@ _NEEDED = ("outcome", "cycle", "contact")
 
 
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
-    """What the report takes of a file, called `source` by the user. Raises UserError.
+    """What the report takes of a file; variables stay unread but for coordinates, texts and the mesh.
 
-    Variables stay unread but for coordinates, texts and the mesh.
+    Parameters
+    ----------
+    dataset
+        The file as it was opened.
+    source
+        What the user calls it.
+
+    Raises
+    ------
+    UserError
+        Where something that is needed is missing, or is not what it has to be.
     """
     lacking = [name for name in _NEEDED if name not in dataset.variables]
     if lacking:
@@ -74,9 +83,14 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
 
 
 def check_numbers(dataset: xr.Dataset, source: str) -> None:
-    """Raises UserError where a number is none of a joint that vibrates, and could not be drawn. NaN is no number.
+    """Look for numbers that are none of a joint that vibrates, and could not be drawn. NaN is no number.
 
     Of what is too large to be read as a whole, nothing is looked at.
+
+    Raises
+    ------
+    UserError
+        Where there is one.
     """
     for name, variable in dataset.variables.items():
         if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
@@ -105,8 +119,12 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
     """The effective study that a file carries, by table; empty where it is no TOML.
 
-    Numbers are such that they can be counted with, texts are cleaned, and what is nested deeply is left out. Raises
-    UserError where reading it would do harm.
+    Numbers are such that they can be counted with, texts are cleaned, and what is nested deeply is left out.
+
+    Raises
+    ------
+    UserError
+        Where reading it would do harm.
     """
     text = str(attributes.get("study", ""))
     try:
@@ -171,7 +189,10 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
 
 def _is_choice(text: str) -> bool:
     """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
-    return text == "auto" or re.fullmatch(r"[0-9.e+-]{1,32}", text) is not None
+    try:
+        return text == "auto" or math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.accessor import Grid, find_grid
-from studyrunner.report.reading.frequency_course import cell_edges
 from studyrunner.report.reading.result import Result
 
 LONE = 1e-3
@@ -59,6 +58,15 @@ def find_flanks(result: Result) -> tuple[Flank, ...]:
             Flank(surface or "contact", pairs, area[pairs], grid, _flatten(positions[pairs]) if known else None)
         )
     return tuple(found)
+
+
+def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np.float64]:
+    """Edges (n + 1,) of cells around rising positions (n,): halfway between them; of this width around a single one."""
+    if positions.size == 1:
+        return np.array([positions[0] - 0.5 * width, positions[0] + 0.5 * width])
+    middle = 0.5 * (positions[1:] + positions[:-1])
+    first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
 
 
 def _find_grid(positions: NDArray[np.float64]) -> Grid | None:

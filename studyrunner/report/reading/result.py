@@ -15,16 +15,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.door import check_dataset, reading_errors, study_tables
-from studyrunner.report.reading.units import show_cycles, show_number
+from studyrunner.report.reading.units import show_cycles, show_value
 from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
-from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 CONVERGED = 0
 """The `outcome` of a point of which nothing else is to be said."""
 
 _COMPLETE = ("converged", "inaccurate", "sensitive")
 """Words of the outcomes of points that were computed to the last cycle."""
+
+NO_VOLUME = 1e-24
+"""m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
 
 Point = Mapping[str, int]
 """Index along each axis. Where axes are left out, all values along them are meant."""
@@ -300,28 +302,6 @@ class Result:
     def close(self) -> None:
         """Close the file."""
         self.dataset.close()
-
-
-def units_of(name: str) -> str:
-    """Unit of a variable or a coordinate of a result file; `cycles` where it counts them, empty where there is none."""
-    if name in ("step", "step_limit", "cycle", "jump_cycle"):
-        return "cycles"
-    for table in (ASKED, KEPT, COORDINATES):
-        if name in table:
-            units = table[name].units
-            return "" if units == "1" else units
-    return ""
-
-
-def show_value(name: str, value: object) -> str:
-    """A value of an axis in words."""
-    if isinstance(value, str):
-        return f"{value} scheme" if name == "scheme" else f"{name.replace('_', ' ')} {value}"
-    units = units_of(name)
-    number = show_number(float(str(value)))
-    return (
-        f"{number} Hz" if name == "frequency" else f"{name.replace('_', ' ')} {number}" + (f" {units}" if units else "")
-    )
 
 
 def as_sentences(*parts: str) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from studyrunner.variables import ASKED, COORDINATES, KEPT
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -78,6 +80,28 @@ def show_number(value: float, digits: int = 6) -> str:
 def show_cycles(value: float) -> str:
     """A cycle count in words."""
     return f"{show_number(value, 8)} cycle" + ("" if value == 1 else "s")
+
+
+def units_of(name: str) -> str:
+    """Unit of a variable or a coordinate of a result file; `cycles` where it counts them, empty where there is none."""
+    if name in ("step", "step_limit", "cycle", "jump_cycle"):
+        return "cycles"
+    for table in (ASKED, KEPT, COORDINATES):
+        if name in table:
+            units = table[name].units
+            return "" if units == "1" else units
+    return ""
+
+
+def show_value(name: str, value: object) -> str:
+    """A value of an axis in words."""
+    if isinstance(value, str):
+        return f"{value} scheme" if name == "scheme" else f"{name.replace('_', ' ')} {value}"
+    units = units_of(name)
+    number = show_number(float(str(value)))
+    return (
+        f"{number} Hz" if name == "frequency" else f"{name.replace('_', ' ')} {number}" + (f" {units}" if units else "")
+    )
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

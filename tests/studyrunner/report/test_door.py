@@ -166,6 +166,16 @@ def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert not set("\x1b\x07\x01") & set(page)
 
 
+@pytest.mark.parametrize("text", ["1.5.2", "1e999", "-", "nan"])
+def test_choices_are_numbers_or_auto(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    build_file(axes={"frequency": (190.0, 191.0), "harmonics": ("auto", "3", text)}).to_netcdf("out.nc")
+    assert main(["out.nc"]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("study-report: out.nc: harmonics = texts in place of numbers")
+
+
 def test_long_names_are_cut(folder: Path) -> None:
     with h5py.File("out.nc", "r+") as file:
         file["response"][0] = "x" * 1_000_000

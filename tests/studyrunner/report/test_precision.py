@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from studyrunner.report.precision.errors import Measured, Precision, pareto_front, study_precision
+from studyrunner.report.drawing import Table
+from studyrunner.report.precision.comparison import Precision, study_precision
+from studyrunner.report.precision.errors import pareto_front
+from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.precision.findings import (
     TARGETS,
     find_orders,
     find_stable_step,
     log_slope,
     recommend,
-    recommendations,
 )
 from studyrunner.report.precision.settings import Setting
 from studyrunner.report.reading.result import Result
@@ -62,15 +66,15 @@ def test_errors_against_the_exact_answer_are_those_of_the_formula() -> None:
         assert point.reference is not None
         assert point.reference.setting is None
         assert len(point.measured) == 2 * len(STEPS) * len(HARMONICS)
-        for item in point.measured:
-            at = {"frequency": frequency, **vars(item.setting)}
+        for item in point.measured.itertuples():
+            at = {"frequency": frequency, **vars(item.Index)}
             assert item.volume == pytest.approx(abs(error_of(at)), rel=1e-9, abs=1e-15)
             assert item.response == pytest.approx(abs(error_of(at)), rel=1e-9, abs=1e-15)
             assert item.course == pytest.approx(item.volume, rel=1e-9, abs=1e-15)
             assert item.run_time == pytest.approx(time_of(at))
             assert item.volume_resolved
             assert item.response_resolved
-        times = [item.run_time for item in point.measured]
+        times = point.measured["run_time"].to_list()
         assert times == sorted(times)
 
 
@@ -79,8 +83,8 @@ def test_largest_error_over_the_cycles_is_that_of_any_count() -> None:
     worn = result.dataset["worn_volume"].values.copy()
     worn[..., 1] += 0.25 * WORN
     result.dataset["worn_volume"] = (result.dataset["worn_volume"].dims, worn)
-    for item in precision_of(result).points[0].measured:
-        middle = 0.5 * 0.4 * error_of({"frequency": 100.0, **vars(item.setting)})
+    for item in precision_of(result).points[0].measured.itertuples():
+        middle = 0.5 * 0.4 * error_of({"frequency": 100.0, **vars(item.Index)})
         assert item.course == pytest.approx(0.25 + middle, rel=1e-9)
         assert item.volume < 0.1
 
@@ -91,14 +95,14 @@ def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines() -> No
     for point, size in zip(precision.points, (1.0, 2.0), strict=True):
         assert point.reference is not None
         assert point.reference.setting == Setting("adaptive", None, 9)
-        assert point.reference.volume == 2e-4
-        assert all(item.setting != point.reference.setting for item in point.measured)
+        assert point.reference.uncertainty["volume"] == 2e-4
+        assert point.reference.setting not in point.measured.index
         assert len(point.measured) == (2 * len(STEPS) + 1) * len(HARMONICS) - 1
         # the next coarser: 5 harmonics, or the smallest implicit step
         coarser = [abs(size * (0.03 / 25 - reference_error)), size * 1e-4 * STEPS[0]]
-        assert point.reference.volume_difference == pytest.approx(max(coarser) / (1.0 + size * reference_error))
-        for item in point.measured:
-            own = error_of({"frequency": 100.0 * size, **vars(item.setting) | {"step": item.setting.step or 0.0}})
+        assert point.reference.difference["volume"] == pytest.approx(max(coarser) / (1.0 + size * reference_error))
+        for item in point.measured.itertuples():
+            own = error_of({"frequency": 100.0 * size, **vars(item.Index) | {"step": item.Index.step or 0.0}})
             known = abs(own - size * reference_error) / (1.0 + size * reference_error)
             assert item.volume == pytest.approx(known, rel=1e-9, abs=1e-14)
             assert item.volume_resolved == (known >= 3.0 * 2e-4)
@@ -125,7 +129,7 @@ def test_smallest_rtol_of_the_adaptive_scheme_is_the_reference() -> None:
     assert point.reference is not None
     assert point.reference.setting == Setting("adaptive", None, 3, 64, None, 0.01)
     # rtol changes nothing for the implicit scheme with given harmonics and samples, nor the step for the adaptive one
-    by_scheme = [item.setting.scheme for item in point.measured]
+    by_scheme = [setting.scheme for setting in point.measured.index]
     assert by_scheme.count("adaptive") == 2 * 2 * 2 - 1
     assert by_scheme.count("implicit") == len(STEPS) * 2 * 2
 
@@ -151,9 +155,9 @@ def test_failed_settings_are_counted_and_never_compared() -> None:
     for point in precision.points:
         assert point.reference is not None
         assert point.reference.setting == Setting("adaptive", None, 5)
-        assert point.runs.outcomes == {"march_failed": 2 * len(STEPS) + 1 + 3}
-        failed = {failure.setting for failure in point.failures}
-        assert not failed & {item.setting for item in point.measured}
+        assert Counter(point.failures.values()) == {"march_failed": 2 * len(STEPS) + 1 + 3}
+        failed = set(point.failures)
+        assert not failed & set(point.measured.index)
         assert len(failed) + len(point.measured) + 1 == (2 * len(STEPS) + 1) * len(HARMONICS)
     assert precision.outcomes["march_failed"] == 2 * (2 * len(STEPS) + 4)
 
@@ -162,8 +166,10 @@ def test_nothing_is_compared_where_all_failed() -> None:
     assert study_precision(finest_file(outcome=lambda _: 4)) is None
     half = precision_of(finest_file(outcome=lambda point: 4 * (point["frequency"] == 200.0)))
     assert half.points[1].reference is None
-    assert half.points[1].measured == ()
-    assert [label for label, _ in recommendations(half)] == ["100 Hz"]
+    assert not len(half.points[1].measured)
+    (table,) = [item for item in draw_precision(half) if item.name == "precision_recommended"]
+    assert isinstance(table, Table)
+    assert {row[0] for row in table.rows} == {"100 Hz"}
 
 
 def test_files_without_settings_to_compare() -> None:
@@ -181,11 +187,9 @@ def test_times_of_shared_marches_are_told(wears: int, shortcuts: str, shared: bo
 def test_front_is_that_of_all_pairs_compared() -> None:
     rng = np.random.default_rng(1)
     numbers = rng.integers(1, 12, (60, 2)).astype(float)
-    items = [
-        Measured(Setting(step=float(n)), time, 0.0, 0.0, 0.0, True, True, False) for n, (time, _) in enumerate(numbers)
-    ]
-    errors = numbers[:, 1].tolist()
-    front = {item.setting.step for item in pareto_front(items, errors)}
+    index = pd.Index([Setting(step=float(n)) for n in range(len(numbers))], dtype=object)
+    runs = pd.DataFrame({"run_time": numbers[:, 0]}, index=index)
+    front = {setting.step for setting in pareto_front(runs, pd.Series(numbers[:, 1], index)).index}
     best = {tuple(numbers[int(step)]) for step in front}
     undominated = {
         (time, error)
@@ -200,8 +204,8 @@ def test_errors_that_are_not_resolved_end_the_front() -> None:
     precision = precision_of(finest_file(estimate=lambda _: 2e-3))
     for point in precision.points:
         front = point.front("volume")
-        assert sum(not item.volume_resolved for item in front) == 1
-        assert not front[-1].volume_resolved
+        assert sum(~front["volume_resolved"]) == 1
+        assert not front["volume_resolved"].iloc[-1]
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0])
@@ -225,7 +229,7 @@ def test_order_in_the_step_is_that_of_the_formula(power: float, against: str) ->
     for order in orders:
         assert order.order == pytest.approx(power, abs=1e-9)
         assert order.used == STEPS
-        assert order.errors == pytest.approx([1e-4 * step**power for step in STEPS], rel=1e-9)
+        assert list(order.errors.values()) == pytest.approx([1e-4 * step**power for step in STEPS], rel=1e-9)
 
 
 def test_order_of_the_step_without_a_finer_reference_uses_clear_errors_only() -> None:
@@ -234,7 +238,7 @@ def test_order_of_the_step_without_a_finer_reference_uses_clear_errors_only() ->
     (point,) = precision_of(result).points
     order = next(order for order in find_orders(point) if order.quantity == "volume")
     # against a step of 1 the errors are those of step - 1: less than 5 at step 4
-    assert order.values == tuple(steps[1:])
+    assert tuple(order.errors) == tuple(steps[1:])
     assert order.used == (8.0, 16.0, 32.0)
     assert order.order == pytest.approx(np.polyfit(np.log([8, 16, 32]), np.log([7, 15, 31]), 1)[0], rel=1e-9)
 
@@ -267,7 +271,7 @@ def test_convergence_in_the_harmonics() -> None:
     assert [order.quantity for order in orders] == ["volume", "response"]
     for order in orders:
         assert order.order == pytest.approx(2.0, abs=1e-9)
-        assert order.values == (1.0, 3.0, 5.0, 9.0)
+        assert tuple(order.errors) == (1.0, 3.0, 5.0, 9.0)
         assert order.setting == Setting("implicit", STEPS[0])
         # against the exact answer, what the finest setting leaves may have other causes: 5 times that counts
         assert order.used == (1.0, 3.0)
@@ -287,16 +291,6 @@ def test_largest_stable_step_is_the_last_before_the_first_unstable_one(how: str)
     assert (found.largest, found.smallest_unstable, found.predicted) == (20.0, 50.0, 40.0)
     # three steps of 300 cycles show nothing in 1000
     assert found.unjudged == (300.0,)
-
-
-def test_explicit_steps_are_held_against_implicit_ones() -> None:
-    def error(point: Point) -> float:
-        return 1e-4 * float(point["step"]) * (3.0 if point["scheme"] == "explicit" and point["step"] == 50.0 else 1.0)
-
-    result = synthetic({"step": STEPS, "scheme": ["implicit", "explicit"]}, error, time_of, exact=True)
-    found = find_stable_step(precision_of(result).points[0])
-    assert found is not None
-    assert found.faithful == 20.0
 
 
 def test_recommended_is_the_cheapest_of_all_that_are_exact_enough() -> None:
@@ -343,7 +337,6 @@ def test_wear_where_there_is_none_is_infinitely_wrong() -> None:
     result.dataset["worn_volume"] = (result.dataset["worn_volume"].dims, worn)
     point = precision_of(result).points[0]
     assert point.quantities == ("response",)
-    wrong = next(item for item in point.measured if item.setting == Setting("implicit", STEPS[0], 1))
-    assert wrong.volume == math.inf
-    assert sum(math.isinf(item.volume) for item in point.measured) == 1
-    assert all(math.isnan(item.course) for item in point.measured)
+    assert point.measured.at[Setting("implicit", STEPS[0], 1), "volume"] == math.inf
+    assert sum(np.isinf(point.measured["volume"])) == 1
+    assert point.measured["course"].isna().all()

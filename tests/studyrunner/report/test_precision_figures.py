@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.precision.errors import Precision, study_precision
+from studyrunner.report.precision.comparison import Precision, study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.precision.findings import show_percent
 from tests.studyrunner.report.synthetic import Point, synthetic
@@ -41,7 +41,7 @@ def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
         marks = [line for line in panel.lines if line.get_linestyle() == "None" and line.get_markersize() < 10.0]
         drawn = sorted((float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in marks)
         assert len(drawn) == n_settings
-        known = sorted((item.run_time, item.volume) for item in point.measured)
+        known = sorted(point.measured[["run_time", "volume"]].itertuples(index=False))
         np.testing.assert_allclose(drawn, known, rtol=1e-12)
         rings = [line for line in panel.lines if line.get_markersize() > 10.0]
         assert len(rings) == len(point.front("volume"))
@@ -50,7 +50,7 @@ def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
         table = items[f"precision_settings_{number}"]
         assert isinstance(table, Table)
         assert table.columns[:3] == ("scheme", "step", "harmonics")
-        assert [row[4] for row in table.rows] == [show_percent(item.volume) for item in point.measured]
+        assert [row[4] for row in table.rows] == list(map(show_percent, point.measured["volume"]))
     for path in drawing.save(tmp_path):
         assert path.stat().st_size > 1000
     ElementTree.parse(tmp_path / "precision.svg")
@@ -64,7 +64,7 @@ def test_marks_of_errors_that_are_not_resolved_are_hollow() -> None:
         line for line in drawing.figure.axes[0].lines if line.get_linestyle() == "None" and line.get_markersize() < 10
     ]
     hollow = [line for line in marks if line.get_markerfacecolor() == "white"]
-    assert len(hollow) == sum(not item.volume_resolved for item in precision.points[0].measured) > 0
+    assert len(hollow) == sum(~precision.points[0].measured["volume_resolved"]) > 0
     assert "known to 0.2 %" in drawing.caption
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.sections import study_section
+from studyrunner.report.page.page import write_page
 from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_endings
@@ -39,7 +40,7 @@ def test_points_are_told_apart() -> None:
     assert not np.isnan(stable[SENSITIVE]).any()
 
 
-def test_sentences_begin_with_the_worn_volume() -> None:
+def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
     result = mixed()
     assert tell_volumes(result) == (
         "The worn volume of 2 of 8 points is known within rtol = 1 %, of 4 less well; the worst is known to 2 %, at 202"
@@ -49,7 +50,8 @@ def test_sentences_begin_with_the_worn_volume() -> None:
         "8 points, 6 computed to the last cycle, 1 ended early and hold what was computed until then, 1 without a"
         " result."
     )
-    html = study_section(result)
+    write_page(result, [], tmp_path / "index.html")
+    html = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert html.index("The worn volume of 2 of 8") < html.index("8 points, 6 computed") < html.index("Above.")
     assert "202 Hz, implicit scheme: from cycle 1000 on the wear rate is known to 2.6 % only" in html
 

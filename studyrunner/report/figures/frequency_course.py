@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import line_style
-from studyrunner.report.reading.result import Result, units_of
-from studyrunner.report.reading.units import scale_for, show_power
+from studyrunner.report.reading.flanks import cell_edges
+from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.units import scale_for, show_power, units_of
 
 _DECADES = 30.0
 _MANY = 60
@@ -59,15 +60,6 @@ class Course:
             panel.set_xscale("log")
             panel.xaxis.set_major_formatter(show_power)
             panel.xaxis.set_minor_formatter("")
-
-
-def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np.float64]:
-    """Edges (n + 1,) of cells around rising positions (n,): halfway between them; of this width around a single one."""
-    if positions.size == 1:
-        return np.array([positions[0] - 0.5 * width, positions[0] + 0.5 * width])
-    middle = 0.5 * (positions[1:] + positions[:-1])
-    first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
-    return np.concatenate([[first], middle, [last]])
 
 
 def find_course(result: Result, axis: str | None = None) -> Course | None:

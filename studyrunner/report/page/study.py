@@ -1,0 +1,74 @@
+"""What the page tells of the study: its axes, its scene, how well the worn volume is known, how the points ended."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.units import show_cycles, show_number, units_of
+from studyrunner.system.progress import count
+
+_MOST_VALUES = 12
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Points that ended in one way: how many, what that means, and the first of them, a line each."""
+
+    points: str
+    sentence: str
+    lines: list[str]
+
+
+@dataclass(frozen=True)
+class StudyFacts:
+    """The study in words.
+
+    summary: how well the worn volume is known, and how many points were computed. endings: of the points of which there
+    is more to say. facts: names and values. text: the effective study, None where the file has none.
+    """
+
+    summary: str
+    endings: list[Ended]
+    facts: list[tuple[str, str]]
+    text: str | None
+
+
+def describe_study(result: Result) -> StudyFacts:
+    """What was studied and how it ended."""
+    attributes = result.dataset.attrs
+    facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
+    cycles = result.cycles
+    kept = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}, {len(cycles)} kept"
+    facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
+    facts.append(("scene", _scene(result)))
+    named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
+    facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
+    numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
+    endings = [
+        Ended(count(numbers[number], "point"), ending.sentence, describe_ended(result, number))
+        for number, ending in sorted(result.endings.items())
+        if numbers[number] and number != CONVERGED
+    ]
+    summary = " ".join(filter(None, (tell_volumes(result), tell_ends(result))))
+    return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
+
+
+def _axis_values(result: Result, name: str) -> str:
+    axis = result.dataset[name]
+    words = axis.dtype.kind not in "fiu"
+    values = [str(value) if words else show_number(float(value)) for value in axis.values]
+    units = units_of(name)
+    after = f" {units}" if units else ""
+    if len(values) > _MOST_VALUES:
+        return f"{values[0]} to {values[-1]}{after}, {len(values)} values"
+    return ", ".join(values) + after
+
+
+def _scene(result: Result) -> str:
+    n_pairs = count(result.dataset.sizes["contact"], "contact pair")
+    responses = f", response {', '.join(result.responses)}" if result.responses else ""
+    model = result.study.get("scene", {}).get("model")
+    return f"{model or 'unknown'}: {n_pairs}{responses}"
