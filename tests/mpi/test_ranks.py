@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -113,12 +114,23 @@ def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["two_masses.nc.parts"]
 
 
+@pytest.fixture
+def default_signals() -> Iterator[None]:
+    """Whoever runs the tests may ignore signals, as `nohup` does: the processes that they start would inherit it."""
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGHUP, signal.SIGUSR1)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 # the launcher of MPICH ends by itself at SIGHUP, and all ranks with it
 @pytest.mark.parametrize(
     ("n_ranks", "number"),
     [(n, number) for n in (0, 2) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)] + [(0, signal.SIGHUP)],
 )
-def test_an_interrupted_run_ends_at_once(n_ranks: int, number: signal.Signals, tmp_path: Path) -> None:
+def test_an_interrupted_run_ends_at_once(
+    n_ranks: int, number: signal.Signals, tmp_path: Path, default_signals: None
+) -> None:
     def interrupt(running: Running) -> None:
         running.wait_for("following 2 branches")
         running.process.send_signal(number)
