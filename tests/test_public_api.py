@@ -81,6 +81,7 @@ def test_types_and_physics_are_part_of_the_packages() -> None:
         assert (ROOT / name / file).is_file()
 
 
+@pytest.mark.slow
 def test_a_script_is_checked_by_mypy(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
@@ -122,6 +123,7 @@ frequency_response(model, [0.1], 1.0, 0.5, sweep="sideways")
 # --- the README ---
 
 
+@pytest.mark.slow
 def test_the_example_of_the_readme_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -152,6 +154,7 @@ def test_the_map_of_the_house_names_what_there_is() -> None:
 # --- studies ---
 
 
+@pytest.mark.slow
 def test_a_study_gives_what_the_command_gives(
     result: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -176,6 +179,7 @@ def test_overrides_are_values_or_texts() -> None:
         read_study("sdof_slider", {"study.name.x": 3})
 
 
+@pytest.mark.slow
 def test_a_run_that_is_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: xr.Dataset) -> None:
     path = tmp_path / "out.nc"
     done: list[object] = []

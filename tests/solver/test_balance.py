@@ -138,6 +138,7 @@ def test_predict_is_the_inverse_for_masses_on_sliders(free: str, wear: bool, res
     assert back == pytest.approx(predicted, abs=1e-10 * np.abs(predicted).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 32), Resolution((1, 3, 5), 48)])
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("free", MASSES)

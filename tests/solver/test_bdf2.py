@@ -33,6 +33,7 @@ def exact_depths(cycles: np.ndarray) -> np.ndarray:
     return np.asarray(found.y[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-1, 1e-2, 1e-3, 1e-4])
 def test_the_worn_volume_is_as_exact_as_asked_for(rtol: float) -> None:
     history = adaptive_march(rtol)
@@ -48,6 +49,7 @@ def test_the_worn_volume_is_as_exact_as_asked_for(rtol: float) -> None:
     assert np.abs(history.wear_rate / AREA - rates).max() < max(2.0 * rtol, 2e-3) * rates.max()
 
 
+@pytest.mark.slow
 def test_steps_are_of_second_order() -> None:
     rtols = np.array([1e-3, 1e-4, 1e-5])
     begin = slider_start(COARSE)[1].newton_iterations

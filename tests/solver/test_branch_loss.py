@@ -63,6 +63,7 @@ def history(step: float, scheme: Scheme, end: float = 1000.0) -> WearHistory:
     return march_wear(worn_wall(1.0), 1e-3, start(), WEAR, step, scheme, cycles, SETTINGS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "impacts"), [(0.98, True), (1.02, False)])
 def test_the_exact_branch_ends_at_the_depth_of_the_jump(share: float, impacts: bool) -> None:
     depth = share * history(5.0, "implicit").wear_depth[-1, 0]
@@ -70,6 +71,7 @@ def test_the_exact_branch_ends_at_the_depth_of_the_jump(share: float, impacts: b
     assert (abs(orbit.harmonic(0)) > 0.05) == impacts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "step"),
     [("explicit", 50.0), ("implicit", 50.0), ("explicit", 1000.0), ("implicit", 1000.0), ("adaptive", 0.0)],

@@ -74,6 +74,7 @@ def failing(joint: Joint, evaluation: Evaluation) -> set[str]:
     return set(certify(joint, evaluation).failures(TOLERANCE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_harmonics", [3, 5, 11, 21])
 def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
     states = [slider(n_harmonics), two_masses(0.4, n_harmonics), two_masses(0.6, n_harmonics)]
@@ -91,6 +92,7 @@ def test_states_of_elastic_joints_hold(seed: int) -> None:
     assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_dovetail_state_that_slips_and_lifts_holds() -> None:
     settings = SolverSettings(3, 128)
     omegas = 2 * np.pi * np.array([211.5, 212.5])

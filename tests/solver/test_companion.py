@@ -58,6 +58,7 @@ def errors(history: WearHistory, truth: WearHistory) -> np.ndarray:
     return (history.worn_volume_error * history.worn_volume)[1:] / true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), SCHEMES)
 def test_the_error_of_the_dovetail_holds_that_of_its_steps(scheme: Scheme, step: float) -> None:
     truth = worn("implicit", 50.0)
@@ -71,6 +72,7 @@ def test_the_error_of_the_dovetail_holds_that_of_its_steps(scheme: Scheme, step:
     assert history.wear_depth_error[-1].sum() > 0.5 * of_pairs.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "explicit"])
 def test_the_error_falls_with_the_step(scheme: Scheme) -> None:
     steps = np.array([4000.0, 2000.0, 1000.0])
@@ -82,6 +84,7 @@ def test_the_error_falls_with_the_step(scheme: Scheme) -> None:
     assert sizes[0] > sizes[1] > sizes[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), SCHEMES)
 def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: float) -> None:
     model = scene("sdof_slider", 21)
@@ -104,6 +107,7 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: fl
     assert history.error_estimate < 0.3
 
 
+@pytest.mark.slow
 def test_nothing_that_wears_nothing_has_an_error() -> None:
     history = worn("implicit", 1000.0, frequency=205.0)
     assert history.outcome is Outcome.CONVERGED
@@ -112,6 +116,7 @@ def test_nothing_that_wears_nothing_has_an_error() -> None:
     assert history.error_estimate == 0.0
 
 
+@pytest.mark.slow
 def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = worn("implicit", 1000.0)
     check = Trajectory.check
@@ -132,6 +137,7 @@ def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch: pytest.Mo
     assert ended.error_estimate == ended.worn_volume_error[known][-1] > 0.0
 
 
+@pytest.mark.slow
 def test_a_volume_that_one_number_does_not_tell_is_said_to_be_sensitive(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = worn("explicit", 4000.0)
     monkeypatch.setattr(march_module, "SENSITIVE_ERROR", 0.9 * usual.error_estimate)
@@ -155,6 +161,7 @@ def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
     assert (_before(cycles, []) == 0.0).all()
 
 
+@pytest.mark.slow
 def test_an_error_of_the_start_state_is_taken_to_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """The volume is not known better than a multiple of what the wear rates of the start states differ by."""
     model, found = start()
@@ -170,6 +177,7 @@ def test_an_error_of_the_start_state_is_taken_to_grow(monkeypatch: pytest.Monkey
     assert RESULTS.start_safety >= 3.0
 
 
+@pytest.mark.slow
 def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     found = {}
     for change in (0.1, 10.0):

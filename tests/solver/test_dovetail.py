@@ -65,6 +65,7 @@ def law(nodal_diameter: int, start: StartState, state: PeriodicState, passes: in
 SLIPPING = [(0, -2.0, 2.0), (0, -1.0, 2.0), (0, -0.45, 2.0), (0, -0.1, 0.5), (3, -1.0, 2.0), (20, -0.5, 2.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "offset", "amplitude"), SLIPPING)
 def test_a_state_balances_forces_and_energy(nodal_diameter: int, offset: float, amplitude: float) -> None:
     _, state = state_at(nodal_diameter, offset, amplitude)
@@ -105,6 +106,7 @@ def test_every_sample_obeys_the_contact_law(nodal_diameter: int, offset: float, 
     assert np.abs(mean - state.contact_force_h[:, 0, 0]).max() < 1e-2 * mean.max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "amplitude"), [(0, 0.5), (0, 2.0), (3, 0.5), (3, 2.0), (20, 0.5)])
 def test_the_resonance_is_passed_on_a_sweep(nodal_diameter: int, amplitude: float) -> None:
     frequencies = glued_frequency(nodal_diameter) + np.array([-2.0, -1.0, -0.5, -0.1, 0.3, 1.0])
@@ -121,6 +123,7 @@ def worn(step: float, scheme: Scheme) -> WearHistory:
     return march_wear(dovetail(), FRICTION, start, WEAR, step, scheme, CYCLES, SETTINGS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 @pytest.mark.parametrize("step", STEPS)
 def test_wear_at_resonance_only_grows(step: float, scheme: Scheme) -> None:
@@ -150,6 +153,7 @@ def test_an_implicit_step_costs_what_an_explicit_one_does() -> None:
     assert iterations[1] <= 1.5 * iterations[0]
 
 
+@pytest.mark.slow
 def test_away_from_resonance_wear_is_round_off() -> None:
     start, _ = state_at(0, -5.0, 0.5)
     history = march_wear(dovetail(), FRICTION, start, WEAR, 1000.0, "implicit", CYCLES, SETTINGS)

@@ -164,6 +164,7 @@ def run_converged(case: Case) -> WearHistory:
     return ended.history
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("friction", [0.0, 0.05, 2.0])
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
@@ -177,6 +178,7 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
     assert ended.history.outcome.complete or ended.history.outcome is Outcome.STEP_TOO_LONG
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e2, 1e4])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
@@ -189,6 +191,7 @@ def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
     assert ended.history.outcome.complete or (factor > 1.0 and ended.history.outcome is Outcome.STEP_TOO_LONG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-4, 1e-2, 1.0, 5.0, 50.0])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
 def test_amplitude(base: Case, factor: float) -> None:
@@ -197,6 +200,7 @@ def test_amplitude(base: Case, factor: float) -> None:
         assert not history.wear_depth.any(), "so small a load is held by friction"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 5.0, 50.0])
 def test_a_block_that_bounces(factor: float) -> None:
     # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
@@ -205,6 +209,7 @@ def test_a_block_that_bounces(factor: float) -> None:
     assert ended.start.outcome is Outcome.CONVERGED or factor > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [5e-5, 0.5, 25.0])
 def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
     settings = SolverSettings(3, 64)
@@ -214,6 +219,7 @@ def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
     assert ended.history.outcome is Outcome.CONVERGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("n_steps", [1, 7, 200])
 def test_step_from_one_cycle_to_all_cycles(n_steps: int, scheme: Scheme) -> None:
@@ -224,6 +230,7 @@ def test_step_from_one_cycle_to_all_cycles(n_steps: int, scheme: Scheme) -> None
         assert ended.history.outcome is Outcome.CONVERGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-8, 1e-4, 1e4, 1e8])
 def test_contact_stiffness_ratio(ratio: float) -> None:
     history = run_converged(block((1e7, 1e7 * ratio)))
@@ -257,6 +264,7 @@ def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: 
         assert ended.history.response_peak.max() > 1e3 * 10.0 / 1.6e5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 1])
 def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) -> None:
     case = elastic()
@@ -268,6 +276,7 @@ def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) 
     run(replace(case, model=undamped, omega=float(np.sqrt(np.sort(squares)[number]))))
 
 
+@pytest.mark.slow
 def test_zero_damping_off_resonance() -> None:
     for case in (elastic(), block()):
         linear = case.model.linear[0]
@@ -275,6 +284,7 @@ def test_zero_damping_off_resonance() -> None:
         run_converged(replace(case, model=undamped))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
 def test_no_static_load(base: Case) -> None:
     linear = base.model.linear[0]
@@ -282,6 +292,7 @@ def test_no_static_load(base: Case) -> None:
     run_converged(replace(base, model=bare))
 
 
+@pytest.mark.slow
 def test_forces_below_all_numbers() -> None:
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
     case = block(preload=0.0, lift=0.2)
@@ -308,11 +319,13 @@ def test_wear_that_consumes_the_whole_preload(scheme: Scheme) -> None:
     assert history.mean_pressure[-1, 0] < 0.05 * history.mean_pressure[0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["3d", "one_tangent", "second_tangent", "normal_only", "constant_load"])
 def test_one_pair(kind: str) -> None:
     run_converged(Case(random_model(5, (kind,)), OMEGA))
 
 
+@pytest.mark.slow
 def test_500_pairs() -> None:
     # one tangent each and a constant load: the same with closing displacements takes fifty times as long
     settings = SolverSettings(1, 32)
@@ -365,6 +378,7 @@ def block_limit() -> float:
     return 2.0 * 300.0 / (1.0 - difference[1] / difference[0])
 
 
+@pytest.mark.slow
 def test_the_explicit_scheme_throws_the_load_to_and_fro_beyond_its_limit() -> None:
     limit = block_limit()
     assert 2000.0 < limit < 3500.0
@@ -384,6 +398,7 @@ def test_the_implicit_scheme_runs_through_beyond_that_limit(share: float) -> Non
     assert np.abs(difference[3:]).max() < 0.02 * difference[0]
 
 
+@pytest.mark.slow
 def test_the_explicit_scheme_says_where_it_is_unstable() -> None:
     limit = block_limit()
     for share in (0.4, 1.2, 4.0):

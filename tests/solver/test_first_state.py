@@ -75,6 +75,7 @@ def test_with_more_friction_the_static_state_comes_nearer_to_the_glued_one() -> 
     assert away[-1] < 1e-6 * away[0]
 
 
+@pytest.mark.slow
 def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure() -> None:
     model = pressed_dovetail()
     glued = None

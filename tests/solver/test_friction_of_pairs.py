@@ -91,6 +91,7 @@ def state_at(model: ReducedModel, friction: float | np.ndarray) -> PeriodicState
     return start.state
 
 
+@pytest.mark.slow
 def test_two_sliders_with_their_own_coefficients_are_those_that_stand_alone() -> None:
     model = scene("sdof_slider", normal_stiffness=0.0)
     friction = np.array([0.3, 0.6])

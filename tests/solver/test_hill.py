@@ -48,6 +48,7 @@ def crossings() -> dict[float, list[PathPoint]]:
     return found
 
 
+@pytest.mark.slow
 def test_the_branches_have_alternating_stability() -> None:
     upper, middle, lower = crossings()[1.55]
     tangents = [balance_at(1.55, point.history).linearise(point.evaluation) for point in (upper, middle, lower)]

@@ -71,6 +71,7 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
     assert balance.evaluate(tailed).scaled_residual() < plain.evaluate(padded).scaled_residual()
 
 
+@pytest.mark.slow
 def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, attempts = random_scene(THROWN_OFF), []
     by_homotopy = Level.by_homotopy

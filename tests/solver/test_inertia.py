@@ -114,6 +114,7 @@ def test_a_step_from_rest_has_its_derivative_in_force_and_limit() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", [0, 1])
 def test_a_pair_with_one_tangent_moves_along_it_alone(line: int) -> None:
     force, velocity = np.array([7.0, -11.0]), np.array([0.3, 0.4])
@@ -447,6 +448,7 @@ def assert_derivative(case: MassCase, slack: float = 1e-6) -> int:
     return away
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_derivative_of_the_periodic_march_is_that_of_differences(seed: int) -> None:
     case = mass_case(12, seed)

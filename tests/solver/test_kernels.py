@@ -323,6 +323,7 @@ def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
     assert integrate_slip_work(force_t, state_t)[0] == 0.0
 
 
+@pytest.mark.slow
 def test_kernels_give_the_same_numbers_without_compilation(tmp_path: Path) -> None:
     path = tmp_path / "plain.npz"
     root = Path(__file__).parents[2]

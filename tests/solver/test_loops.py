@@ -134,6 +134,7 @@ def test_a_mass_that_stops_stands_still_in_its_loop() -> None:
     assert np.ptp(series) != pytest.approx(history.slip_range[0, 0], rel=5e-3, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
     history = dovetail_march(scheme)

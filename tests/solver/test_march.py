@@ -72,6 +72,7 @@ def exact_depth(settings: SolverSettings = COARSE) -> float:
     return float(solution.y[0, -1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_the_error_of_the_depth_is_of_first_order_in_the_step(scheme: Scheme) -> None:
     errors = np.array([final_depth(step, scheme) - exact_depth() for step in STEPS])
@@ -91,6 +92,7 @@ def test_both_schemes_have_the_same_limit() -> None:
     assert limits[0] == pytest.approx(limits[1], rel=1e-4, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_with_21_harmonics_the_depth_is_that_of_the_exact_motion(scheme: Scheme) -> None:
     exact = slider_wear_depth(
@@ -140,6 +142,7 @@ def test_the_normal_force_falls_with_the_depth() -> None:
     assert not history.open_fraction.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_the_worn_slider_moves_as_its_friction_force_lets_it(scheme: Scheme) -> None:
     history = march(4000.0, scheme, CYCLES[::2], FINE)
@@ -200,6 +203,7 @@ def test_the_largest_depth_rule_gives_every_step_that_depth() -> None:
     assert between.wear_depth[1:-1, 0] == pytest.approx((np.arange(5) + 0.5) * largest, rel=1e-9, abs=0.0)
 
 
+@pytest.mark.slow
 def test_the_largest_depth_rule_is_of_first_order() -> None:
     errors = [
         march(1.0, "explicit", np.array([0.0, END]), largest_depth=largest).wear_depth[-1, 0] - exact_depth()

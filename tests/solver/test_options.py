@@ -41,6 +41,7 @@ def test_no_two_options_have_one_name() -> None:
     assert len(names) == len(set(names))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ROOMS)
 def test_every_option_is_used_in_a_line_of_code(room: str) -> None:
     code = "".join(path.read_text() for path in ROOT.rglob("*.py"))

@@ -40,6 +40,7 @@ def worn(model: ReducedModel, starts: list[StartState], scheme: Scheme) -> list[
     return [march_wear(model, 0.5, start, WEAR, 2000.0, scheme, CYCLES, SETTINGS) for start in starts]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "explicit", "adaptive"])
 def test_wear_is_that_of_dense_solves(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
     model = sector()

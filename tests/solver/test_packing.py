@@ -102,6 +102,7 @@ def from_every_stop(
     return whole, kept
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("explicit", 800.0), ("adaptive", 1.0)])
 def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=8))
@@ -112,6 +113,7 @@ def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkey
     assert len(kept) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
 def test_a_march_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=30))
@@ -121,6 +123,7 @@ def test_a_march_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, m
     assert min(cycles) < whole.jump_cycle < max(cycles)
 
 
+@pytest.mark.slow
 def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=1))
     monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 100)
@@ -133,6 +136,7 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
     assert any(unpack(progress)[2]["rates"]["n_alternating"].max() in (1, 2) for progress in kept)
 
 
+@pytest.mark.slow
 def test_a_start_state_comes_back() -> None:
     (start,) = branch_states(dovetail(3), 0.5, 0.5, [2 * np.pi * 212.0], SolverSettings(3, 64))
     found = unpack(pack(start))
@@ -143,6 +147,7 @@ def test_a_start_state_comes_back() -> None:
     assert_same(unpack(pack(failed)), failed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""

@@ -63,6 +63,7 @@ def multipliers(scene: Scene, _: Case, joint: Joint, at: Evaluation) -> FloatArr
     return np.linalg.eigvals(np.array(columns).T)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 6, 17, 26, 29, 32, 41, 54, 57])
 def test_it_is_a_multiplier_beyond_minus_one(seed: int) -> None:
     scene = drawn("impact", seed)
@@ -72,6 +73,7 @@ def test_it_is_a_multiplier_beyond_minus_one(seed: int) -> None:
     assert doubles_period(case, joint, at, Effort()) == bool(beyond)
 
 
+@pytest.mark.slow
 def test_the_draws_are_of_both_kinds() -> None:
     """Else the test above would show nothing."""
     found = [multipliers(scene, *state_of(scene, start_of(scene))) for scene in (drawn("impact", s) for s in (1, 17))]
@@ -100,6 +102,7 @@ def test_harmonics_of_two_periods() -> None:
     assert two_periods((1, 2, 3)) == (1, 2, 3, 4, 5, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_harmonics", [3, 5, 9, 13])
 @pytest.mark.parametrize("omega", [1.0, 1.2, 1.5])
 def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega: float, n_harmonics: int) -> None:
@@ -125,6 +128,7 @@ def test_it_is_not_looked_for_in_a_travelling_wave_or_without_bouncing() -> None
         assert not doubles_period(case, balance.joint, balance.evaluate(predicted), Effort())
 
 
+@pytest.mark.slow
 def test_the_outcome_says_so() -> None:
     scene = drawn("impact", 17)
     start = start_of(scene)
@@ -135,6 +139,7 @@ def test_the_outcome_says_so() -> None:
     assert np.isnan(history.response).all()
 
 
+@pytest.mark.slow
 def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = drawn("impact", 17)
     with monkeypatch.context() as presented:

@@ -56,6 +56,7 @@ def states_at(joint: Joint, predicted: FloatArray, before: FloatArray) -> FloatA
     return state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stride", [1, 2])
 def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
     balance, predicted = case(11)
@@ -83,6 +84,7 @@ def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
     assert checked > 0.9 * own.shape[0] * own.shape[1]
 
 
+@pytest.mark.slow
 def test_the_march_solves_what_it_says_sample_by_sample() -> None:
     balance, predicted = case(3)
     found = build_march(tangent_of(balance, predicted))

@@ -12,6 +12,7 @@ from functools import lru_cache
 from random import Random
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
@@ -286,6 +287,7 @@ def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
     assert np.abs(other.slip_work - at.slip_work).max() <= 1e-6 * at.slip_work.max() + round_off
 
 
+@pytest.mark.slow
 def test_what_is_drawn_sticks_slips_opens_and_wears() -> None:
     seen = [found(seed) for seed in range(40)]
     statuses = {int(s) for result in seen if result is not None for s in np.unique(result[2].evaluation.status_t)}

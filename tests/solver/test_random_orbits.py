@@ -46,6 +46,7 @@ def check(scene: Scene, rtol: float, sweep: str) -> None:
     assert found.wear_rate_estimate >= 0.5 * found.wear_rate - ROUND_OFF, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("kind", KINDS)

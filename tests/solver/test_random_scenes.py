@@ -76,6 +76,7 @@ def test_a_rigid_mass_stays_pressed_on() -> None:
                 assert force[row[0]] <= 0.5001 * linear.load_static[row[0]]
 
 
+@pytest.mark.slow
 def test_a_score_of_scenes_is_solved() -> None:
     # the benchmark runs 1000 of them, of which some take minutes
     records = [run_scene(random_scene(seed)) for seed in range(100, 120)]

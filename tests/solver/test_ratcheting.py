@@ -44,6 +44,7 @@ def ratcheting(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathP
     return next((joint, point) for joint, point in seen if joint.omega == omega)
 
 
+@pytest.mark.slow
 def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.MonkeyPatch) -> None:
     joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
     assert ratcheting_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
@@ -54,6 +55,7 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.Mon
     assert certify(joint, shaken.evaluation).holds(TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     joint, point = ratcheting(SLIDING_ON, monkeypatch)
     shaken = shake_down(joint, point, 1e-3, TOLERANCE, Effort())
@@ -67,6 +69,7 @@ def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.
     assert np.abs(middle[joint.penalty.inertial]).max() < 0.1 * moved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
 def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert started(seed).outcome is Outcome.CONVERGED
@@ -77,6 +80,7 @@ def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pyte
     assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
 
 
+@pytest.mark.slow
 def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position() -> None:
     # shaken down with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     start = started(710)

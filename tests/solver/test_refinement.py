@@ -234,6 +234,7 @@ def true_error(refined: Refined, amplitude: float, fine: Resolution) -> Estimate
     return Estimate(error, abs(work / its_work - 1.0) if its_work else 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rtol", "fine"), [(1e-2, 25), (1e-3, 115)])
 @pytest.mark.parametrize("amplitude", [100.0, 200.0, 400.0, 800.0])
 def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: float, rtol: float, fine: int) -> None:

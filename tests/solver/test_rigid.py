@@ -57,6 +57,7 @@ def reported(
     return complex(history.response[0, 0]), float(history.response_peak[0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
 @pytest.mark.parametrize(("name", "force", "omega"), CASES)
 def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(

@@ -34,6 +34,7 @@ def first_harmonic(model: str, state: PeriodicState, **values: float) -> np.ndar
     return np.abs(full_motion(scene(model, **values), state).displacement[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.6, 0.7, 0.8, 0.9, 1.1, 1.3, 1.6])
 def test_the_slider_has_the_amplitude_of_den_hartog(ratio: float) -> None:
     mass, _, stiffness, force, friction = SLIDER
@@ -42,6 +43,7 @@ def test_the_slider_has_the_amplitude_of_den_hartog(ratio: float) -> None:
     assert np.abs(moved).max() == pytest.approx(expected, rel=0.02, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [0.3, 0.4, 0.6, 0.7, 1.3])
 def test_two_masses_have_their_exact_first_harmonics(omega: float) -> None:
     orbit = coulomb_orbit(*TWO_MASSES, omega)
@@ -50,6 +52,7 @@ def test_two_masses_have_their_exact_first_harmonics(omega: float) -> None:
     assert first_harmonic("two_masses", state) == pytest.approx(expected, rel=0.02, abs=0.0)
 
 
+@pytest.mark.slow
 def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None:
     orbit = coulomb_orbit(*TWO_MASSES, 0.5)
     expected = abs(orbit.harmonic(1))
@@ -61,6 +64,7 @@ def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None
     assert np.polyfit(np.log(harmonics), np.log(errors), 1)[0] < -2.0
 
 
+@pytest.mark.slow
 def test_the_slider_converges_with_harmonics() -> None:
     exact = abs(slider_orbit(*SLIDER, 0.6 * NATURAL).harmonic(0))
     errors = [
@@ -72,6 +76,7 @@ def test_the_slider_converges_with_harmonics() -> None:
     assert errors == sorted(errors, reverse=True)
 
 
+@pytest.mark.slow
 def test_the_slider_converges_with_samples() -> None:
     def amplitude(samples: int) -> float:
         return float(first_harmonic("sdof_slider", slider_state(0.6, 21, samples), normal_stiffness=0.0)[0])
@@ -84,6 +89,7 @@ def test_the_slider_converges_with_samples() -> None:
     assert abs(amplitude(512) / limit - 1) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.6, 0.9, 1.3])
 def test_the_slider_balances_its_energy(ratio: float) -> None:
     state = slider_state(ratio, 21, 256)
@@ -112,6 +118,7 @@ def test_the_slider_balances_its_energy(ratio: float) -> None:
     assert motion.excitation_work() == pytest.approx(loop, rel=0.02, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", ["up", "down"])
 def test_a_sweep_gives_one_state_a_frequency_in_its_own_order(sweep: str) -> None:
     frequencies = np.array([0.4, 0.55, 0.7]) / (2 * np.pi)
@@ -136,6 +143,7 @@ def rising() -> dict[float, PeriodicState | None]:
     return {float(omega): start.state for omega, start in zip(omegas, starts, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.05, 1.2, 1.3, 1.4, 1.5])
 def test_a_sweep_up_stays_on_the_branch_with_impacts(rising: dict[float, PeriodicState | None], omega: float) -> None:
     state = rising[omega]
@@ -152,6 +160,7 @@ def test_a_sweep_down_stays_on_the_branch_without_impacts() -> None:
         assert first_harmonic("vibro_impact", start.state)[1] == pytest.approx(expected, rel=1e-8, abs=0.0)
 
 
+@pytest.mark.slow
 def test_a_sweep_down_falls_on_the_branch_with_impacts_where_the_other_one_ends() -> None:
     # without the wall the mass reaches it at 1.0935 rad/s
     starts = branch_states(scene("vibro_impact"), 0.0, 0.02, [1.05, 1.15], SolverSettings(9, 128), "down")
@@ -163,6 +172,7 @@ def test_a_sweep_down_falls_on_the_branch_with_impacts_where_the_other_one_ends(
     assert first_harmonic("vibro_impact", starts[0].state)[1] == pytest.approx(expected, rel=1e-6, abs=0.0)
 
 
+@pytest.mark.slow
 def test_a_single_frequency_knows_its_branch() -> None:
     # both branches exist at 1.12 rad/s; below 1.0935 there is only the one with impacts
     model = scene("vibro_impact")
@@ -173,6 +183,7 @@ def test_a_single_frequency_knows_its_branch() -> None:
     assert not from_above.contact_force_h.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.2, 1.5])
 def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: float) -> None:
     # both branches exist from 1.0919 to 1.5576 rad/s
@@ -186,6 +197,7 @@ def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: f
     assert rising.branch == falling.branch == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sweep", "omegas", "fold"), [("up", [1.5, 1.54, 1.58, 1.65], 1.5576), ("down", [1.0, 1.05, 1.12, 1.2], 1.09195)]
 )
@@ -204,6 +216,7 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep: str, omegas: li
     assert with_impacts == ([True, True, False, False] if sweep == "up" else [False, False, True, True])
 
 
+@pytest.mark.slow
 def test_a_refined_fold_does_not_depend_on_where_the_sweep_comes_from() -> None:
     folds = []
     for before in (1.50, 1.53, 1.55):
@@ -222,6 +235,7 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> Non
     assert starts[0].state is None
 
 
+@pytest.mark.slow
 def test_a_sweep_is_the_same_twice() -> None:
     model = random_model(3, ("3d", "one_tangent"))
     settings = SolverSettings(3, 64)

@@ -77,6 +77,7 @@ def last_volume(wear_coefficient: float, scheme: Scheme, step: float, cycles: Fl
     return history.outcome, float(history.worn_volume[-1]), history.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(scheme: Scheme) -> None:
     outcome, _, message = last_volume(1.1e-5, scheme, 1000.0, CYCLES)
@@ -84,12 +85,14 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(scheme: Scheme)
     assert "from cycle 0 on" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 def test_steps_that_move_all_of_the_normal_forces_are_known_not_to_be_accurate(scheme: Scheme) -> None:
     outcome, _, _ = last_volume(1.1e-7, scheme, 1000.0, CYCLES)
     assert outcome in (Outcome.SENSITIVE, Outcome.STEP_TOO_LONG)
 
 
+@pytest.mark.slow
 def test_the_step_that_is_advised_is_none_too_long() -> None:
     _, _, message = last_volume(1.1e-5, "explicit", 1000.0, CYCLES)
     advised = float(message.split("at most ")[1].split()[0])
@@ -98,6 +101,7 @@ def test_the_step_that_is_advised_is_none_too_long() -> None:
     assert outcome is Outcome.CONVERGED, message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
 def test_usual_steps_are_none_too_long(scheme: Scheme) -> None:
     outcome, volume, _ = last_volume(1.1e-11, scheme, 2000.0, np.array([0.0, 2e4]))

@@ -41,6 +41,7 @@ def slip_work(start: StartState) -> float:
     return float(np.pi * (motion[..., 2::2] * force[..., 1::2] - motion[..., 1::2] * force[..., 2::2])[..., 0].sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
 @pytest.mark.parametrize("others", [[212.0], [205.0, 211.1, 212.499, 212.501, 214.0]])
 def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: str, others: list[float]) -> None:
@@ -59,6 +60,7 @@ def test_the_three_loading_histories_leave_different_states() -> None:
     assert len({f"{work:.4e}" for work in works}) == 3
 
 
+@pytest.mark.slow
 def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     # behind the resonance, with harmonics enough: what the coarse walk misses are its steps alone
     settings = SolverSettings(harmonics=9, samples=128)
@@ -79,6 +81,7 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
     assert abs(slip_work(coarse) / slip_work(fine) - 1.0) < coarse.wear_rate_error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "same"), [(AUTOMATIC, False), (SolverSettings(5, 64), True)])
 def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings: SolverSettings, same: bool) -> None:
     line = FrequencySweep(dovetail(13), 0.5, 0.5, "up", settings)
@@ -91,6 +94,7 @@ def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings:
     assert coarse.samples <= fine.samples
 
 
+@pytest.mark.slow
 def test_a_sweep_goes_on_to_the_last_bit() -> None:
     kept: list[Packed] = []
     frequencies = np.array([211.0, 212.0, 212.25, 212.5, 212.75])
@@ -104,6 +108,7 @@ def test_a_sweep_goes_on_to_the_last_bit() -> None:
         assert np.array_equal(one.displacement_h, other.displacement_h)
 
 
+@pytest.mark.slow
 def test_progress_beyond_a_frequency_is_not_used_for_it() -> None:
     kept: list[Packed] = []
     list(follow_branch(dovetail(13), 0.5, 0.5, np.array([212.6]), "up", AUTOMATIC, keep=kept.append))
@@ -131,6 +136,7 @@ def test_all_points_of_a_cell_share_their_origin() -> None:
     assert len(origins) == 1
 
 
+@pytest.mark.slow
 def test_a_ramp_finds_a_state_at_every_frequency() -> None:
     found = starts([205.0, 212.0, 213.0], "ramp")
     assert [start.outcome for start in found.values()] == [Outcome.CONVERGED] * 3

@@ -75,6 +75,7 @@ def upper_state(case: Case, omega: float) -> PathPoint:
     return PathPoint(omega, at, state.start_history)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.56, 1.60])
 def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: float) -> None:
     # the branch with impacts ends at 1.5576 rad/s
@@ -123,6 +124,7 @@ def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
         assert after.velocity == pytest.approx(motion.velocity, abs=1e-8 * np.abs(motion.velocity).max())
 
 
+@pytest.mark.slow
 def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
     # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
     model = scene("vibro_impact", gap=1e3)
@@ -153,6 +155,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
 
 
+@pytest.mark.slow
 def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> None:
     case = build_case(scene("vibro_impact"), 0.0, 1.2, SolverSettings(5, 64))
     start, joint = upper_state(case, 1.2), case.joint(1.2, FORCE)

@@ -55,11 +55,13 @@ def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
     return case, PathPoint(omega, point.evaluation, point.history)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "amplitude"), [(3, 0.5), (7, 0.5), (20, 0.5), (20, 2.0)])
 def test_every_point_over_the_resonance_has_a_state(nodal_diameter: int, amplitude: float) -> None:
     assert [start.outcome for start in starts(nodal_diameter, amplitude)] == [Outcome.CONVERGED] * len(OFFSETS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
 def test_every_point_is_marched_to_its_end_or_keeps_what_it_had(nodal_diameter: int) -> None:
     for offset, history in zip(OFFSETS, histories(nodal_diameter, 0.5), strict=True):

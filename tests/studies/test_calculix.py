@@ -70,6 +70,7 @@ def tables(tmp_path_factory):
         pool.shutdown(cancel_futures=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "stress_stiffening"), QUADRATIC)
 def test_frequencies_within_3_percent_of_quadratic_elements(nodal_diameter, stress_stiffening, tables):
     own = glued_frequencies(Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening))
@@ -77,6 +78,7 @@ def test_frequencies_within_3_percent_of_quadratic_elements(nodal_diameter, stre
     assert np.abs(own / reference - 1.0).max() < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "stress_stiffening"), INCOMPATIBLE)
 def test_frequencies_agree_with_incompatible_elements(nodal_diameter, stress_stiffening, tables):
     own = glued_frequencies(Parameters(nodal_diameter=nodal_diameter, stress_stiffening=stress_stiffening))
@@ -86,6 +88,7 @@ def test_frequencies_agree_with_incompatible_elements(nodal_diameter, stress_sti
     assert np.abs(own / reference - 1.0).max() < 0.01
 
 
+@pytest.mark.slow
 def test_static_frictional_contact_force(tables):
     parameters = Parameters(stress_stiffening=False)
     force = solve_static_contact(build(parameters, 0), parameters.friction_coefficient).reshape(2, -1, 3).sum(axis=1)

@@ -36,14 +36,17 @@ def frequencies(linear, n_relative=N_RELATIVE):
     return np.sqrt(np.diag(linear.stiffness).real[n_relative:]) / (2.0 * np.pi)
 
 
+@pytest.mark.slow
 def test_frequencies_of_the_glued_sector_at_rest(at_rest):
     assert np.abs(frequencies(at_rest.linear[0])[:6] / AT_REST - 1.0).max() < 0.03
 
 
+@pytest.mark.slow
 def test_frequencies_of_the_glued_turning_sector(default):
     assert np.abs(frequencies(default.linear[0])[:3] / TURNING[:3] - 1.0).max() < 0.02
 
 
+@pytest.mark.slow
 def test_a_finer_mesh_changes_the_frequencies_little(at_rest):
     fine = build(Parameters(mesh=3, stress_stiffening=False), 0)
     assert fine.contact.n_contact == 2 * 12 * 4
@@ -129,6 +132,7 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
         assert np.sqrt(0.5) * (force[:, 0] + force[:, 2]).sum() == pytest.approx(pull, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_centrifugal_load_grows_with_the_square_of_speed(at_rest):
     half = build(Parameters(stress_stiffening=False, rotation_speed=1500.0), 0)
     assert np.allclose(4.0 * half.linear[0].load_static, at_rest.linear[0].load_static, rtol=1e-9)
@@ -193,6 +197,7 @@ def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     assert 0.01 < abs(tip) < 0.1
 
 
+@pytest.mark.slow
 def test_twenty_stuck_modes_are_enough(at_rest):
     many = build(Parameters(stress_stiffening=False, stuck_modes=60), 0)
     free = [

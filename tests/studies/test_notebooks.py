@@ -90,6 +90,7 @@ def written_as_warning(cells):
     return [output.text for output in outputs(cells) if output.output_type == "stream" and output.name == "stderr"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs_without_a_warning_and_draws_its_figures(path, results, tmp_path, monkeypatch):
     names = [results[name] for name in READS.get(path.stem, ["dovetail"])]
@@ -100,6 +101,7 @@ def test_notebook_runs_without_a_warning_and_draws_its_figures(path, results, tm
     assert count_figures(cells) == FIGURES[path.stem]
 
 
+@pytest.mark.slow
 def test_a_notebook_that_warns_or_fails_is_noticed(tmp_path, monkeypatch):
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("import warnings; warnings.warn('look out')")])
     nbformat.write(notebook, tmp_path / "warns.ipynb")

@@ -52,6 +52,7 @@ def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, 
         assert own.first_harmonic(np.array(friction_force)) == pytest.approx(exact, rel=1e-8, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [150.0, 160.0, 185.0, 230.0])
 def test_the_slider_wears_by_its_differential_equation(frequency):
     found = answer(frequency)
@@ -140,6 +141,7 @@ def test_the_mesh_is_the_skin_of_blade_and_disk():
         assert volume == pytest.approx(np.linalg.det(edges).sum(), rel=0.1)
 
 
+@pytest.mark.slow
 def test_frequencies_of_the_glued_sector_at_rest():
     parameters = scene_parameters("dovetail_sector")(stress_stiffening=False, n_sectors=47)
     coarse = scene_frequencies("dovetail_sector", dovetail(stress_stiffening=False))

@@ -171,6 +171,7 @@ def test_two_masses_are_those_of_the_reference() -> None:
     assert 7.2 < abs(taken_up[1]) <= 7.2 * 4 / np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.1, -0.02])
 def test_the_vibro_impact_scene_is_the_bilinear_spring(gap: float) -> None:
     model = build("vibro_impact", gap=gap)

@@ -103,6 +103,7 @@ def groups(path: Path | str) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 def test_a_result_keeps_the_friction_coefficient_of_each_pair(folder: Path) -> None:
     assert main(["sdof_slider", "--write-scene", "slider.h5"]) == 0
     Path("slider.toml").write_text(SLIDER, encoding="utf-8")
@@ -120,6 +121,7 @@ def test_a_result_keeps_the_friction_coefficient_of_each_pair(folder: Path) -> N
     xr.testing.assert_identical(again.drop_attrs(), own.drop_attrs())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wave", [(), WAVE], ids=["standing", "travelling"])
 def test_a_written_scene_gives_the_same_result(wave: tuple[str, ...], folder: Path) -> None:
     assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS, *wave)]) == 0
@@ -145,6 +147,7 @@ def test_a_written_scene_gives_the_same_result(wave: tuple[str, ...], folder: Pa
     assert groups("again.nc") == groups("elsewhere/moved.nc")
 
 
+@pytest.mark.slow
 def test_mesh_and_model_come_back_bit_by_bit(folder: Path) -> None:
     study = read_study("dovetail", (*COARSE, *WAVE))
     assert main(["dovetail", "--write-scene", "wave.h5", *options(*COARSE, *WAVE)]) == 0
@@ -168,6 +171,7 @@ def test_mesh_and_model_come_back_bit_by_bit(folder: Path) -> None:
     assert main(["out.nc", "--plan"]) == 0
 
 
+@pytest.mark.slow
 def test_a_result_of_a_bundled_scene_runs_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Also one that holds what is asked for by name, sweeps and axes of words."""
     overrides = ("axes.frequency=[160, 150]", "axes.harmonics=['auto', 3]", "outputs.variables=['default', 'exact']")
@@ -180,6 +184,7 @@ def test_a_result_of_a_bundled_scene_runs_again(folder: Path, capsys: pytest.Cap
     xr.testing.assert_identical(contents("sdof_slider.nc"), contents("renamed.nc"))
 
 
+@pytest.mark.slow
 def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = slider.read_bytes()
     capsys.readouterr()
@@ -194,6 +199,7 @@ def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.Capt
     assert slider.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_result_of_an_interrupted_run_is_enough(slider: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It opens like any other, holds its scene, and its study runs to its end."""
     from studyrunner import run
@@ -210,6 +216,7 @@ def test_a_result_of_an_interrupted_run_is_enough(slider: Path, monkeypatch: pyt
     xr.testing.assert_identical(contents("whole.nc"), contents(slider))
 
 
+@pytest.mark.slow
 def test_overrides_apply_and_another_scene_takes_the_place_of_the_kept_one(
     slider: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -231,6 +238,7 @@ def change(path: Path, work: Callable[[h5py.File], None]) -> None:
         work(file)
 
 
+@pytest.mark.slow
 def test_another_scene_or_solver_is_said_and_computed_all_the_same(
     slider: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -245,6 +253,7 @@ def test_another_scene_or_solver_is_said_and_computed_all_the_same(
     assert "fretwear" in warned[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("work", "words"),
     [

@@ -66,6 +66,7 @@ def test_all_bundled_studies_are_here():
     assert set(bundled_studies()) == set(SMALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(SMALL) - set(MAY_FAIL)))
 def test_every_point_of_a_bundled_study_converges(name, tmp_path):
     result = run_small(name, tmp_path)
@@ -73,6 +74,7 @@ def test_every_point_of_a_bundled_study_converges(name, tmp_path):
     assert np.isfinite(result.response_amplitude).all()
 
 
+@pytest.mark.slow
 def test_every_point_of_the_extremes_is_whole_or_says_why_not(tmp_path):
     result = run_small("extremes", tmp_path)
     whole = result.last_cycle == result.cycle[-1]
@@ -100,6 +102,7 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not(tmp_path):
     assert n_points == result.outcome.size
 
 
+@pytest.mark.slow
 def test_the_dovetail_wears_near_its_resonance_only(tmp_path):
     worn = run_small("dovetail", tmp_path).worn_volume.isel(cycle=-1).squeeze()
     beside, near = worn.sel(frequency=207.0), worn.sel(frequency=212.5)
@@ -107,11 +110,13 @@ def test_the_dovetail_wears_near_its_resonance_only(tmp_path):
     assert (beside < 1e-6 * near).all()
 
 
+@pytest.mark.slow
 def test_the_two_branches_of_the_vibro_impact_differ(tmp_path):
     response = run_small("vibro_impact", tmp_path).response_amplitude.squeeze()
     assert (response.sel(sweep="up") > 1.3 * response.sel(sweep="down")).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["work_precision", "work_precision_slider"])
 def test_schemes_agree_better_with_smaller_steps(name, tmp_path):
     worn = run_small(name, tmp_path).worn_volume.isel(cycle=-1).sel(harmonics=5).squeeze()

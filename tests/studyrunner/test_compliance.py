@@ -67,6 +67,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "everything.nc"
 
 
+@pytest.mark.slow
 def test_compliance_checker_passes(result: Path) -> None:
     done = subprocess.run([sys.executable, CHECK, str(result)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -116,6 +117,7 @@ def test_the_header_reads_like_documentation(result: Path) -> None:
         assert file["scene"].comment
 
 
+@pytest.mark.slow
 def test_equal_runs_have_equal_attributes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     found = []

@@ -15,6 +15,7 @@ N_DRAWN = 60
 AT_ONCE = 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n_files", "kinds"), [(N_FILES, KINDS), (N_DRAWN, {"report": 0.5, "reader": 0.5})])
 def test_fuzzed_files(n_files: int, kinds: dict[str, float], tmp_path: Path) -> None:
     write_whole_files(tmp_path)

@@ -235,6 +235,7 @@ def test_only_the_variables_asked_for(tmp_path: Path) -> None:
         assert set(dataset.data_vars) == {"wear_rate", *(name for name, entry in CONTRACT.items() if entry[0] == ())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides",
     [(), (WEAR_RATE,), ("axes.wear_coefficient=[0, 1e-11]",), SHARED, (*SHARED, LOOP), (WEAR_RATE, LOOP)],

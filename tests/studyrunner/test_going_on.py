@@ -50,6 +50,7 @@ def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
     return int((~left).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", range(1, N_RESULTS + 1))
 def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
     expected = whole(solver)
@@ -73,6 +74,7 @@ def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.Captur
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 2, 3, 6, 9])
 @pytest.mark.parametrize("where", ["flush", "_write", "add_history"])
 def test_an_interrupt_anywhere_in_the_main_thread(
@@ -137,6 +139,7 @@ def test_a_study_that_was_made_larger_holds_what_it_held_whenever_it_ends(solver
     xr.testing.assert_equal(load().sel(wear_coefficient=[5e-12, 1e-11]).worn_volume, before.worn_volume)
 
 
+@pytest.mark.slow
 def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
     expected = whole(solver)
 
@@ -166,6 +169,7 @@ def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFix
     xr.testing.assert_identical(load(), expected)
 
 
+@pytest.mark.slow
 def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> None:
     expected = whole(solver)
 
@@ -218,6 +222,7 @@ def test_a_second_run_of_the_same_study_is_refused(
     assert "another run is writing there: wait for its end, or give another result file with -o" in line
 
 
+@pytest.mark.slow
 def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = whole(solver)
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.01)
@@ -240,6 +245,7 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert not list(Path("out.nc.parts").glob("*.progress"))
 
 
+@pytest.mark.slow
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files of start states may be damaged while the progress of their branch is not."""
     expected = whole(solver)
@@ -269,6 +275,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
     xr.testing.assert_identical(load(), expected)
 
 
+@pytest.mark.slow
 def test_a_time_limit_is_one_bad_point() -> None:
     """With the solver itself: all points have their outcome, and a larger limit finishes those that failed."""
     study = [
@@ -290,6 +297,7 @@ def test_a_time_limit_is_one_bad_point() -> None:
     assert any(line.startswith(sentence) for line in load().outcome.attrs["sentences"].splitlines())
 
 
+@pytest.mark.slow
 def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself: to the numbers of a march that had the time at once."""
     from solver.newton import solve_balance as newton

@@ -103,6 +103,7 @@ def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refus
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
 def test_scene_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -120,6 +121,7 @@ def put_scene_into_result() -> None:
             pytest.skip("the library cannot copy it")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
 def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -128,6 +130,7 @@ def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
     assert not line or "result: " in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
 def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     check_result_file(folder / "result", "result")
@@ -147,12 +150,14 @@ def test_damaged_result_file_for_those_who_open_it(folder: Path) -> None:
             check_result_file(folder / "result", "result")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", TEXTS)
 def test_study_file(case: str, folder: Path, refused: Refused) -> None:
     (folder / "study").write_bytes(TEXTS[case])
     refused(["study", "--plan"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     # an attribute is no text with a null; where the scene stands in the result, its name does not matter
@@ -207,6 +212,7 @@ def test_names_of_files_do_not_reach_the_terminal_raw(
     assert "\x1b" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["inflating chunk", "bomb within the limit", "next to the largest"])
 def test_the_command_alone(case: str, folder: Path) -> None:
     """Time of the processors and memory of the whole command, its start included."""

@@ -74,6 +74,7 @@ def test_a_result_of_an_earlier_version_counts_as_finished(solver: Solver) -> No
     assert Path("out.nc").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert main(APART) == 0
     assert main(VARIANT) == 0
@@ -89,6 +90,7 @@ def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert len(solver.tasks) > N_POINTS
 
 
+@pytest.mark.slow
 def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
     assert main(APART) == 0
     assert main([*VARIANT, "--fresh"]) == 0

@@ -186,6 +186,7 @@ def kernel(folder: Path) -> Callable[[], str]:
     return call
 
 
+@pytest.mark.slow
 def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], folder: Path) -> None:
     assert kernel() == "6.0 0"
     assert kernel() == "6.0 1"
@@ -196,6 +197,7 @@ def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], fol
         assert kernel() == "6.0 1"
 
 
+@pytest.mark.slow
 def test_kernels_without_a_place_for_their_cache_are_compiled_all_the_same(
     kernel: Callable[[], str], folder: Path
 ) -> None:

@@ -71,6 +71,7 @@ class Disk:
         return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names_of_now", [False, True])
 def test_nothing_that_was_said_to_be_there_is_lost(
     names_of_now: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -132,6 +132,7 @@ def build_slow(model: object, friction_coefficient: float) -> Callable[..., Iter
     return evaluate
 
 
+@pytest.mark.slow
 def test_the_run_itself_says_how_far_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -132,6 +132,7 @@ def test_the_friction_coefficient_is_given_once(rough_file: str, capsys: pytest.
     assert "missing: give it, or contact/friction_coefficient in the scene file" in line
 
 
+@pytest.mark.slow
 def test_a_written_scene_with_automatic_harmonics_is_the_same_scene(tmp_path: Path) -> None:
     model = build_study_scene(read_study("dovetail", WAVE))
     write_scene(model, tmp_path / "wave.h5")

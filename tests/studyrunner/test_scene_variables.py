@@ -28,6 +28,7 @@ GRID = (*SLIDER, EXACT, "axes.wear_coefficient=[1e-11, 0]", "axes.step=[10, 100]
 COARSE = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.scheme=implicit")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bytes_a_slab", [1.0, 3000.0, 1e9], ids=["a point", "some points", "all"])
 def test_the_file_is_the_one_of_the_plain_twin(
     bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -90,6 +91,7 @@ def test_the_computed_slider_is_near_its_exact_answer(tmp_path: Path, monkeypatc
         assert result.exact_worn_volume.attrs["coverage_content_type"] == "referenceInformation"
 
 
+@pytest.mark.slow
 def test_mesh_and_natural_frequencies_of_the_sector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     values = np.arange(24 * 6.0).reshape(24, 6)

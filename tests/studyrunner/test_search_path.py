@@ -69,6 +69,7 @@ def assert_nothing_taken(folder: Path, done: subprocess.CompletedProcess[str]) -
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_process_that_reads(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # as in a notebook, or a script, that stands in the folder
     monkeypatch.chdir(hostile)
@@ -85,15 +86,18 @@ MODULE = [sys.executable, "-m", "studyrunner.cli"]
 REPORT = [sys.executable, "-m", "studyrunner.report.cli"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["study.toml", "--plan"], ["study.toml"], ["result.nc", "-o", "again.nc"]])
 def test_run_study(arguments: list[str], hostile: Path) -> None:
     assert_nothing_taken(hostile, run([*MODULE, *arguments], hostile, str(ROOT)))
 
 
+@pytest.mark.slow
 def test_study_report(hostile: Path) -> None:
     assert_nothing_taken(hostile, run([*REPORT, "result.nc"], hostile, str(ROOT)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("python_path", [f":{ROOT}", f".:{ROOT}", f"{ROOT}:"])
 @pytest.mark.parametrize("module", ["studyrunner.cli", "studyrunner.report.cli"])
 def test_commands_as_they_are_installed(module: str, python_path: str, hostile: Path, tmp_path: Path) -> None:
@@ -104,18 +108,21 @@ def test_commands_as_they_are_installed(module: str, python_path: str, hostile: 
     assert_nothing_taken(hostile, run([sys.executable, str(script), *arguments], hostile, python_path))
 
 
+@pytest.mark.slow
 def test_under_mpiexec(hostile: Path) -> None:
     done = run([*launcher(2), *MODULE, "study.toml", "-o", "out.nc"], hostile, str(ROOT))
     assert_nothing_taken(hostile, done)
     assert (hostile / "out.nc").exists()
 
 
+@pytest.mark.slow
 def test_a_cache_of_compiled_code_is_no_data_either(hostile: Path) -> None:
     (hostile / ".numba_config.yaml").write_text(f"cache_dir: {hostile / 'cache'}\n", encoding="utf-8")
     assert_nothing_taken(hostile, run([*MODULE, "study.toml"], hostile, str(ROOT)))
     assert not (hostile / "cache").exists()
 
 
+@pytest.mark.slow
 def test_the_style_of_figures_is_the_reports_own(hostile: Path) -> None:
     (hostile / "matplotlibrc").write_text(
         "text.usetex: True\nfont.size: 40\nbackend: module://numpy\n", encoding="utf-8"

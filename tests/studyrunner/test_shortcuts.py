@@ -57,6 +57,7 @@ def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
 COMPARED = [name for name in (*ASKED, *KEPT) if name not in EFFORT]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMPARED)
 def test_steps_of_given_length(name: str, results: tuple[xr.Dataset, xr.Dataset]) -> None:
     short, long = (result.sel(scheme=FIXED) for result in results)
@@ -75,6 +76,7 @@ def test_adaptive_steps_whatever_the_step_axis_says(name: str, results: tuple[xr
     assert_same(name, short, long)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overrides", [BY_DEPTH, NO_CYCLES], ids=["largest depth", "no cycles"])
 def test_other_reasons(overrides: list[str], tmp_path: Path) -> None:
     short, long = both_ways(tmp_path, *overrides, "axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")

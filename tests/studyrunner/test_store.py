@@ -278,6 +278,7 @@ def test_what_is_damaged_is_forgotten_with_a_line_and_nothing_else(pattern: str,
     store.close()
 
 
+@pytest.mark.slow
 def test_any_bit_of_a_file_matters(folder: Path) -> None:
     """Of all bits of each sort of file: none makes anything but what was there before, or nothing."""
     store = Store(folder, KIND)
@@ -476,6 +477,7 @@ def test_files_that_were_not_finished_are_removed(folder: Path) -> None:
     assert len(store.histories) == 4
 
 
+@pytest.mark.slow
 def test_files_are_put_together_while_more_come(folder: Path) -> None:
     """As many as there may be of each size are all that there are, and the last of several records counts."""
     store = Store(folder, KIND)

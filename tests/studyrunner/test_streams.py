@@ -39,6 +39,7 @@ def faked(arguments: str, where: str) -> str:
     return f"{sys.executable} {ROOT / 'tests' / 'mpi' / 'run_faked.py'} {arguments} {where}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", DEAF)
 def test_a_run_that_nobody_hears(case: str, tmp_path: Path) -> None:
     status, _, _ = shell(faked(STUDY, DEAF[case]), tmp_path)
@@ -46,6 +47,7 @@ def test_a_run_that_nobody_hears(case: str, tmp_path: Path) -> None:
     assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["full log of everything", "closed"])
 def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
     command = shlex.join([*launcher(2), "bash", "-c", faked(STUDY, DEAF[case])])
@@ -72,6 +74,7 @@ def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
     assert len(printed.splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["full log of everything", "closed", "a reader that has gone"])
 def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
     assert shell(faked(STUDY, ""), tmp_path)[0] == 0

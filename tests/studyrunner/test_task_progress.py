@@ -91,12 +91,14 @@ def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks: int) -> None:
         assert found.makespan == pytest.approx(shortest)
 
 
+@pytest.mark.slow
 def test_a_thousand_ranks_are_busy_with_ten_thousand_uneven_points() -> None:
     found = replay_shape(SHAPES["steps"], 1024, Overheads())
     assert found.n_unfinished == 0
     assert found.efficiency >= 0.95
 
 
+@pytest.mark.slow
 def test_costs_with_a_long_tail_keep_256_ranks_busy() -> None:
     """Some marches take a hundred times as long as most, which shows only while they run."""
     assert replay_shape(SHAPES["usual"], 256, Overheads()).efficiency >= 0.93

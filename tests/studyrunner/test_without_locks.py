@@ -52,6 +52,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("locks", [no_locks, locks_of_two_hosts])
 def test_two_stores_in_a_folder_share_no_file(
     locks: Callable[[pytest.MonkeyPatch], None], folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -109,6 +110,7 @@ def test_a_run_says_once_that_there_are_no_locks(
     assert lines[0].endswith("so nothing keeps a second run out: give each run a result file of its own with -o")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("locks", [no_locks, locks_of_two_hosts])
 @pytest.mark.parametrize("at", [1, 2, 4, 6])
 def test_two_studies_with_one_result_file_do_not_mix(
@@ -140,6 +142,7 @@ def test_two_studies_with_one_result_file_do_not_mix(
         xr.testing.assert_identical(result.load().drop_vars("run_time"), expected["first.nc"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["another record", "missing", "shorter", "another kind"])
 def test_a_record_that_is_not_the_one_asked_for_is_no_result(
     change: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -18,7 +18,11 @@ from tests.studyrunner.report.page_cases import AXES, SENTENCES, as_result, buil
 
 CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
 
-pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver")
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
+]
 
 EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
 FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ per kcycle": 1e12, "kPa": 1e-3, "Pa": 1.0}

@@ -127,6 +127,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", REFUSED)
 def test_refused_in_a_sentence(
     case: str, folder: Path, capsys: pytest.CaptureFixture[str], reader: ReadingProcess
@@ -147,6 +148,7 @@ def test_refused_in_a_sentence(
         check_numbers(open_for_report("out.nc").dataset, "out.nc")
 
 
+@pytest.mark.slow
 def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of responses and surfaces, in figures, in the page, and where the picture is text as well."""
     monkeypatch.chdir(tmp_path)
@@ -176,6 +178,7 @@ def test_choices_are_numbers_or_auto(
     assert capsys.readouterr().err.startswith("study-report: out.nc: harmonics = texts in place of numbers")
 
 
+@pytest.mark.slow
 def test_long_names_are_cut(folder: Path) -> None:
     with h5py.File("out.nc", "r+") as file:
         file["response"][0] = "x" * 1_000_000
@@ -195,6 +198,7 @@ def test_what_is_not_known_stays_outside(folder: Path) -> None:
         assert "worn_volume" in result.dataset.variables
 
 
+@pytest.mark.slow
 def test_the_name_of_the_file_is_text(folder: Path) -> None:
     name = "\x1b[2J<b>.nc"
     (folder / "out.nc").rename(name)

@@ -100,6 +100,7 @@ LAID_OUT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_no_figure_is_empty_and_all_axes_have_units(case: str) -> None:
     items = list(draw_report(CASES[case]()))
@@ -189,6 +190,7 @@ def test_all_points_failed() -> None:
     assert table.rows == (("3", "branch lost", "8", "The branch was lost.", "200 Hz, implicit scheme"),)
 
 
+@pytest.mark.slow
 def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
     before = dict(mpl.rcParams)
     for item in draw_report(_complete()):
@@ -231,6 +233,7 @@ def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
         assert dataset["worn_volume"].variable._in_memory
 
 
+@pytest.mark.slow
 def test_neither_pyplot_nor_the_solver_is_imported() -> None:
     code = (
         "import sys, studyrunner.report.gallery;"

@@ -182,6 +182,7 @@ def test_the_style_sheet_of_an_svg_does_not_reach_the_page(tmp_path: Path) -> No
     assert element.get("aria-label") == "a < b"
 
 
+@pytest.mark.slow
 def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = as_result(build_file(), tmp_path / "some.nc")
     items = [drawing("light"), drawing("heavy", n_points=20_000)]

@@ -28,6 +28,7 @@ def items_of(precision: Precision) -> dict[str, Drawing | Missing | Table]:
     return dict(zip(names, items, strict=True))
 
 
+@pytest.mark.slow
 def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
     precision = precision_of(finest_file(estimate=lambda _: 1e-4))
     items = items_of(precision)
@@ -78,6 +79,7 @@ def test_failed_points_are_told_and_listed() -> None:
     assert sum("march failed" in row[-1] for row in table.rows) == len(STEPS) * len(HARMONICS)
 
 
+@pytest.mark.slow
 def test_exact_answer_and_shared_times_are_told() -> None:
     axes = {"step": STEPS, "scheme": ["implicit", "explicit"], "wear_coefficient": [1e-11, 1e-10]}
     result = synthetic(axes, lambda point: 1e-4 * float(point["step"]), lambda _: 1.0, exact=True)

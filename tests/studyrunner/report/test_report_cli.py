@@ -30,6 +30,7 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["results/worn.x.nc"]) == WRITTEN
     said = capsys.readouterr()
@@ -40,6 +41,7 @@ def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: p
     assert said.err == ""
 
 
+@pytest.mark.slow
 def test_a_folder_can_be_named(short: Path) -> None:
     assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
     assert [path.name for path in (short / "a" / "b").iterdir()] == ["index.html"]
@@ -47,11 +49,13 @@ def test_a_folder_can_be_named(short: Path) -> None:
     assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
 
 
+@pytest.mark.slow
 def test_failed_points_are_no_failure_of_the_report(short: Path) -> None:
     build_file(failed=range(16)).to_netcdf(short / "failed.nc")
     assert main(["failed.nc"]) == WRITTEN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
@@ -88,6 +92,7 @@ def test_an_unexpected_failure_has_a_traceback(
     assert "ZeroDivisionError: broken" in said
 
 
+@pytest.mark.slow
 def test_an_interrupt_is_one_line(
     short: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

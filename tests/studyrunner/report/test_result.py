@@ -14,6 +14,7 @@ from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result, with_variables
 
 
+@pytest.mark.slow
 def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     path = tmp_path / "made.nc"
     made = make_result()
@@ -27,6 +28,7 @@ def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     result.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [
