@@ -148,10 +148,13 @@ def test_friction_and_wear_only_take(seed: int) -> None:
     work, damping = (
         series_work(force, moved) for force in (joint.to_relative(at.force_h), joint.structure.apply(moved))
     )
-    # few harmonics leave a pair that comes and goes without slip wrong by a little of what flows: in 4 of 400 scenes,
-    # at most 0.7 % (seed 182)
     least = ACCURACY.energy_limit * float(at.slip_work.sum()) + ACCURACY.noticed_loss_factor * elastic_work(joint, at)
-    assert work >= -max(least, 0.01 * abs(damping))
+    opens = at.status_t == 0
+    if (opens.any(axis=1) & ~opens.all(axis=1)).any():
+        # few harmonics leave a pair that comes and goes wrong by a little of what flows: beyond the bound of all others
+        # in 4 of 400 scenes, by at most 0.7 % (seed 182)
+        least = max(least, 0.01 * abs(damping))
+    assert work >= -least
     # stuck pairs wear exactly nothing
     stuck = (at.status_t == 1).all(axis=1)
     assert not at.slip_work[stuck].any()
