@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from studyrunner.system.endings import uninterrupted
+
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
@@ -15,14 +17,15 @@ Done = TypeVar("Done")
 class Writer(Generic[Job, Done]):
     """Does jobs one after the other on a thread of its own. All methods are for one other thread.
 
-    An interrupt between any two of their steps loses neither a job nor what came of it.
+    An interrupt between any two steps of `take` loses neither a job nor what came of it.
     """
 
     def __init__(self, do: Callable[[Job], Done]) -> None:
         self._do = do
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._ended: deque[tuple[Job, Done | BaseException]] = deque()
-        self._something_ended = threading.Event()
+        # A lock written in Python, as that of an Event, may stay taken where its owner is interrupted.
+        self._news: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._n_begun = self._n_taken = 0
         # A daemon: a process that ends in disorder does not wait for a disk that hangs.
         self._thread = threading.Thread(target=self._work, name="writer", daemon=True)
@@ -35,8 +38,9 @@ class Writer(Generic[Job, Done]):
 
     def begin(self, job: Job) -> None:
         """Hands over a job."""
-        self._jobs.put(job)
-        self._n_begun += 1
+        with uninterrupted():
+            self._jobs.put(job)
+            self._n_begun += 1
 
     def take(self, accept: Callable[[Job, Done], None], refuse: Callable[[Job], None], *, wait: bool = False) -> None:
         """Takes note of the jobs that have ended. Raises what a job raised.
@@ -51,7 +55,6 @@ class Writer(Generic[Job, Done]):
             Whether to wait until there is nothing more to take note of.
         """
         while True:
-            self._something_ended.clear()
             while self._ended:
                 job, done = self._ended[0]
                 if isinstance(done, BaseException):
@@ -64,7 +67,8 @@ class Writer(Generic[Job, Done]):
                     raise done
             if not wait or not self.busy:
                 return
-            self._something_ended.wait()
+            # of jobs that were taken note of before it came, in part
+            self._news.get()
 
     def close(self) -> None:
         """Ends the thread, after the jobs that it has."""
@@ -78,4 +82,4 @@ class Writer(Generic[Job, Done]):
             except BaseException as error:  # handed to the other thread, which raises it
                 done = error
             self._ended.append((job, done))
-            self._something_ended.set()
+            self._news.put(None)

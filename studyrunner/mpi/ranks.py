@@ -18,6 +18,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn, Protocol
 
 from studyrunner.mpi.launcher import LauncherError, has_launcher, launcher_rank, launcher_size, load_packaged_library
+from studyrunner.system.endings import uninterrupted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -134,7 +135,9 @@ class MpiRanks:
             # Not at every message: with thousands of ranks as many may be on their way.
             self._forget_sent()
             self._many = max(_MANY_SENT, 2 * len(self._sent))
-        self._sent.append(self._world.isend(message, dest=rank))
+        with uninterrupted():
+            # the request holds the memory that the message is sent from
+            self._sent.append(self._world.isend(message, dest=rank))
 
     def flush(self) -> None:
         """As in Ranks."""
@@ -145,10 +148,11 @@ class MpiRanks:
 
     def receive(self) -> tuple[int, object] | None:
         """As in Ranks."""
-        status = self._mpi.Status()
-        # The matched probe takes the message out at once: a receive after it gets this one and no other.
-        matched = self._world.improbe(status=status)
-        return None if matched is None else (status.Get_source(), matched.recv())
+        with uninterrupted():
+            status = self._mpi.Status()
+            # The matched probe takes the message out at once: a receive after it gets this one and no other.
+            matched = self._world.improbe(status=status)
+            return None if matched is None else (status.Get_source(), matched.recv())
 
     def close(self) -> None:
         """As in Ranks."""

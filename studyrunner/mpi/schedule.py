@@ -18,7 +18,7 @@ from typing import Generic, TypeVar
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
 from studyrunner.plan.costs import LearnedCosts
-from studyrunner.system.endings import ignore_endings
+from studyrunner.system.endings import ignore_endings, uninterrupted
 
 SECONDS_TO_PROGRESS = 5.0
 """A task says how far it is at most so often, with many ranks less often."""
@@ -227,27 +227,32 @@ def serve_tasks(
         dispatcher.add(take(task, message.result))
         hand_out()
 
-    try:
-        do_without_the_lost()
-        hand_out()
-        while not dispatcher.done:
-            if ranks.lost != lost:
-                do_without_the_lost()
-                hand_out()
-            quiet = False
-            for _ in range(_LOOKS_A_TICK):
-                received, message = ranks.receive(), local.receive(0.0)
-                if received is not None:
-                    accept(*received)
-                if message is not None:
-                    accept(0, message)
-                quiet = received is None and message is None
-                if quiet:
-                    break
-            dispatcher.watch()
-            tick(dispatcher.running)
-            if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
+    def look() -> None:
+        if ranks.lost != lost:
+            do_without_the_lost()
+            hand_out()
+        quiet = False
+        for _ in range(_LOOKS_A_TICK):
+            received, message = ranks.receive(), local.receive(0.0)
+            if received is not None:
+                accept(*received)
+            if message is not None:
                 accept(0, message)
+            quiet = received is None and message is None
+            if quiet:
+                break
+        dispatcher.watch()
+        tick(dispatcher.running)
+        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
+            accept(0, message)
+
+    try:
+        with uninterrupted():
+            do_without_the_lost()
+            hand_out()
+        while not dispatcher.done:
+            with uninterrupted():
+                look()
     except BaseException:
         local.give_up()
         raise

@@ -1,0 +1,111 @@
+"""Signals that end a run come between any two instructions of the main thread, and leave nothing half done."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from studyrunner.system.endings import take_endings, uninterrupted
+
+ROOT = Path(__file__).parents[2]
+
+WRITER = """
+import signal
+from studyrunner.checkpoint.writer import Writer
+
+class Disturbed(Exception): pass
+def disturb(*_): raise Disturbed
+
+writer = Writer(lambda job: job)
+signal.signal(signal.SIGALRM, disturb)
+for number in range(20_000):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 1e-5 + 1e-7 * (number % 1000))
+        # the loop of rank 0 looks without waiting, which is most of what it does
+        while True:
+            writer.take(lambda *_: None, lambda _: None)
+            if not writer.busy:
+                writer.begin(number)
+    except Disturbed:
+        pass
+writer.take(lambda *_: None, lambda _: None, wait=True)
+writer.close()
+print("closed")
+"""
+
+
+@pytest.fixture(autouse=True)
+def _as_before() -> Iterator[None]:
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+    handlers = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def end() -> Callable[[], None]:
+    """Sends this process what ends a run."""
+    signal.signal(signal.SIGUSR1, signal.SIG_DFL)
+    take_endings()
+
+    def send() -> None:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        time.sleep(0.0)
+
+    return send
+
+
+def test_an_ending_is_raised_once(end: Callable[[], None]) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        end()
+    end()
+
+
+def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[], None]) -> None:
+    done = []
+
+    def work() -> None:
+        with uninterrupted():
+            with uninterrupted():
+                end()
+                done.append("inner")
+            end()
+            done.append("outer")
+        done.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["inner", "outer"]
+    with uninterrupted():
+        # it was raised: what comes now is not disturbed by it
+        end()
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_an_ending_is_not_lost_where_something_else_is_raised(
+    end: Callable[[], None], error: type[BaseException]
+) -> None:
+    def work() -> None:
+        with uninterrupted():
+            end()
+            raise error
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    with uninterrupted():
+        pass
+
+
+def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", WRITER], cwd=ROOT, capture_output=True, text=True, timeout=200.0, check=False
+    )
+    assert ended.stdout == "closed\n", ended.stderr
