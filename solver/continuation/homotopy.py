@@ -34,6 +34,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
+from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
 
 
@@ -181,6 +182,6 @@ class HarmonicHomotopy:
         if parameter < 1.0:
             mixed = structure.dynamic_stiffness.astype(complex)
             mixed[self.new] = np.linalg.inv((1.0 - parameter) * self.penalty_compliance + parameter * self.compliance)
-            structure = replace(structure, dynamic_stiffness=mixed)
+            structure = replace(structure, moving=DenseStiffness(mixed))
         joint = replace(self.joint, structure=structure)
         return Balance.frozen(joint, self.history, self.wear_depth)

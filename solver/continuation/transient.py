@@ -35,6 +35,7 @@ from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
 from solver.structure.fourier import from_complex, to_complex
+from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
 
 
@@ -103,7 +104,7 @@ class Transient:
         plain = self.joint.structure
         kept: dict[str, Any] = {field.name: getattr(plain, field.name) for field in fields(plain)}
         kept["static_stiffness"] = np.real(stiffness[0])
-        kept["dynamic_stiffness"] = stiffness[1:]
+        kept["moving"] = DenseStiffness(stiffness[1:])
         load_h = from_complex(np.real(force[0]), force[1:].T)
         return replace(self.joint, structure=_LoadedStructure(**kept, load_h=load_h))
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
+from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, share_matrices
+from solver.structure.options import STRUCTURE
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class CondensedStructure:
 
     `n_rel` relative displacements, in the order pair by pair: closing, tangent 1, tangent 2, those that exist.
 
-    static_stiffness (n_rel, n_rel): N/m. dynamic_stiffness (H, n_rel, n_rel) complex: the harmonics above it, N/m.
+    static_stiffness (n_rel, n_rel): N/m. moving: the stiffness at the H harmonics above it.
     static_force (n_rel,): N. harmonic_force (n_rel,) complex: N, harmonic 1, for the actual excitation amplitude.
     static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
     static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
@@ -27,7 +29,7 @@ class CondensedStructure:
     """
 
     static_stiffness: FloatArray
-    dynamic_stiffness: ComplexArray
+    moving: HarmonicStiffness
     static_force: FloatArray
     harmonic_force: ComplexArray
     static_response: FloatArray
@@ -37,17 +39,26 @@ class CondensedStructure:
     drive: ComplexArray
     drive_offset: complex
 
+    @property
+    def dynamic_stiffness(self) -> ComplexArray:
+        """Stiffness (H, n_rel, n_rel), N/m, at the harmonics above the static one."""
+        return self.moving.dense
+
+    @property
+    def n_harmonics(self) -> int:
+        """Number H of harmonics above the static one."""
+        return len(self.dynamic_response)
+
     def force_h(self) -> FloatArray:
         """Reduced force F_r of Eq. (8), (n_rel, 2H+1), N."""
-        amplitudes = np.zeros((self.static_force.size, self.dynamic_stiffness.shape[0]), complex)
+        amplitudes = np.zeros((self.static_force.size, self.n_harmonics), complex)
         if amplitudes.shape[1]:
             amplitudes[:, 0] = self.harmonic_force
         return from_complex(self.static_force, amplitudes)
 
     def apply(self, displacement_h: FloatArray) -> FloatArray:
         """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
-        moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
-        force = np.matmul(self.dynamic_stiffness, moving)[:, :, 0].T
+        force = self.moving.apply(displacement_h)
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
 
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
@@ -60,7 +71,7 @@ class CondensedStructure:
 
     def input_work(self, displacement_h: FloatArray) -> float:
         """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
-        if not self.dynamic_stiffness.shape[0]:
+        if not self.n_harmonics:
             return 0.0
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
@@ -95,7 +106,38 @@ def build_structure(
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
     static = condense(np.real(still.stiffness), relative, still.load_static)
-    n_response = still.response.shape[0]
+    first = model.harmonic_structure(1)[0] if orders else still
+    n_bytes = 16 * len(orders) * relative.size**2
+    if n_bytes > STRUCTURE.dense_bytes and first is still and _is_real(still) and not model.nodal_diameter:
+        moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
+    else:
+        moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
+    return CondensedStructure(
+        static_stiffness=np.real(static.stiffness),
+        static_force=np.real(static.force),
+        static_response=np.real(still.response @ static.motion),
+        static_offset=np.real(still.response @ static.held_motion),
+        **vars(moving),
+    )
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """What a `CondensedStructure` has of the harmonics above the static one."""
+
+    moving: HarmonicStiffness
+    harmonic_force: ComplexArray
+    dynamic_response: ComplexArray
+    harmonic_offset: ComplexArray
+    drive: ComplexArray
+    drive_offset: complex
+
+
+def _condense_each(
+    model: ReducedModel, relative: IntArray, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
+) -> _Moving:
+    """A matrix for each harmonic; arguments as in `build_structure`."""
+    n_response = model.linear[0].response.shape[0]
     stiffness = np.empty((len(orders), relative.size, relative.size), complex)
     response = np.empty((len(orders), n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
@@ -116,18 +158,42 @@ def build_structure(
             force, offset = moving.force[0], rows @ moving.held_motion[0]
             load = excitation_amplitude * shape.conj()
             drive, drive_offset = load @ moving.motion[0], complex(load @ moving.held_motion[0])
-    return CondensedStructure(
-        static_stiffness=np.real(static.stiffness),
-        dynamic_stiffness=stiffness,
-        static_force=np.real(static.force),
-        harmonic_force=force,
-        static_response=np.real(still.response @ static.motion),
-        dynamic_response=response,
-        static_offset=np.real(still.response @ static.held_motion),
-        harmonic_offset=offset,
-        drive=drive,
-        drive_offset=drive_offset,
+    return _Moving(DenseStiffness(stiffness), force, response, offset, drive, drive_offset)
+
+
+def _condense_shared(
+    linear: LinearModel, relative: IntArray, rates: FloatArray, excitation_amplitude: float
+) -> _Moving:
+    """The matrices of a real structure once, for harmonics n = 1, ... at the rates n w (H,), rad/s."""
+    n = linear.mass.shape[0]
+    internal = np.setdiff1d(np.arange(n), relative)
+    rate = rates[:, None, None]
+
+    def block(rows: IntArray, columns: IntArray) -> ComplexArray:
+        stiffness, damping, mass = (
+            part[rows[:, None], columns] for part in (linear.stiffness, linear.damping, linear.mass)
+        )
+        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
+
+    compliance = cast("ComplexArray", np.linalg.inv(block(internal, internal)))
+    coupling = block(internal, relative)
+    load, rows = excitation_amplitude * linear.load_harmonic, linear.response
+    # displacements behind the joint under a unit load on them, seen by the responses and by the excitation
+    seen = rows[:, internal] @ compliance
+    by_load = load[internal].conj() @ compliance[0]
+    held = compliance[0] @ load[internal]
+    return _Moving(
+        moving=share_matrices(linear, relative, internal, rates, compliance),
+        harmonic_force=load[relative] - block(relative, internal)[0] @ held,
+        dynamic_response=rows[:, relative] - seen @ coupling,
+        harmonic_offset=rows[:, internal] @ held,
+        drive=load[relative].conj() - by_load @ coupling[0],
+        drive_offset=complex(load[internal].conj() @ held),
     )
+
+
+def _is_real(linear: LinearModel) -> bool:
+    return not any(np.iscomplexobj(part) for part in (linear.mass, linear.damping, linear.stiffness, linear.response))
 
 
 def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -11,6 +11,8 @@ from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, 
 from solver.settings import Resolution, SolverSettings, first_resolution
 from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis, from_complex, to_complex
+from solver.structure.harmonic_stiffness import DenseStiffness
+from solver.structure.options import STRUCTURE
 from solver.structure.penalty import Penalty, build_penalty, static_penalty
 
 
@@ -125,6 +127,9 @@ class Case:
     penalty: Penalty
     settings: SolverSettings
     resolution: Resolution
+    _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def joint(self, omega: float, excitation_amplitude: float) -> Joint:
         """Joint at the angular frequency omega (rad/s) and excitation amplitude (N).
@@ -139,7 +144,7 @@ class Case:
             omega=omega,
             excitation_amplitude=excitation_amplitude,
             friction_coefficient=self.friction_coefficient,
-            structure=build_structure(self.model, omega, excitation_amplitude, self.resolution.orders),
+            structure=self._structure(omega, excitation_amplitude),
             contact=self.model.contact,
             basis=build_basis(self.resolution.orders, self.resolution.samples),
             component_index=component_index,
@@ -147,6 +152,17 @@ class Case:
             has_normal=self.model.contact.dofs[:, 0] >= 0,
             line=np.where(one, np.argmax(tangents, axis=1), -1),
         )
+
+    def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
+        """One of the last that were asked for: a march has two at one frequency, in turns."""
+        key = omega, excitation_amplitude, self.resolution.orders
+        found = self._structures.get(key)
+        if found is None:
+            found = build_structure(self.model, *key)
+            while len(self._structures) >= STRUCTURE.kept_structures:
+                del self._structures[next(iter(self._structures))]
+            self._structures[key] = found
+        return found
 
     def at(self, resolution: Resolution) -> Case:
         """The same case with other harmonics and samples."""
@@ -206,7 +222,7 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
     structure = joint.structure
     held = replace(
         structure,
-        dynamic_stiffness=structure.dynamic_stiffness[:0],
+        moving=DenseStiffness(np.empty((0, *structure.static_stiffness.shape), complex)),
         dynamic_response=structure.dynamic_response[:0],
         static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,

@@ -1,4 +1,4 @@
-"""Tuning constants of the penalty."""
+"""Tuning constants of the condensed structure and of the penalty."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ class StructureOptions:
     Results at a finite number of harmonics depend on them, in the limit of many they do not.
     """
 
+    dense_bytes: float = 2e6
+    """Matrices of all harmonics up to which a product with each of them is fastest: more do not stay in the cache. Does
+    not change results."""
+    kept_structures: int = 4
+    """Condensed structures that are kept for the next one who asks: harmonics of a march, of its companion and of the
+    errors of pairs. Does not change results."""
     inertial_ratio: float = 2.0
     """Stiffness at twice the rate over that at the rate, above which a pair is inertial: 1 for a spring, 4 for a mass.
     With 4 no pair is, and the two masses move by 20 % otherwise with five harmonics."""

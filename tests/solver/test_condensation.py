@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.structure import condensation
 from solver.structure.condensation import build_structure, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
-from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model
+from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
+from solver.structure.options import STRUCTURE
+from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 HARMONICS = 3
@@ -228,3 +233,33 @@ def test_a_structure_that_nothing_holds_is_singular() -> None:
     )
     with pytest.raises(np.linalg.LinAlgError):
         build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, (1,))
+
+
+def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = scene("dovetail_sector", 5, mesh=1)
+    orders = (1, 2, 3, 5)
+    each = build_structure(model, OMEGA, AMPLITUDE, orders)
+    monkeypatch.setattr(condensation, "STRUCTURE", replace(STRUCTURE, dense_bytes=0.0))
+    shared = build_structure(model, OMEGA, AMPLITUDE, orders)
+    assert isinstance(each.moving, DenseStiffness)
+    assert isinstance(shared.moving, SharedStiffness)
+    names = [field.name for field in fields(each) if field.name != "moving"]
+    for name in (*names, "dynamic_stiffness"):
+        ours, theirs = (np.asarray(getattr(structure, name)) for structure in (shared, each))
+        assert ours.shape == theirs.shape
+        assert ours.dtype == theirs.dtype
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-14 * np.abs(theirs).max(), err_msg=name)
+    displacement_h = np.random.default_rng(0).normal(size=(each.static_force.size, 9))
+    expected = each.apply(displacement_h)
+    np.testing.assert_allclose(shared.apply(displacement_h), expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
+    # nothing behind the joint
+    bare = replace(model, linear={0: only_pairs(model.linear[0], model.contact.n_contact)})
+    assert build_structure(bare, OMEGA, AMPLITUDE, orders).apply(displacement_h).shape == expected.shape
+
+
+def only_pairs(linear: LinearModel, n_contact: int) -> LinearModel:
+    """A structure without displacements other than those of the pairs."""
+    n = 3 * n_contact
+    square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}
+    loads = {name: getattr(linear, name)[:n] for name in ("load_static", "load_harmonic")}
+    return replace(linear, **square, **loads, response=linear.response[:, :n])

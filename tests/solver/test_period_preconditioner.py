@@ -25,6 +25,7 @@ from solver.newton.period_preconditioner import (
 from solver.newton.preconditioner import HarmonicFactor, build_factor, build_harmonic_factor
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
+from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint, build_case
 from tests.solver.models import OMEGA, dovetail, random_balance, random_model, with_free_masses
 
@@ -158,7 +159,7 @@ def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_st
     stiffness = np.real(structure.dynamic_stiffness[2])
     same = np.broadcast_to(stiffness.astype(complex), structure.dynamic_stiffness.shape)
     joint = replace(
-        balance.joint, structure=replace(structure, static_stiffness=stiffness, dynamic_stiffness=np.array(same))
+        balance.joint, structure=replace(structure, static_stiffness=stiffness, moving=DenseStiffness(np.array(same)))
     )
     balance = replace(balance, joint=joint)
     assert np.array_equal(stiffness_of_most(joint), stiffness)

@@ -1,0 +1,100 @@
+"""The condensed dynamic stiffness Z_r of Eq. (8) at all harmonics: how it is kept, and its product with a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, cast
+
+import numpy as np
+
+from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
+from solver.structure.fourier import to_complex
+
+
+class HarmonicStiffness(Protocol):
+    """Z_r at H harmonics above the static one."""
+
+    @property
+    def dense(self) -> ComplexArray:
+        """Matrices (H, n_rel, n_rel), N/m."""
+
+    def apply(self, displacement_h: FloatArray) -> ComplexArray:
+        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
+
+
+@dataclass(frozen=True)
+class DenseStiffness:
+    """A matrix for each harmonic: of any structure. dense (H, n_rel, n_rel): N/m."""
+
+    dense: ComplexArray
+
+    def apply(self, displacement_h: FloatArray) -> ComplexArray:
+        """As in HarmonicStiffness."""
+        moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
+        return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
+
+
+@dataclass(frozen=True)
+class SharedStiffness:
+    """Real matrices K, M and C that all harmonics share, and the displacements behind the joint at each of them.
+
+    With A = K + i n w C - (n w)^2 M and the displacements split into those of the pairs (r) and all others (i),
+
+        Z_r = A_rr - A_ri A_ii^-1 A_ir                                                                         (8)
+
+    A product takes three real ones for all harmonics at once and is bound by reading 3 n_rel^2 numbers, whatever H.
+
+    n_rel: of the joint. rates (H,): n w, rad/s. columns (3, n, n_rel): columns r of K, M, C, rows r before rows i.
+    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N.
+    """
+
+    n_rel: int
+    rates: FloatArray
+    columns: FloatArray
+    back: FloatArray
+    held_compliance: ComplexArray
+
+    @cached_property
+    def dense(self) -> ComplexArray:
+        """As in HarmonicStiffness; made where it is asked for."""
+        stiffness, mass, damping = self.columns
+        matrices = np.empty((self.rates.size, self.n_rel, self.n_rel), complex)
+        for place, rate in enumerate(self.rates):
+            columns = stiffness - rate**2 * mass + 1j * rate * damping
+            back = self.back[0] - rate**2 * self.back[1] + 1j * rate * self.back[2]
+            held = self.held_compliance[place] @ columns[self.n_rel :]
+            matrices[place] = columns[: self.n_rel] - back @ held
+        return matrices
+
+    def apply(self, displacement_h: FloatArray) -> ComplexArray:
+        """As in HarmonicStiffness."""
+        forces = self._combine(self.columns, displacement_h[:, 1:])
+        behind = np.matmul(self.held_compliance, forces[self.n_rel :].T[:, :, None])[:, :, 0].T
+        parts = np.empty((behind.shape[0], 2 * self.rates.size))
+        parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
+        return forces[: self.n_rel] - self._combine(self.back, parts)
+
+    def _combine(self, forms: FloatArray, moving: FloatArray) -> ComplexArray:
+        """`(K + i n w C - (n w)^2 M) u` (rows, H) from K, M, C (3, rows, k) and harmonics cosine, sine, ... (k, 2H)."""
+        n_rows = forms.shape[1]
+        parts = (forms.reshape(3 * n_rows, -1) @ moving).reshape(3, n_rows, -1, 2)
+        spring = parts[0] - self.rates[:, None] ** 2 * parts[1]
+        drag = self.rates[:, None] * parts[2]
+        # i (cosine - i sine) = sine + i cosine
+        return cast("ComplexArray", spring[..., 0] + drag[..., 1] - 1j * (spring[..., 1] - drag[..., 0]))
+
+
+def share_matrices(
+    linear: LinearModel, relative: IntArray, internal: IntArray, rates: FloatArray, held_compliance: ComplexArray
+) -> SharedStiffness:
+    """Z_r of a real structure at the rates n w (H,), rad/s. held_compliance: as in SharedStiffness."""
+    every = np.concatenate([relative, internal])
+    parts = [np.asarray(np.real(part), np.float64) for part in (linear.stiffness, linear.mass, linear.damping)]
+    return SharedStiffness(
+        relative.size,
+        rates,
+        np.stack([part[every[:, None], relative] for part in parts]),
+        np.stack([part[relative[:, None], internal] for part in parts]),
+        held_compliance,
+    )
