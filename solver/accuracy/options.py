@@ -107,7 +107,9 @@ class AccuracyOptions:
     cheap_unknowns: int = 2000
     """Unknowns, two levels up, up to which a refinement is cheap."""
     most_unknowns: int = 8000
-    """Unknowns of a balance that "auto" may march with."""
+    """Unknowns of a balance that "auto" may march with, where it has more harmonics than `harmonics_of_any_joint`."""
+    harmonics_of_any_joint: int = 21
+    """Harmonics that "auto" may march with however many pairs there are: most states of the dovetail need 5 to 13."""
     few_pairs_unknowns: int = 2000
     """The same where the pairs are few: impacts couple all harmonics, and no preconditioner helps."""
     aim: float = 0.8

@@ -160,8 +160,11 @@ def _allowed(here: Level, resolution: Resolution) -> bool:
     """Whether "auto" may go on with these harmonics and samples."""
     if not here.case.model.holds(resolution.highest):
         return False
-    small = here.joint.component_index.size <= NEWTON.small_joint_displacements
-    most = ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns
+    n_rel = here.joint.component_index.size
+    small = n_rel <= NEWTON.small_joint_displacements
+    most = max(ACCURACY.most_unknowns, n_rel * (2 * ACCURACY.harmonics_of_any_joint + 1))
+    if small:
+        most = ACCURACY.few_pairs_unknowns
     if resolution.highest > ACCURACY.most_mixed_harmonics:
         # friction alone: motions that hit something take more in vain
         if not all(order % 2 for order in resolution.orders):
