@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solver.clock import n_compiled
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.records import record_type
@@ -276,7 +277,13 @@ def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, pro
         crashes = {crash.key: crash for crash in count_crashes(completion.store.folder, rank)}
         return tasks.take_back(lost, crashes)
 
+    known: int | None = n_compiled()
+
     def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
+        nonlocal known
+        if known is not None and n_compiled() > known:
+            known = None
+            progress.note("the solver is compiled for this machine, once after an installation")
         completion.store.tick()
         progress.tick(lambda: tasks.look(running()))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -65,3 +67,14 @@ def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
     fresh, says = march()
     assert fresh > 0.1 + compiled
     assert says < 0.3 * fresh
+
+
+def test_what_is_compiled_is_noticed_and_what_is_there_is_not() -> None:
+    code = """
+from numba import njit
+from solver.clock import n_compiled
+f = njit(lambda x: x + 1)
+print(n_compiled(), f(1), n_compiled(), f(2), n_compiled())
+"""
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.split() == ["0", "2", "1", "3", "1"]

@@ -153,3 +153,15 @@ def test_the_run_itself_says_how_far_it_is(
     running = [match["running"] for match in found if match["running"]]
     assert any(name.startswith("sweep up to 1") for name in running)
     assert any(name in ("100 Hz implicit", "110 Hz explicit", "120 Hz explicit", "120 Hz implicit") for name in running)
+
+
+@pytest.mark.parametrize("compiles", [True, False])
+def test_a_run_that_has_to_compile_says_so_once(
+    compiles: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run, "build_evaluator", build_slow)
+    numbers = itertools.count(3) if compiles else itertools.repeat(3)
+    monkeypatch.setattr(run, "n_compiled", lambda: next(numbers))
+    assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
+    said = capsys.readouterr().err
+    assert said.count("the solver is compiled for this machine, once after an installation") == int(compiles)
