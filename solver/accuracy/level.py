@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import fewer, levels_to_reach, levels_to_see, n_unknowns, reach, shifted
+from solver.accuracy.harmonic_levels import fewer, levels_to_reach, levels_to_see, n_unknowns, reach, room_for, shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
 from solver.continuation.homotopy import add_harmonics, start_with_tail
@@ -177,7 +177,7 @@ class Level:
                 reaching -= 1
         for levels in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
             other = shifted(self.case.resolution, levels)
-            affordable = self.unknowns(other) <= ACCURACY.compared_unknowns
+            affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
                 level = level or self.solve_at(other, effort)

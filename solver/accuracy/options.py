@@ -44,6 +44,9 @@ class AccuracyOptions:
     """Highest harmonics between which "auto" chooses: all but the last two, with which it compares."""
     most_mixed_harmonics: int = 79
     """Highest level of "auto" but for odd harmonics alone: motions that hit something take more in vain."""
+    displacements_of_limits: int = 144
+    """Relative displacements for which numbers of unknowns are meant here, those of the dovetail of 48 pairs: for a
+    larger joint they grow in proportion, so that the harmonics are limited and not the pairs."""
     costly_unknowns: int = 2500
     """Unknowns from which a state that is no result takes fewer harmonics than its error asks for."""
     coarse_unknowns: int = 1600
@@ -107,9 +110,7 @@ class AccuracyOptions:
     cheap_unknowns: int = 2000
     """Unknowns, two levels up, up to which a refinement is cheap."""
     most_unknowns: int = 8000
-    """Unknowns of a balance that "auto" may march with, where it has more harmonics than `harmonics_of_any_joint`."""
-    harmonics_of_any_joint: int = 21
-    """Harmonics that "auto" may march with however many pairs there are: most states of the dovetail need 5 to 13."""
+    """Unknowns of a balance that "auto" may march with."""
     few_pairs_unknowns: int = 2000
     """The same where the pairs are few: impacts couple all harmonics, and no preconditioner helps."""
     aim: float = 0.8

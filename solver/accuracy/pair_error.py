@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import n_unknowns, shifted
+from solver.accuracy.harmonic_levels import n_unknowns, room_for, shifted
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray
@@ -18,7 +18,8 @@ def slip_work_error(case: Case, joint: Joint, point: PathPoint, effort: Effort) 
     Zero where there are none to compare with.
     """
     evaluation = point.evaluation
-    costly = n_unknowns(case.resolution, joint.component_index.size) > ACCURACY.costly_unknowns
+    n_rel = joint.component_index.size
+    costly = n_unknowns(case.resolution, n_rel) > room_for(ACCURACY.costly_unknowns, n_rel)
     wanted = shifted(case.resolution, -1 if costly else 2)
     if wanted == case.resolution or not case.model.holds(wanted.highest):
         return np.zeros(evaluation.slip_work.shape)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import fewer, n_unknowns, shifted
+from solver.accuracy.harmonic_levels import fewer, n_unknowns, room_for, shifted
 from solver.accuracy.level import Level
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
@@ -137,12 +137,13 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
 def coarse_state(
     refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort
 ) -> Refined | None:
-    """The same state with so few harmonics that it has at most `most` unknowns; None where there is none.
+    """The same state with so few harmonics that it has at most `most` unknowns (of 48 pairs); None where there is none.
 
     omega: rad/s. excitation_amplitude: N. Its error is not known.
     """
     here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
-    while n_unknowns(here.case.resolution, here.joint.component_index.size) > most:
+    n_rel = here.joint.component_index.size
+    while n_unknowns(here.case.resolution, n_rel) > room_for(most, n_rel):
         lower = fewer(here.case.resolution, here.case.settings)
         level = here.solve_at(lower, effort) if lower != here.case.resolution else None
         if level is None:
@@ -162,9 +163,7 @@ def _allowed(here: Level, resolution: Resolution) -> bool:
         return False
     n_rel = here.joint.component_index.size
     small = n_rel <= NEWTON.small_joint_displacements
-    most = max(ACCURACY.most_unknowns, n_rel * (2 * ACCURACY.harmonics_of_any_joint + 1))
-    if small:
-        most = ACCURACY.few_pairs_unknowns
+    most = room_for(ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns, n_rel)
     if resolution.highest > ACCURACY.most_mixed_harmonics:
         # friction alone: motions that hit something take more in vain
         if not all(order % 2 for order in resolution.orders):

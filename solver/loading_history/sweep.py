@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer, n_unknowns
+from solver.accuracy.harmonic_levels import fewer, n_unknowns, room_for
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.refinement import Refined, coarse_state, refine
 from solver.contact.coulomb import STICK, friction_limit
@@ -273,7 +273,8 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        if n_unknowns(refined.case.resolution, joint.component_index.size) > ACCURACY.costly_unknowns:
+        n_rel = joint.component_index.size
+        if n_unknowns(refined.case.resolution, n_rel) > room_for(ACCURACY.costly_unknowns, n_rel):
             most = ACCURACY.coarse_unknowns
             refined = coarse_state(refined, joint.omega, joint.excitation_amplitude, most, self.effort) or refined
         if refined.case is not self.case:

@@ -21,7 +21,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer, n_unknowns
+from solver.accuracy.harmonic_levels import fewer, n_unknowns, room_for
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray
@@ -177,8 +177,9 @@ class Companion:
         """
         trajectory, main = self.trajectory, self.main
         resolution, n_rel = main.case.resolution, main.joint.component_index.size
-        if n_unknowns(resolution, n_rel) > ACCURACY.costly_unknowns:
-            while n_unknowns(resolution, n_rel) > ACCURACY.coarse_unknowns and resolution.highest > 1:
+        if n_unknowns(resolution, n_rel) > room_for(ACCURACY.costly_unknowns, n_rel):
+            most = room_for(ACCURACY.coarse_unknowns, n_rel)
+            while n_unknowns(resolution, n_rel) > most and resolution.highest > 1:
                 resolution = fewer(resolution, AUTOMATIC)
         self.followed = main.case.resolution
         case = main.case.at(resolution)

@@ -171,9 +171,10 @@ def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tup
     if history.error_estimate > SENSITIVE_ERROR:
         area = march.joint.contact.area
         volume, other = (1e9 * float(depth @ area) for depth in (history.wear_depth[-1], companion.kept[-1]))
+        known = history.error_estimate < 1.0
         return Outcome.SENSITIVE, (
             f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 with steps twice as long from the start state of a "
-            f"coarser sweep: known to {100.0 * history.error_estimate:.2g} % only"
+            f"coarser sweep: {f'known to {100.0 * history.error_estimate:.2g} % only' if known else 'not known'}"
         )
     if march.inaccurate_from < float("inf"):
         what = "wear rate" if march.worst.wear_rate >= march.worst.response else "response"
