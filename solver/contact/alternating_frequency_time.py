@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit, mean_normal_force, mean_normal_tangent
 from solver.contact.options import CONTACT
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses

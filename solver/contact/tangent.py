@@ -9,16 +9,7 @@ import numpy as np
 from numba import njit
 
 from solver.contact import archard
-from solver.contact.coulomb import (
-    SEPARATED,
-    SLIP,
-    STICK,
-    advance_tangent,
-    contact_sample,
-    contact_tangent,
-    friction_limit,
-    slip_direction,
-)
+from solver.contact.coulomb import STICK, advance_tangent, contact_sample, friction_limit
 from solver.contact.period_march import PLAIN_PERIODS, solve_periodicity
 from solver.contact.rigid_slider import step_mass
 from solver.model import BoolArray, FloatArray, IntArray
@@ -322,48 +313,3 @@ def mass_tangent(
                     )
             slip_work_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
     return force_tangent, slip_work_tangent
-
-
-@njit(cache=True)
-def sample_tangents(
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    state_t: FloatArray,
-    status_t: IntArray,
-    has_normal: BoolArray,
-    stride: int,
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, n of them.
-
-    The normal state is what of the predicted force the pair does not take up. Arrays as in `march_period`. Returns the
-    derivatives with respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state
-    before it (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
-    """
-    n_contact, n_samples = status_t.shape
-    own = np.zeros((n_samples // stride, n_contact, 3, 3))
-    carried = np.zeros((n_samples // stride, n_contact, 2, 2))
-    for pair in range(n_contact):
-        for place in range(n_samples // stride):
-            n = place * stride
-            status = status_t[pair, n]
-            trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
-            trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
-            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
-                status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
-            )
-            across = carried[place, pair]
-            across[0, 0], across[1, 1] = across_11, across_22
-            if status == SLIP:
-                # entry 12 of `coulomb.across_slip` but for the order of its products, as the preconditioner rounds it
-                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
-                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
-                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
-            if status == SEPARATED:
-                own[place, pair, 0, 0] = 1.0
-            for i in range(2):
-                own[place, pair, 1 + i, 1 + i] = 1.0
-                for j in range(2):
-                    own[place, pair, 1 + i, 1 + j] -= across[i, j]
-            if has_normal[pair]:
-                own[place, pair, 1, 0], own[place, pair, 2, 0] = -pull_1, -pull_2
-    return own, carried

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from solver.contact.tangent import sample_tangents
+from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON
