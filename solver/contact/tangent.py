@@ -8,13 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact import archard
 from solver.contact.coulomb import STICK, advance_tangent, contact_sample, friction_limit
-from solver.contact.period_march import PLAIN_PERIODS, solve_periodicity
+from solver.contact.period_march import PLAIN_PERIODS, increment_slopes, slip_work_slopes, solve_periodicity
 from solver.contact.rigid_slider import step_mass
 from solver.model import BoolArray, FloatArray, IntArray
-
-slip_work_slopes = njit()(archard.slip_work_slopes)
 
 
 @njit(cache=True)
@@ -101,7 +98,7 @@ def march_tangent(
                 continue
             before = n - 1 if n > 0 else n_samples - 1
             normal_before = max(predicted_t[pair, 0, before], 0.0)
-            by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
+            by_normal, by_slip = increment_slopes(normal_before, normal, slip)
             for column in range(width + 2):
                 work[column] += by_slip * (
                     step_1 / slip * (dstate[0, column] - before_dstate[0, column])
@@ -110,9 +107,9 @@ def march_tangent(
             if has_normal[pair]:
                 for k in range(m):
                     if normal_before > 0.0:
-                        work[k] += 0.5 * by_normal * basis_t[before, k]
+                        work[k] += by_normal * basis_t[before, k]
                     if normal > 0.0:
-                        work[k] += 0.5 * by_normal * basis_t[n, k]
+                        work[k] += by_normal * basis_t[n, k]
         start_tangent(
             dstart,
             dstate,
