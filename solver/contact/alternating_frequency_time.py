@@ -143,9 +143,10 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
             joint.has_normal[inertial],
         )
     normal = np.flatnonzero(joint.has_normal & switching)
-    force_tangent[normal, :m, :m] = mean_normal_tangent(
-        at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
-    )
+    if normal.size:
+        force_tangent[normal, :m, :m] = mean_normal_tangent(
+            at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
+        )
     return force_tangent, slip_work_tangent
 
 

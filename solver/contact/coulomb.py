@@ -138,47 +138,53 @@ def advance_tangent(
     trial_1: float,
     trial_2: float,
     friction: float,
-    has_normal: bool,
+    first: IntArray,
     dforce: FloatArray,
 ) -> None:
-    """Derivatives of one sample, in place: `dforce` (2, 3m+2) of the tangential force, `dstate` (2, 3m+2) of the state.
+    """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
 
-    Eqs. (13)-(15), with all that came before in the period. Columns are the harmonics of the predicted force of the
-    pair: normal (m), tangent 1 (m), tangent 2 (m), and the state at the start of the period. `basis` (m,) holds the
-    derivative of a time sample with respect to its harmonics. `dstate` comes in as that of the sample before.
+    Eqs. (13)-(15), with all that came before in the period. Columns are m harmonics of each component of the predicted
+    force of the pair, from `first` (3,) on: normal, tangent 1, tangent 2; -1 where the force does not depend on one.
+    The last two are the state at the start of the period. `basis` (m,) holds the derivative of a time sample with
+    respect to its harmonics. `dstate` comes in as that of the sample before.
     """
-    m = basis.size
+    m, width = basis.size, dstate.shape[1]
     if status == STICK:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = -dstate[0, column]
             dforce[1, column] = -dstate[1, column]
-        for k in range(m):
-            dforce[0, m + k] += basis[k]
-            dforce[1, 2 * m + k] += basis[k]
+        for component in range(2):
+            place = first[1 + component]
+            if place >= 0:
+                own = dforce[component, place : place + m]
+                for k in range(m):
+                    own[k] += basis[k]
         return
     pull_1, pull_2, across_11, across_12, across_22 = contact_tangent(status, normal, trial_1, trial_2, friction)
     if status == SLIP and friction_limit(friction, normal) > 0.0:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
             dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-        for k in range(m):
-            if has_normal:
-                dforce[0, k] += pull_1 * basis[k]
-                dforce[1, k] += pull_2 * basis[k]
-            dforce[0, m + k] += across_11 * basis[k]
-            dforce[0, 2 * m + k] += across_12 * basis[k]
-            dforce[1, m + k] += across_12 * basis[k]
-            dforce[1, 2 * m + k] += across_22 * basis[k]
+        for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
+            place = first[component]
+            if place >= 0:
+                force_1, force_2 = dforce[0, place : place + m], dforce[1, place : place + m]
+                for k in range(m):
+                    force_1[k] += by_1 * basis[k]
+                    force_2[k] += by_2 * basis[k]
     else:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = 0.0
             dforce[1, column] = 0.0
-    for column in range(3 * m + 2):
+    for column in range(width):
         dstate[0, column] = -dforce[0, column]
         dstate[1, column] = -dforce[1, column]
-    for k in range(m):
-        dstate[0, m + k] += basis[k]
-        dstate[1, 2 * m + k] += basis[k]
+    for component in range(2):
+        place = first[1 + component]
+        if place >= 0:
+            own = dstate[component, place : place + m]
+            for k in range(m):
+                own[k] += basis[k]
 
 
 @njit(cache=True)
