@@ -15,6 +15,7 @@ from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
+from solver.structure.joint import friction_of_pairs
 from solver.wear.march import march_wear as march_from_start
 
 _UNWORN = np.zeros(1)  # the only cycle count
@@ -46,7 +47,7 @@ def frequency_response(
     model: ReducedModel,
     frequency: ArrayLike,
     excitation_amplitude: float,
-    friction_coefficient: float,
+    friction_coefficient: ArrayLike | None,
     *,
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
@@ -64,7 +65,7 @@ def frequency_response(
     excitation_amplitude
         N, multiplies the unit harmonic load of the model.
     friction_coefficient
-        Of all pairs.
+        Of all pairs, or (n_contact,) of each; None for a model that has one of each pair, as a scene file may.
     sweep
         How a state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
     settings
@@ -73,7 +74,8 @@ def frequency_response(
     Raises
     ------
     ValueError
-        Where a number is out of its range, or the model does not hold the nodal diameters that the harmonics need.
+        Where a number is out of its range, the model does not hold the nodal diameters that the harmonics need, or
+        friction coefficients are given twice, not at all, or not to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
@@ -100,13 +102,13 @@ def frequency_response(
 def check_case(
     model: ReducedModel,
     excitation_amplitude: float,
-    friction_coefficient: float,
+    friction_coefficient: ArrayLike | None,
     sweep: Sweep,
     settings: SolverSettings,
-) -> tuple[float, float]:
+) -> tuple[float, float | FloatArray | None]:
     """Excitation amplitude and friction coefficient. Raises ValueError where a joint cannot be computed like this."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
-    friction = check_number("friction_coefficient", friction_coefficient, least=0.0)
+    friction = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Sweep))
     highest = 1 if settings.harmonics == "auto" else settings.harmonics
     if not model.holds(highest):
@@ -114,6 +116,16 @@ def check_case(
     if settings.samples != "auto" and settings.samples <= 2 * highest:
         raise ValueError(f"settings.samples: give more than {2 * highest}, twice the harmonics")
     return load, friction
+
+
+def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:
+    """One number, one of each pair (n_contact,), or None for those of the model. Raises ValueError where none fits."""
+    friction: float | FloatArray | None = None
+    if given is not None:
+        numbers = check_numbers("friction_coefficient", given, least=0.0)
+        friction = numbers if numbers.size > 1 else float(numbers[0])
+    friction_of_pairs(model, friction)
+    return friction
 
 
 def check_word(name: str, given: str, known: tuple[str, ...]) -> None:

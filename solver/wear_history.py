@@ -21,7 +21,7 @@ def march_wear(
     model: ReducedModel,
     frequency: float,
     excitation_amplitude: float,
-    friction_coefficient: float,
+    friction_coefficient: ArrayLike | None,
     wear_coefficient: float,
     cycles: ArrayLike,
     *,
@@ -43,7 +43,7 @@ def march_wear(
     excitation_amplitude
         N, multiplies the unit harmonic load of the model.
     friction_coefficient
-        Of all pairs.
+        Of all pairs, or (n_contact,) of each; None for a model that has one of each pair, as a scene file may.
     wear_coefficient
         k_w of Eq. (2), 1/Pa.
     cycles
@@ -60,8 +60,9 @@ def march_wear(
     Raises
     ------
     ValueError
-        Where a number is out of its range, counts do not ascend, a scheme of a given step has none, or the model does
-        not hold the nodal diameters that the harmonics need.
+        Where a number is out of its range, counts do not ascend, a scheme of a given step has none, the model does not
+        hold the nodal diameters that the harmonics need, or friction coefficients are given twice, not at all, or not
+        to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)

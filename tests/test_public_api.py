@@ -102,7 +102,7 @@ model = read_scene("root.h5")
 model = build_model([[1.0]], None, [[1.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=1.0)
 settings = SolverSettings(harmonics=5, rtol=1e-3)
 response: NDArray[np.complex128] = frequency_response(model, [0.1], 1.0, 0.5, sweep="down", settings=settings).response
-outcome: Outcome = march_wear(model, 0.1, 1.0, 0.5, 1e-11, np.linspace(0.0, 10.0, 3)).outcome
+outcome: Outcome = march_wear(model, 0.1, 1.0, [0.5], 1e-11, np.linspace(0.0, 10.0, 3)).outcome
 wrong: str = run_study(3)
 frequency_response(model, [0.1], 1.0, 0.5, sweep="sideways")
 """,
@@ -388,6 +388,9 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change: dict[str, Any],
         ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
         ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
         ({"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
+        ({"friction_coefficient": [0.5, -0.1]}, "friction_coefficient: give values of at least 0"),
+        ({"friction_coefficient": [0.5, 0.4]}, "friction_coefficient has shape (2,): give a number or shape (1,)"),
+        ({"friction_coefficient": None}, "friction_coefficient is missing"),
         ({"wear_coefficient": -1.0}, "wear_coefficient: give values of at least 0"),
         ({"cycles": [0.0, 2.0, 2.0]}, "cycles: give ascending counts"),
         ({"cycles": []}, "cycles: give finite numbers"),

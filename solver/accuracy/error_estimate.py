@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
+from solver.model import FloatArray
 from solver.packing import packable
+
+Values = TypeVar("Values", float, FloatArray)
 
 
 @packable
@@ -34,6 +38,15 @@ class Estimate:
     def times(self, factor: float) -> Estimate:
         """Larger errors."""
         return Estimate(factor * self.response, factor * self.wear_rate, self.weight)
+
+
+def euler_error(length: float, change: Values) -> Values:
+    """Estimated error of an Euler step, explicit or implicit: its difference to the trapezoidal rule.
+
+    length: of the step, cycles. change: of the wear rate over the step, of each pair, m per cycle, or of all, m3 per
+    cycle. The error is as signed as the change.
+    """
+    return 0.5 * length * change
 
 
 NOTHING = Estimate(0.0, 0.0)

@@ -233,9 +233,8 @@ class Level:
         """Response, m, below which a relative error says nothing: a small fraction of what the excitation would cause
         on the joint's own stiffness. A mass that its friction holds does not respond at all.
         """
-        structure, penalty = self.joint.structure, self.joint.penalty
-        stiffness = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()
-        moved = structure.harmonic_force / stiffness[self.joint.component_index]
+        structure = self.joint.structure
+        moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
         return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
 

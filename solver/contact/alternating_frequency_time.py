@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit, mean_normal_force, mean_normal_tangent
 from solver.contact.options import CONTACT
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
@@ -144,9 +143,10 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
             joint.has_normal[inertial],
         )
     normal = np.flatnonzero(joint.has_normal & switching)
-    force_tangent[normal, :m, :m] = mean_normal_tangent(
-        at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
-    )
+    if normal.size:
+        force_tangent[normal, :m, :m] = mean_normal_tangent(
+            at.predicted_t[normal], basis.synthesis, basis.analysis, joint.has_normal[normal]
+        )
     return force_tangent, slip_work_tangent
 
 

@@ -1,4 +1,5 @@
-"""Coulomb friction with separation in one sample of one pair: the return map and its derivative. Floats only.
+"""Coulomb friction with separation, sample by sample: the return map, its derivative, and the normal force that goes on
+to the harmonics. Floats and arrays only.
 
 The law is applied to a *predicted* force `p` (what the joint would take up if the pair did not move) and to a
 force-like tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS,
@@ -13,6 +14,9 @@ So the friction force is the projection of a trial force on a disc of radius `mu
 sliders alike; its derivative where it slips is
 
     d lambda_T = mu n d p_N + (mu p_N / |p_T - x'|) (1 - n n^T) (d p_T - d x').
+
+The normal force is that of the sample in the law. Its harmonics, Eqs. (11), (12), are taken from its mean around each
+sample (`closed_fraction`).
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from solver.model import FloatArray
+from solver.model import BoolArray, FloatArray, IntArray
 
 SEPARATED = 0
 STICK = 1
@@ -134,44 +138,157 @@ def advance_tangent(
     trial_1: float,
     trial_2: float,
     friction: float,
-    has_normal: bool,
+    first: IntArray,
     dforce: FloatArray,
 ) -> None:
-    """Derivatives of one sample, in place: `dforce` (2, 3m+2) of the tangential force, `dstate` (2, 3m+2) of the state.
+    """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
 
-    Eqs. (13)-(15), with all that came before in the period. Columns are the harmonics of the predicted force of the
-    pair: normal (m), tangent 1 (m), tangent 2 (m), and the state at the start of the period. `basis` (m,) holds the
-    derivative of a time sample with respect to its harmonics. `dstate` comes in as that of the sample before.
+    Eqs. (13)-(15), with all that came before in the period. Columns are m harmonics of each component of the predicted
+    force of the pair, from `first` (3,) on: normal, tangent 1, tangent 2; -1 where the force does not depend on one.
+    The last two are the state at the start of the period. `basis` (m,) holds the derivative of a time sample with
+    respect to its harmonics. `dstate` comes in as that of the sample before.
     """
-    m = basis.size
+    m, width = basis.size, dstate.shape[1]
     if status == STICK:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = -dstate[0, column]
             dforce[1, column] = -dstate[1, column]
-        for k in range(m):
-            dforce[0, m + k] += basis[k]
-            dforce[1, 2 * m + k] += basis[k]
+        for component in range(2):
+            place = first[1 + component]
+            if place >= 0:
+                own = dforce[component, place : place + m]
+                for k in range(m):
+                    own[k] += basis[k]
         return
     pull_1, pull_2, across_11, across_12, across_22 = contact_tangent(status, normal, trial_1, trial_2, friction)
     if status == SLIP and friction_limit(friction, normal) > 0.0:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
             dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-        for k in range(m):
-            if has_normal:
-                dforce[0, k] += pull_1 * basis[k]
-                dforce[1, k] += pull_2 * basis[k]
-            dforce[0, m + k] += across_11 * basis[k]
-            dforce[0, 2 * m + k] += across_12 * basis[k]
-            dforce[1, m + k] += across_12 * basis[k]
-            dforce[1, 2 * m + k] += across_22 * basis[k]
+        for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
+            place = first[component]
+            if place >= 0:
+                force_1, force_2 = dforce[0, place : place + m], dforce[1, place : place + m]
+                for k in range(m):
+                    force_1[k] += by_1 * basis[k]
+                    force_2[k] += by_2 * basis[k]
     else:
-        for column in range(3 * m + 2):
+        for column in range(width):
             dforce[0, column] = 0.0
             dforce[1, column] = 0.0
-    for column in range(3 * m + 2):
+    for column in range(width):
         dstate[0, column] = -dforce[0, column]
         dstate[1, column] = -dforce[1, column]
-    for k in range(m):
-        dstate[0, m + k] += basis[k]
-        dstate[1, 2 * m + k] += basis[k]
+    for component in range(2):
+        place = first[1 + component]
+        if place >= 0:
+            own = dstate[component, place : place + m]
+            for k in range(m):
+                own[k] += basis[k]
+
+
+@njit(cache=True)
+def sample_tangents(
+    predicted_t: FloatArray,
+    friction: FloatArray,
+    state_t: FloatArray,
+    status_t: IntArray,
+    has_normal: BoolArray,
+    stride: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, n of them.
+
+    The normal state is what of the predicted force the pair does not take up. Arrays as in `march_period`. Returns the
+    derivatives with respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state
+    before it (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
+    """
+    n_contact, n_samples = status_t.shape
+    own = np.zeros((n_samples // stride, n_contact, 3, 3))
+    carried = np.zeros((n_samples // stride, n_contact, 2, 2))
+    for pair in range(n_contact):
+        for place in range(n_samples // stride):
+            n = place * stride
+            status = status_t[pair, n]
+            trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
+            trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
+            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
+                status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
+            )
+            across = carried[place, pair]
+            across[0, 0], across[1, 1] = across_11, across_22
+            if status == SLIP:
+                # entry 12 of `across_slip` but for the order of its products, as the preconditioner rounds it
+                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
+                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
+                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
+            if status == SEPARATED:
+                own[place, pair, 0, 0] = 1.0
+            for i in range(2):
+                own[place, pair, 1 + i, 1 + i] = 1.0
+                for j in range(2):
+                    own[place, pair, 1 + i, 1 + j] -= across[i, j]
+            if has_normal[pair]:
+                own[place, pair, 1, 0], own[place, pair, 2, 0] = -pull_1, -pull_2
+    return own, carried
+
+
+@njit(cache=True)
+def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
+    """Normal force of a sample over the half step towards a neighbour, and its derivatives to both predicted forces.
+
+    Between two samples the predicted normal force is taken as linear, so the pair closes or opens where it is zero: the
+    half step next to an opening counts by the closed part of the step. Without this every sample that changes its state
+    is a corner in the residual, and a branch with hard impacts breaks up into small folds. `force` is positive.
+    """
+    if neighbour >= 0.0:
+        return force, 1.0, 0.0
+    fraction = force / (force - neighbour)
+    # in fractions, not squares: predicted forces of pairs without preload may be as small as numbers get
+    return fraction * force, fraction * (2.0 - fraction), fraction * fraction
+
+
+@njit(cache=True)
+def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
+    """Normal force (n_contact, N), N, averaged around each sample: what its harmonics are taken from."""
+    n_contact, _, n_samples = predicted_t.shape
+    mean = np.zeros((n_contact, n_samples))
+    for pair in range(n_contact):
+        for n in range(n_samples):
+            force = predicted_t[pair, 0, n]
+            if force > 0.0:
+                before, _, _ = closed_fraction(force, predicted_t[pair, 0, n - 1])
+                after, _, _ = closed_fraction(force, predicted_t[pair, 0, (n + 1) % n_samples])
+                mean[pair, n] = 0.5 * (before + after)
+    return mean
+
+
+@njit(cache=True)
+def mean_normal_tangent(
+    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
+) -> FloatArray:
+    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
+    n_contact, _, n_samples = predicted_t.shape
+    m = synthesis.shape[0]
+    basis_t = np.ascontiguousarray(synthesis.T)
+    tangent = np.zeros((n_contact, m, m))
+    analysis_t = np.ascontiguousarray(analysis.T)
+    rows = np.empty((n_samples, m))
+    for pair in range(n_contact):
+        if not has_normal[pair]:
+            continue
+        for n in range(n_samples):
+            force = predicted_t[pair, 0, n]
+            rows[n] = 0.0
+            if force <= 0.0:
+                continue
+            ahead = (n + 1) % n_samples
+            _, own_before, other_before = closed_fraction(force, predicted_t[pair, 0, n - 1])
+            _, own_after, other_after = closed_fraction(force, predicted_t[pair, 0, ahead])
+            for j in range(m):
+                rows[n, j] = 0.5 * (
+                    (own_before + own_after) * basis_t[n, j]
+                    + other_before * basis_t[n - 1, j]
+                    + other_after * basis_t[ahead, j]
+                )
+        tangent[pair] = np.dot(analysis_t, rows)
+    return tangent

@@ -19,6 +19,7 @@ PLAIN_PERIODS = 4  # before Newton's method is used on the periodicity; most pai
 SMALLEST_DETERMINANT = 1e-9  # of 1 - monodromy: below it something does not fade from period to period, and is marched
 
 slip_work_rate = njit()(archard.slip_work_rate)
+slip_work_slopes = njit()(archard.slip_work_slopes)
 
 
 @njit(cache=True)
@@ -128,7 +129,7 @@ def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
     """Slip work of a period, as force times state: N * N, (n_contact,); divided by the tangential penalty it is in J.
 
     Eqs. (7), (21) with the sliding velocity (the print has the displacement), integrated as normal force times
-    increments of the corrected slip. The trapezoidal rule takes the force of both ends of an increment.
+    increments of the corrected slip (`increment_work`).
     """
     n_contact, _, n_samples = force_t.shape
     integral = np.zeros(n_contact)
@@ -138,5 +139,18 @@ def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
             slip = np.hypot(
                 state_t[pair, 0, n + 1] - state_t[pair, 0, n], state_t[pair, 1, n + 1] - state_t[pair, 1, n]
             )
-            integral[pair] += slip_work_rate(0.5 * (force_t[pair, 0, before] + force_t[pair, 0, n]), slip)
+            integral[pair] += increment_work(force_t[pair, 0, before], force_t[pair, 0, n], slip)
     return integral
+
+
+@njit(cache=True)
+def increment_work(normal_before: float, normal: float, slip: float) -> float:
+    """Slip work of an increment of slip by the trapezoidal rule: under the mean of the normal forces of its ends."""
+    return slip_work_rate(0.5 * (normal_before + normal), slip)
+
+
+@njit(cache=True)
+def increment_slopes(normal_before: float, normal: float, slip: float) -> tuple[float, float]:
+    """Derivatives of `increment_work` with respect to the normal force of either end, and to the slip."""
+    by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
+    return 0.5 * by_normal, by_slip

@@ -8,22 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact import archard
-from solver.contact.coulomb import (
-    SEPARATED,
-    SLIP,
-    STICK,
-    advance_tangent,
-    contact_sample,
-    contact_tangent,
-    friction_limit,
-    slip_direction,
-)
-from solver.contact.period_march import PLAIN_PERIODS, solve_periodicity
+from solver.contact.coulomb import STICK, advance_tangent, contact_sample, friction_limit
+from solver.contact.period_march import PLAIN_PERIODS, increment_slopes, slip_work_slopes, solve_periodicity
 from solver.contact.rigid_slider import step_mass
 from solver.model import BoolArray, FloatArray, IntArray
-
-slip_work_slopes = njit()(archard.slip_work_slopes)
 
 
 @njit(cache=True)
@@ -67,21 +55,18 @@ def march_tangent(
     """
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
-    width = 3 * m
     # rows of the transposes are contiguous, which is what the loops over columns need
     basis_t = np.ascontiguousarray(synthesis.T)
-    force_tangent = np.zeros((n_contact, width, width))
-    slip_work_tangent = np.zeros((n_contact, width))
-    dstate = np.empty((2, width + 2))
-    before_dstate = np.empty((2, width + 2))
+    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
+    slip_work_tangent = np.zeros((n_contact, 3 * m))
     analysis_t = np.ascontiguousarray(analysis.T)
-    dforce_t = np.empty((n_samples, 2, width + 2))
-    dforce = np.empty((2, width + 2))
-    work = np.empty(width + 2)
-    dstart = np.empty((2, width))
     for pair in range(n_contact):
-        work[:] = 0.0
-        dstate[:, :] = 0.0
+        columns, width = pair_columns(m, line[pair], has_normal[pair])
+        dforce_t = np.empty((n_samples, 2, width + 2))
+        before_dstate = np.empty((2, width + 2))
+        dstart = np.empty((2, width))
+        work = np.zeros(width + 2)
+        dstate = np.zeros((2, width + 2))
         dstate[0, width] = dstate[1, width + 1] = 1.0
         for n in range(n_samples):
             first = state_t[pair, 0, n]
@@ -100,7 +85,7 @@ def march_tangent(
                 trial_1,
                 trial_2,
                 friction[pair],
-                has_normal[pair],
+                columns,
                 dforce_t[n],
             )
             step_1 = state_t[pair, 0, n + 1] - first
@@ -110,7 +95,7 @@ def march_tangent(
                 continue
             before = n - 1 if n > 0 else n_samples - 1
             normal_before = max(predicted_t[pair, 0, before], 0.0)
-            by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
+            by_normal, by_slip = increment_slopes(normal_before, normal, slip)
             for column in range(width + 2):
                 work[column] += by_slip * (
                     step_1 / slip * (dstate[0, column] - before_dstate[0, column])
@@ -119,9 +104,9 @@ def march_tangent(
             if has_normal[pair]:
                 for k in range(m):
                     if normal_before > 0.0:
-                        work[k] += 0.5 * by_normal * basis_t[before, k]
+                        work[k] += by_normal * basis_t[before, k]
                     if normal > 0.0:
-                        work[k] += 0.5 * by_normal * basis_t[n, k]
+                        work[k] += by_normal * basis_t[n, k]
         start_tangent(
             dstart,
             dstate,
@@ -130,12 +115,10 @@ def march_tangent(
             start[pair],
             min(periods[pair] - 1, PLAIN_PERIODS),
             basis_t,
-            has_normal[pair],
-            dforce,
+            columns,
         )
         if line[pair] >= 0:
-            along = dforce_t[:, line[pair]]
-            _line_tangent(force_tangent[pair], along, dstart, analysis_t, line[pair], has_normal[pair])
+            _line_tangent(force_tangent[pair], dforce_t[:, line[pair]], dstart, analysis_t, line[pair], columns)
         else:
             dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
             for component in range(2):
@@ -147,31 +130,44 @@ def march_tangent(
                         force_tangent[pair, row, column] = (
                             dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
                         )
-        for column in range(width):
-            slip_work_tangent[pair, column] = (
-                work[column] + work[width] * dstart[0, column] + work[width + 1] * dstart[1, column]
-            )
+        for component in range(3):
+            for column in range(columns[component], columns[component] + m if columns[component] >= 0 else -1):
+                slip_work_tangent[pair, component * m + column - columns[component]] = (
+                    work[column] + work[width] * dstart[0, column] + work[width + 1] * dstart[1, column]
+                )
     return force_tangent, slip_work_tangent
 
 
 @njit(cache=True)
-def _line_tangent(
-    tangent: FloatArray, dforce: FloatArray, dstart: FloatArray, analysis_t: FloatArray, line: int, has_normal: bool
-) -> None:
-    """Tangent (3m, 3m) of a pair with one tangent, in place, from `dforce` (N, 3m+2), that of its force: only the
-    columns that there are are analysed.
+def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, int]:
+    """Columns of the derivatives of a pair: the first of each component (3,), -1 for none, and how many (3m at most).
+
+    A pair with one tangent has the columns that there are alone, `line` as in `rigid_slider.step_mass`; one with both
+    has room for all of them.
     """
+    columns = np.array([0 if has_normal else -1, m, 2 * m])
+    if line < 0:
+        return columns, 3 * m
+    own = m if has_normal else 0
+    columns[1 + line], columns[2 - line] = own, -1
+    return columns, own + m
+
+
+@njit(cache=True)
+def _line_tangent(
+    tangent: FloatArray, dforce: FloatArray, dstart: FloatArray, analysis_t: FloatArray, line: int, columns: IntArray
+) -> None:
+    """Tangent (3m, 3m) of a pair with one tangent, in place, from `dforce` (N, width + 2), that of its force."""
     m, n_samples = analysis_t.shape
-    first, own = 0 if has_normal else m, (1 + line) * m
-    packed = np.empty((n_samples, 2 * m - first))
+    width, own, rows = dstart.shape[1], columns[1 + line], (1 + line) * m
+    closed = np.empty((n_samples, width))
     for n in range(n_samples):
-        for k in range(2 * m - first):
-            column = first + k if first + k < m else own + first + k - m
-            start = dforce[n, 3 * m] * dstart[0, column] + dforce[n, 3 * m + 1] * dstart[1, column]
-            packed[n, k] = dforce[n, column] + start
-    harmonics = np.dot(analysis_t, packed)
-    tangent[own : own + m, first:m] = harmonics[:, : m - first]
-    tangent[own : own + m, own : own + m] = harmonics[:, m - first :]
+        for k in range(width):
+            start = dforce[n, width] * dstart[0, k] + dforce[n, width + 1] * dstart[1, k]
+            closed[n, k] = dforce[n, k] + start
+    harmonics = np.dot(analysis_t, closed)
+    tangent[rows : rows + m, :own] = harmonics[:, :own]
+    tangent[rows : rows + m, rows : rows + m] = harmonics[:, own:]
     for k in range((2 - line) * m, (3 - line) * m):
         tangent[k, k] = 1.0
 
@@ -185,10 +181,9 @@ def start_tangent(
     start: FloatArray,
     periods: int,
     basis_t: FloatArray,
-    has_normal: bool,
-    dforce: FloatArray,
+    columns: IntArray,
 ) -> None:
-    """Derivative (2, 3m) of the start of the last period, into `dstart`; `dstate` (2, 3m+2): that of its end.
+    """Derivative (2, width) of the start of the last period, into `dstart`; `dstate` (2, width + 2): that of its end.
 
     periods: those to march before the last one where the periodicity does not say it, 0 where the start is given.
     """
@@ -203,7 +198,7 @@ def start_tangent(
             first, second, _ = solve_periodicity(monodromy, dstate[0, column], dstate[1, column])
             dstart[0, column], dstart[1, column] = first, second
         return
-    moved = np.zeros_like(dstate)
+    moved, dforce = np.zeros_like(dstate), np.empty_like(dstate)
     first, second = start
     for _ in range(periods):
         for n in range(predicted_t.shape[1]):
@@ -213,7 +208,7 @@ def start_tangent(
                 predicted_t[0, n], predicted_t[1, n], predicted_t[2, n], friction, first, second
             )
             if status != STICK:
-                advance_tangent(moved, basis_t[n], status, normal, trial_1, trial_2, friction, has_normal, dforce)
+                advance_tangent(moved, basis_t[n], status, normal, trial_1, trial_2, friction, columns, dforce)
     dstart[:, :] = moved[:, :width]
 
 
@@ -263,20 +258,22 @@ def mass_tangent(
     mean_t = np.ascontiguousarray(step_synthesis.T)
     out = np.empty(7)
     local = np.empty((5, 5))
-    entry = np.empty((2, 3 * m + 2))
-    leave = np.empty((5, 3 * m + 2))
     analysis_t = np.ascontiguousarray(step_analysis.T)
-    dforce_t = np.empty((n_samples, 2, 3 * m + 2))
-    work = np.empty(3 * m + 2)
     for pair in range(n_contact):
+        columns, width = pair_columns(m, line[pair], has_normal[pair])
+        tangents = np.array([0, 1]) if line[pair] < 0 else np.array([line[pair]])
+        leave = np.empty((5, width + 2))
+        # in whole blocks of 8 columns: so the product below rounds as it does with more of them
+        padded = width + 2 if line[pair] < 0 else (width + 2 + 7) // 8 * 8
+        dforce_t = np.zeros((n_samples, tangents.size, padded))
+        work = np.zeros(width + 2)
         gain = mass[pair] / step + 0.5 * drag[pair]
         loss = mass[pair] / step - 0.5 * drag[pair]
         velocity = start[pair].copy()
         # columns: the harmonics of the predicted force, then the velocity at the start
-        entry[:, :] = 0.0
-        entry[0, 3 * m] = 1.0
-        entry[1, 3 * m + 1] = 1.0
-        work[:] = 0.0
+        entry = np.zeros((2, width + 2))
+        entry[0, width] = 1.0
+        entry[1, width + 1] = 1.0
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
             limit = friction_limit(friction[pair], normal)
@@ -284,19 +281,21 @@ def mass_tangent(
             # entry holds the velocities; both forces and the friction limit have columns of their own
             for row in range(5):
                 first, second = local[row, 2], local[row, 3]
-                for column in range(3 * m + 2):
+                for column in range(width + 2):
                     leave[row, column] = first * entry[0, column] + second * entry[1, column]
-                for k in range(m):
-                    leave[row, m + k] += local[row, 0] * mean_t[n, k]
-                    leave[row, 2 * m + k] += local[row, 1] * mean_t[n, k]
+                for tangent in tangents:
+                    own = leave[row, columns[1 + tangent] : columns[1 + tangent] + m]
+                    for k in range(m):
+                        own[k] += local[row, tangent] * mean_t[n, k]
                 if normal > 0.0 and has_normal[pair]:
                     # the limit grows with the normal force by the friction coefficient
                     by_limit = friction[pair] * local[row, 4]
                     for k in range(m):
                         leave[row, k] += by_limit * point_t[n, k]
-            dforce_t[n] = leave[:2]
+            for place, tangent in enumerate(tangents):
+                dforce_t[n, place, : width + 2] = leave[tangent]
             by_normal, by_speed = slip_work_slopes(normal, out[6])
-            for column in range(3 * m + 2):
+            for column in range(width + 2):
                 work[column] += by_speed * step * leave[4, column]
             if normal > 0.0 and has_normal[pair]:
                 for k in range(m):
@@ -306,64 +305,21 @@ def mass_tangent(
             entry[0, :] = leave[2]
             entry[1, :] = leave[3]
         # the start of the period is its end: v0 = v(x, v0)
-        determinant = (1.0 - entry[0, 3 * m]) * (1.0 - entry[1, 3 * m + 1]) - entry[0, 3 * m + 1] * entry[1, 3 * m]
-        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, 3 * m + 2)
-        for column in range(3 * m):
-            first = (
-                (1.0 - entry[1, 3 * m + 1]) * entry[0, column] + entry[0, 3 * m + 1] * entry[1, column]
-            ) / determinant
-            second = ((1.0 - entry[0, 3 * m]) * entry[1, column] + entry[1, 3 * m] * entry[0, column]) / determinant
-            for component in range(2):
-                for k in range(m):
-                    force_tangent[pair, (1 + component) * m + k, column] = (
-                        dforce_h[k, component, column]
-                        + dforce_h[k, component, 3 * m] * first
-                        + dforce_h[k, component, 3 * m + 1] * second
-                    )
-            slip_work_tangent[pair, column] = work[column] + work[3 * m] * first + work[3 * m + 1] * second
+        own_1, other_1 = entry[0, width], entry[0, width + 1]
+        other_2, own_2 = entry[1, width], entry[1, width + 1]
+        determinant = (1.0 - own_1) * (1.0 - own_2) - other_1 * other_2
+        dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, tangents.size, padded)
+        for component in range(3):
+            for harmonic in range(m if columns[component] >= 0 else 0):
+                column, full = columns[component] + harmonic, component * m + harmonic
+                first = ((1.0 - own_2) * entry[0, column] + other_1 * entry[1, column]) / determinant
+                second = ((1.0 - own_1) * entry[1, column] + other_2 * entry[0, column]) / determinant
+                for place, tangent in enumerate(tangents):
+                    for k in range(m):
+                        force_tangent[pair, (1 + tangent) * m + k, full] = (
+                            dforce_h[k, place, column]
+                            + dforce_h[k, place, width] * first
+                            + dforce_h[k, place, width + 1] * second
+                        )
+                slip_work_tangent[pair, full] = work[column] + work[width] * first + work[width + 1] * second
     return force_tangent, slip_work_tangent
-
-
-@njit(cache=True)
-def sample_tangents(
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    state_t: FloatArray,
-    status_t: IntArray,
-    has_normal: BoolArray,
-    stride: int,
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, n of them.
-
-    The normal state is what of the predicted force the pair does not take up. Arrays as in `march_period`. Returns the
-    derivatives with respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state
-    before it (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
-    """
-    n_contact, n_samples = status_t.shape
-    own = np.zeros((n_samples // stride, n_contact, 3, 3))
-    carried = np.zeros((n_samples // stride, n_contact, 2, 2))
-    for pair in range(n_contact):
-        for place in range(n_samples // stride):
-            n = place * stride
-            status = status_t[pair, n]
-            trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
-            trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
-            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
-                status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
-            )
-            across = carried[place, pair]
-            across[0, 0], across[1, 1] = across_11, across_22
-            if status == SLIP:
-                # entry 12 of `coulomb.across_slip` but for the order of its products, as the preconditioner rounds it
-                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
-                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
-                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
-            if status == SEPARATED:
-                own[place, pair, 0, 0] = 1.0
-            for i in range(2):
-                own[place, pair, 1 + i, 1 + i] = 1.0
-                for j in range(2):
-                    own[place, pair, 1 + i, 1 + j] -= across[i, j]
-            if has_normal[pair]:
-                own[place, pair, 1, 0], own[place, pair, 2, 0] = -pull_1, -pull_2
-    return own, carried

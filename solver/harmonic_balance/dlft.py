@@ -204,7 +204,7 @@ class Linearisation:
 
     def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         """Rows of `pairs`, and for each its place in `pairs` and its component."""
-        rows = np.flatnonzero(np.isin(self.joint.component_index // 3, pairs))
+        rows = self.joint.rows_of(pairs)
         return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
 
     def _spread(

@@ -29,7 +29,7 @@ class JacobianSolver:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N."""
         m = right.shape[1]
         pairs = tangent.active()
-        rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
+        rows = tangent.joint.rows_of(pairs)
         step = np.zeros_like(right)
         if rows.size:
             if rows.size * m <= NEWTON.dense_unknowns:
@@ -45,7 +45,7 @@ class JacobianSolver:
     def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Steps (n_rel, m) for two right sides; a small system is factorised once."""
         pairs = tangent.active()
-        rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
+        rows = tangent.joint.rows_of(pairs)
         if not rows.size or rows.size * first.shape[1] > NEWTON.dense_unknowns:
             return self.solve(tangent, first), self.solve(tangent, second)
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)

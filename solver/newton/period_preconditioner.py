@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from solver.contact.tangent import sample_tangents
+from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON
@@ -110,7 +110,7 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     )
     n_contact, size = joint.contact.n_contact, 3 * joint.contact.n_contact
     coupling = np.zeros((size, size))
-    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / _penalty(joint)
+    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
     coupling[joint.component_index, joint.component_index] -= 1.0
     blocks = np.ascontiguousarray(coupling.reshape(size, n_contact, 3).transpose(1, 0, 2))
     matrix = np.empty((n_samples, size, size))
@@ -133,7 +133,7 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
         Rows of `U^T` and `V^T`, dimensionless.
     """
     structure, n_rel, m = joint.structure, joint.component_index.size, joint.basis.synthesis.shape[0]
-    most, penalty = stiffness_of_most(joint), _penalty(joint)
+    most, penalty = stiffness_of_most(joint), joint.relative_penalty
     added, seen = [], []
     for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
         change = (stiffness - most) / penalty
@@ -156,12 +156,6 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
             seen += list(both[1, : 1 + (place > 0)])
     shape = (len(seen), n_rel * m)
     return np.reshape(added, shape), np.reshape(seen, shape)
-
-
-def _penalty(joint: Joint) -> FloatArray:
-    """Penalty (n_rel,), N/m, of each relative displacement."""
-    penalty = joint.penalty
-    return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.component_index]
 
 
 def stiffness_of_most(joint: Joint) -> FloatArray:

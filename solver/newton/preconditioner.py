@@ -90,7 +90,7 @@ def _slip_space(tangent: Linearisation) -> SlipSpace | None:
 
 def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:
     """Factorisation of the rows and columns of `pairs`; singular matrices give infinities, not errors."""
-    rows = np.flatnonzero(np.isin(tangent.joint.component_index // 3, pairs))
+    rows = tangent.joint.rows_of(pairs)
     n_harmonics = tangent.joint.basis.n_harmonics
     n_low = n_harmonics
     while n_low > 0 and rows.size * (2 * n_low + 1) > NEWTON.low_unknowns:

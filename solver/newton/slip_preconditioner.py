@@ -148,7 +148,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
     present[joint.component_index] = True
     for pair, basis, own in zip(space.pairs, space.bases, held, strict=True):
         rank = basis.shape[1]
-        here = _rows(joint, int(pair))
+        here = joint.rows_of(int(pair))
         inside = present[3 * pair : 3 * pair + 3].ravel()
         matrix[place : place + rank] += basis[inside].T @ pushed[here].reshape(-1, space.size)
         matrix[place : place + rank, place : place + rank] -= basis.T @ own
@@ -183,7 +183,7 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
     place = 0
     for pair, motion in zip(space.pairs, moved, strict=True):
         rank = motion.shape[1]
-        here = _rows(joint, int(pair))
+        here = joint.rows_of(int(pair))
         harmonics = motion.reshape(3, m, rank)[joint.component_index[here] % 3]
         columns = slice(place, place + rank)
         pushed[:, 0, columns] = structure.static_stiffness[:, here] @ harmonics[:, 0]
@@ -194,8 +194,3 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
             pushed[:, 2::2, columns] = -force.imag.transpose(1, 0, 2)
         place += rank
     return pushed
-
-
-def _rows(joint: Joint, pair: int) -> IntArray:
-    """Places of a pair's relative displacements, in the order of its components."""
-    return np.flatnonzero(joint.component_index // 3 == pair)

@@ -8,6 +8,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
+from solver.accuracy.error_estimate import euler_error
 from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
@@ -122,7 +123,7 @@ class Recorder:
         else:
             before, before_report, before_rate = self.last
             wanted = (self.cycles > before) & (self.cycles <= cycle)
-            self.local += 0.5 * (cycle - before) * abs(rate - before_rate) if error is None else error
+            self.local += euler_error(cycle - before, abs(rate - before_rate)) if error is None else error
             # what the wear rates are wrong by for want of harmonics and samples, of all pairs together and of each
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)

@@ -94,6 +94,18 @@ class Joint:
             force[fast, 1:] = from_complex(mean, to_complex(motion[fast, 1:]) / self._inertial_compliance()[:, None])
         return force
 
+    @property
+    def relative_penalty(self) -> FloatArray:
+        """Penalty (n_rel,), N/m, of each relative displacement."""
+        penalty = self.penalty
+        return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[self.component_index]
+
+    def rows_of(self, pairs: IntArray | int) -> IntArray:
+        """Places of the relative displacements of one pair or of some, ascending: in the order of its components."""
+        chosen = np.zeros(self.contact.n_contact, bool)
+        chosen[pairs] = True
+        return np.flatnonzero(chosen[self.component_index // 3])
+
     def to_pairs(self, values: FloatArray) -> FloatArray:
         """(n_contact, 3, m) from (n_rel, m): zero where a pair has no such displacement."""
         spread = np.zeros((3 * self.contact.n_contact, values.shape[1]))

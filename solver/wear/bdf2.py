@@ -26,6 +26,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from solver.accuracy.error_estimate import euler_error
 from solver.contact.archard import wear_gain, wear_rate
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
@@ -99,7 +100,9 @@ class AdaptiveSteps:
             if length <= shortest:
                 rate, depth = trajectory.rate(), trajectory.point.evaluation.wear_depth
                 arrived = trajectory.advance(trajectory.cycle + length)
-                self.error = 0.5 * length * float(np.abs(trajectory.rate() - rate) @ trajectory.joint.contact.area)
+                self.error = euler_error(
+                    length, float(np.abs(trajectory.rate() - rate) @ trajectory.joint.contact.area)
+                )
                 self.before, self.length = (length, depth), length
                 return arrived, length
             self.length = max(shorter * length, 0.999 * shortest)
@@ -152,7 +155,7 @@ class AdaptiveSteps:
         new = result.evaluation
         new_rate = wear_rate(trajectory.wear_coefficient, area, new.slip_work)
         if self.before is None:
-            error = 0.5 * length * (new_rate - rate)
+            error = euler_error(length, new_rate - rate)
         else:
             explicit = depth + (1.0 + ratio) * length * rate - ratio**2 * grown
             own, other = (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio)), (1.0 + 1.0 / ratio) / 6.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import mean_normal_force, mean_normal_tangent
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
 from solver.contact.tangent import march_tangent, mass_tangent

@@ -7,6 +7,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from solver import frequency_response
+from solver import march_wear as march_from_unworn
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
@@ -149,3 +151,25 @@ def test_coefficients_that_are_not_one_of_each_pair_are_refused(own: object, giv
     model = model if own is None else with_own_friction(model, own)
     with pytest.raises(ValueError, match=message):
         friction_of_pairs(model, given)
+
+
+@pytest.mark.slow
+def test_the_public_functions_take_one_for_all_one_of_each_or_those_of_the_model() -> None:
+    model, settings = random_model(3, ("constant_load_one_tangent",) * 2), SolverSettings(1, 32)
+    frequency, load, own = OMEGA / (2.0 * np.pi), 120.0, with_own_friction(model, [0.2, 0.6])
+    numbers = ((model, 0.4), (model, [0.4, 0.4]), (model, [0.2, 0.6]))
+    one, same, other = (frequency_response(of, frequency, load, given, settings=settings) for of, given in numbers)
+    assert_same_bits(one, same)
+    assert one.response[0, 0] != other.response[0, 0]
+    step = {"scheme": "implicit", "step": 10.0, "settings": settings}
+    histories = [
+        march_from_unworn(of, frequency, load, given, 1e-11, 10.0, **step)
+        for of, given in ((model, [0.2, 0.6]), (own, None))
+    ]
+    assert histories[0].worn_volume[-1] > 0.0
+    assert histories[0].response[0, 0] == other.response[0, 0]
+    assert_same_bits(*histories, but=("run_time",))
+    with pytest.raises(ValueError, match=r"^friction_coefficient is given twice: the scene has one of each pair"):
+        frequency_response(own, frequency, load, 0.4)
+    with pytest.raises(ValueError, match=r"^friction_coefficient has shape \(3,\): give a number or shape \(2,\)"):
+        frequency_response(model, frequency, load, [0.2, 0.4, 0.6])

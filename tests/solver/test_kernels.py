@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
-from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force, mean_normal_tangent
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.tangent import march_tangent
 from solver.structure.fourier import build_basis

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
-from solver.contact.coulomb import SEPARATED, SLIP, STICK
-from solver.contact.normal_force import mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
 from solver.contact.tangent import march_tangent, mass_tangent

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 
@@ -30,6 +32,13 @@ def _presented(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) 
     """States that double their period are handed out, to be looked at here."""
     if "outcome" not in request.function.__name__:
         monkeypatch.setattr(start_states, "doubles_period", lambda *_: False)
+
+
+@lru_cache
+def presented(seed: int) -> tuple[Scene, Case, Joint, Evaluation]:
+    """A drawn scene with its state, whether it doubles its period or not."""
+    scene = drawn("impact", seed)
+    return (scene, *state_of(scene, start_of(scene)))
 
 
 def start_of(scene: Scene) -> StartState:
@@ -66,8 +75,7 @@ def multipliers(scene: Scene, _: Case, joint: Joint, at: Evaluation) -> FloatArr
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 6, 17, 26, 29, 32, 41, 54, 57])
 def test_it_is_a_multiplier_beyond_minus_one(seed: int) -> None:
-    scene = drawn("impact", seed)
-    case, joint, at = state_of(scene, start_of(scene))
+    scene, case, joint, at = presented(seed)
     found = multipliers(scene, case, joint, at)
     beyond = np.count_nonzero((np.abs(found.imag) < 1e-9) & (found.real < -1.0))
     assert doubles_period(case, joint, at, Effort()) == bool(beyond)
@@ -76,7 +84,7 @@ def test_it_is_a_multiplier_beyond_minus_one(seed: int) -> None:
 @pytest.mark.slow
 def test_the_draws_are_of_both_kinds() -> None:
     """Else the test above would show nothing."""
-    found = [multipliers(scene, *state_of(scene, start_of(scene))) for scene in (drawn("impact", s) for s in (1, 17))]
+    found = [multipliers(*presented(seed)) for seed in (1, 17)]
     assert np.abs(found[0]).max() < 1.0
     assert found[1].real.min() < -2.0
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample
-from solver.contact.tangent import sample_tangents
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, sample_tangents
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
 from solver.newton import period_preconditioner, preconditioner

@@ -31,6 +31,9 @@ from solver.wear.march import march_wear
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import start_state
 
+# for the module: a mark on a test itself would change its source, and with it what hypothesis draws
+pytestmark = pytest.mark.slow
+
 profile = settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 seeds = st.integers(0, 399)
@@ -290,7 +293,6 @@ def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
     assert np.abs(other.slip_work - at.slip_work).max() <= 1e-6 * at.slip_work.max() + round_off
 
 
-@pytest.mark.slow
 def test_what_is_drawn_sticks_slips_opens_and_wears() -> None:
     seen = [found(seed) for seed in range(40)]
     statuses = {int(s) for result in seen if result is not None for s in np.unique(result[2].evaluation.status_t)}

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver.loading_history import start_states
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.options import LOADING
 from solver.loading_history.origin import find_origin
@@ -34,6 +35,32 @@ def alone(sweep: str = "up") -> StartState:
     return starts([BESIDE], sweep)[BESIDE]
 
 
+@lru_cache
+def followed() -> tuple[dict[float, StartState], dict[float, Packed]]:
+    """A sweep up past the frequency: the state at each, and what was kept of its progress behind each."""
+    frequencies = np.array([211.0, 212.0, 212.25, BESIDE, 212.75])
+    found: dict[float, StartState] = {}
+    kept: dict[float, Packed] = {}
+
+    def note(progress: Packed) -> None:
+        kept[max(found)] = progress
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(start_states, "LOADING", replace(start_states.LOADING, iterations_per_report=1))
+        for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
+            found[float(frequencies[index])] = start
+    return found, kept
+
+
+def assert_same_state(one: StartState, other: StartState) -> None:
+    """To the last bit."""
+    assert one.state is not None
+    assert other.state is not None
+    assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
+    assert np.array_equal(one.state.start_history, other.state.start_history)
+    assert (one.response_error, one.branch) == (other.response_error, other.branch)
+
+
 def slip_work(start: StartState) -> float:
     """Work of the mean friction forces on the vibration: what differs first where the history does."""
     assert start.state is not None
@@ -43,15 +70,11 @@ def slip_work(start: StartState) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
-@pytest.mark.parametrize("others", [[212.0], [205.0, 211.1, 212.499, 212.501, 214.0]])
-def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: str, others: list[float]) -> None:
-    among = starts(sorted([*others, BESIDE]), sweep)[BESIDE]
-    one, other = alone(sweep).state, among.state
-    assert one is not None
-    assert other is not None
-    assert np.array_equal(one.displacement_h, other.displacement_h)
-    assert np.array_equal(one.start_history, other.start_history)
-    assert (alone(sweep).response_error, alone(sweep).branch) == (among.response_error, among.branch)
+def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: str) -> None:
+    others = [205.0, 211.1, 212.0, 212.499, 212.501, 214.0]
+    assert_same_state(starts(sorted([*others, BESIDE]), sweep)[BESIDE], alone(sweep))
+    if sweep == "up":
+        assert_same_state(followed()[0][BESIDE], alone())
 
 
 def test_the_three_loading_histories_leave_different_states() -> None:
@@ -96,26 +119,18 @@ def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings:
 
 @pytest.mark.slow
 def test_a_sweep_goes_on_to_the_last_bit() -> None:
-    kept: list[Packed] = []
-    frequencies = np.array([211.0, 212.0, 212.25, 212.5, 212.75])
-    whole = dict(follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=kept.append))
-    assert kept
-    again = dict(follow_branch(dovetail(13), 0.5, 0.5, frequencies[3:], "up", AUTOMATIC, resume=kept[-1]))
-    for index in (0, 1):
-        one, other = whole[index + 3].state, again[index].state
-        assert one is not None
-        assert other is not None
-        assert np.array_equal(one.displacement_h, other.displacement_h)
+    whole, kept = followed()
+    left = np.array([BESIDE, 212.75])
+    again = dict(follow_branch(dovetail(13), 0.5, 0.5, left, "up", AUTOMATIC, resume=kept[212.25]))
+    for index, frequency in enumerate(left):
+        assert_same_state(again[index], whole[float(frequency)])
 
 
 @pytest.mark.slow
 def test_progress_beyond_a_frequency_is_not_used_for_it() -> None:
-    kept: list[Packed] = []
-    list(follow_branch(dovetail(13), 0.5, 0.5, np.array([212.6]), "up", AUTOMATIC, keep=kept.append))
-    ((_, again),) = follow_branch(dovetail(13), 0.5, 0.5, np.array([BESIDE]), "up", AUTOMATIC, resume=kept[-1])
-    assert again.state is not None
-    assert alone().state is not None
-    assert np.array_equal(again.state.displacement_h, alone().state.displacement_h)
+    _, kept = followed()
+    ((_, again),) = follow_branch(dovetail(13), 0.5, 0.5, np.array([BESIDE]), "up", AUTOMATIC, resume=kept[212.75])
+    assert_same_state(again, alone())
 
 
 @pytest.mark.parametrize("sweep", ["up", "down"])
