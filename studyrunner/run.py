@@ -133,9 +133,10 @@ def serve_study(
         completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
         if fresh:
             completion.forget_all()
-        crashes = take_crashes(completion, fresh=fresh)
         if retry_failed:
+            # before crashes are looked at: what has ended two processes since it was tried again has failed again
             completion.forget_failed(COMPLETE)
+        crashes = take_crashes(completion, fresh=fresh)
         for crash in crashes:
             if completion.is_left(crash.key):
                 progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
@@ -162,7 +163,7 @@ def serve_study(
         except KeyboardInterrupt:
             raise Interrupted(write()) from None
         if summary.n_left == 0:
-            forget_crashes(store.folder, None if prune else completion.keys)
+            forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
             completion.prune(0.0 if prune else MOST_OF_OTHERS)
     return summary
 
@@ -193,6 +194,12 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
             forget_crashes(folder, {key})
     tally = read_tally(folder)
     return [crash for crash in new if crash.key in tally]
+
+
+def _tried_again(completion: CompletionIndex) -> set[str]:
+    """Tasks that had crashed too often, were tried again and have crashed once more: that is counted on."""
+    tally = {key for key, crashes in read_tally(completion.store.folder).items() if len(crashes) < MOST_DEATHS}
+    return tally & completion.tasks_with(Outcome.CRASHED) if tally else set()
 
 
 def _open_store(folder: Path, kind: np.dtype[np.void]) -> Store:

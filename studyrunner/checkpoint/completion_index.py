@@ -149,6 +149,17 @@ class CompletionIndex:
                     if key in failed or march.position in without_state:
                         self.store.forget_history(key)
 
+    def tasks_with(self, outcome: int) -> set[str]:
+        """What the marches are known by a point of which has this outcome, and the branches that they start from."""
+        found = self.store.select(lambda records: records["outcome"] == outcome)
+        return {
+            key
+            for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
+            for march in line
+            if not found.isdisjoint(self._histories[march.number])
+            for key in (self.key(branch), self.key(march))
+        }
+
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
         """The task of this key ends its processes: no other run tries it again.
 

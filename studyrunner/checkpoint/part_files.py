@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -55,50 +55,59 @@ class _Summed:
 
 def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
     """Records (n,) of one type, piece by piece."""
-    summed = _Summed(file)
-    _write_header(summed, pieces[0].dtype, sum(map(len, pieces)))
-    for piece in pieces:
-        step = max(1, _BYTES_AT_ONCE // piece.itemsize)
-        for first in range(0, len(piece), step):
-            summed.write(piece[first : first + step].tobytes())
-    summed.end()
+    _write_pieces(file, pieces[0].dtype, sum(map(len, pieces)), pieces)
 
 
-def load_records(path: Path, *, check: bool = True) -> NDArray[np.void]:
-    """Records that stay on the disk until they are used.
-
-    Parameters
-    ----------
-    path
-        A file of records.
-    check
-        Whether all of it is read to see whether its check sum is right.
+def load_records(path: Path) -> NDArray[np.void]:
+    """Records that stay on the disk until they are used; whether they are what was written is not looked at.
 
     Raises
     ------
     ValueError
-        Where they are damaged.
+        Where they are no records.
     OSError
         Where they cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
-        kind, n_records = _read_header(file)
-        first = file.tell()
-        if first + n_records * kind.itemsize + _CHECK_SUM_BYTES != os.fstat(file.fileno()).st_size:
-            raise ValueError("the file has another length than it says")
-        if check:
-            _check_sum(file)
-        return np.memmap(file, kind, "r", first, (n_records,))
+        kind, n_records = _read_record_header(file)
+        return np.memmap(file, kind, "r", file.tell(), (n_records,))
+
+
+def load_record_keys(path: Path) -> tuple[np.dtype[np.void], list[str]]:
+    """Type of the records of a file, and their hashes; no more of it than a piece is in memory at once.
+
+    Raises
+    ------
+    ValueError
+        Where any of it is damaged.
+    OSError
+        Where it cannot be read.
+    """
+    with open_plain(path, LARGEST_PART) as file:
+        _check_sum(file)
+        kind, n_records = _read_record_header(file)
+        keys: list[str] = []
+        for _, n_rows in _portions(n_records, kind):
+            records = np.frombuffer(file.read(n_rows * kind.itemsize), kind)
+            keys += [_text(key) for key in records[KEY].tolist()]
+    return kind, keys
 
 
 def merge_records(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None:
     """Writes records of some files, of one type, into a new one."""
-    write_records(file, [_some(load_records(path), rows) for path, rows in sources])
+    for path, _ in sources:
+        with open_plain(path, LARGEST_PART) as source:
+            _check_sum(source)
+    kind = load_records(sources[0][0]).dtype
+    _write_pieces(file, kind, sum(len(rows) for _, rows in sources), _records_of(sources))
 
 
-def record_keys(records: NDArray[np.void]) -> list[str]:
-    """Their hashes."""
-    return [_text(key) for key in records[KEY].tolist()]
+def _records_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[NDArray[np.void]]:
+    """Records of some files, piece by piece."""
+    for path, rows in sources:
+        # each piece from the file anew: what was used of it once does not stay in memory
+        for first, n_rows in _portions(len(rows), load_records(path).dtype):
+            yield load_records(path)[list(rows[first : first + n_rows])]
 
 
 def write_bundle(file: IO[bytes], entries: Mapping[str, Packed]) -> None:
@@ -197,7 +206,7 @@ def _write_header(file: _Summed, kind: np.dtype[np.generic], length: int) -> Non
     npy.write_array_header_1_0(file, header)
 
 
-def _read_header(file: IO[bytes]) -> tuple[np.dtype[np.generic], int]:
+def _read_header(file: IO[bytes]) -> tuple[np.dtype[Any], int]:
     """Type and length of an array of one dimension that is no larger than the file. Raises ValueError."""
     if npy.read_magic(file) != (1, 0):
         raise ValueError("not written by a run")
@@ -226,9 +235,27 @@ def _check_sum(file: IO[bytes]) -> None:
     file.seek(before)
 
 
-def _some(records: NDArray[np.void], rows: Rows) -> NDArray[np.void]:
-    """Rows of records; all of them as they stand on the disk."""
-    return records if len(rows) == len(records) else records[list(rows)]
+def _write_pieces(file: IO[bytes], kind: np.dtype[np.void], n_records: int, pieces: Iterable[NDArray[np.void]]) -> None:
+    summed = _Summed(file)
+    _write_header(summed, kind, n_records)
+    for piece in pieces:
+        for first, n_rows in _portions(len(piece), kind):
+            summed.write(piece[first : first + n_rows].tobytes())
+    summed.end()
+
+
+def _portions(n_records: int, kind: np.dtype[np.void]) -> Iterator[tuple[int, int]]:
+    """First record and number of records of parts that are no larger than is read at once."""
+    step = max(1, _BYTES_AT_ONCE // kind.itemsize)
+    return ((first, min(step, n_records - first)) for first in range(0, n_records, step))
+
+
+def _read_record_header(file: IO[bytes]) -> tuple[np.dtype[Any], int]:
+    """Type and number of records, which follow. Raises ValueError where the file has another length."""
+    kind, n_records = _read_header(file)
+    if file.tell() + n_records * kind.itemsize + _CHECK_SUM_BYTES != os.fstat(file.fileno()).st_size:
+        raise ValueError("the file has another length than it says")
+    return kind, n_records
 
 
 def _text(key: bytes) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.checkpoint.part_files import load_keys, load_records, record_keys
+from studyrunner.checkpoint.part_files import load_keys, load_record_keys
 from studyrunner.checkpoint.part_writer import PARTIAL, PROGRESS, RECORDS, STARTS
 from studyrunner.checkpoint.shelf import PartFile, Shelf
 from studyrunner.system.files import NotPlainError
@@ -74,8 +74,8 @@ def _look_into(path: Path, sort: str, number: int, kind: np.dtype[np.void], alon
     n_bytes = path.lstat().st_size
     if sort != RECORDS:
         return PartFile(number, path, load_keys(path), n_bytes, alone), True
-    records = load_records(path)
-    return PartFile(number, path, record_keys(records), n_bytes, alone), records.dtype == kind
+    found, keys = load_record_keys(path)
+    return PartFile(number, path, keys, n_bytes, alone), found == kind
 
 
 def _is_left_over(path: Path) -> bool:

@@ -176,7 +176,7 @@ class Store:
         """Records of a file; they stay on the disk until they are used."""
         path = self.path(number)
         try:
-            return load_records(path, check=False)
+            return load_records(path)
         except (OSError, ValueError) as error:
             raise StorageError(path, error) from error
 

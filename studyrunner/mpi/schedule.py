@@ -20,8 +20,12 @@ from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
 from studyrunner.plan.costs import LearnedCosts
 from studyrunner.system.endings import ignore_endings, uninterrupted
 
-SECONDS_TO_PROGRESS = 5.0
-"""A task says how far it is at most so often, with many ranks less often."""
+SECONDS_TO_PROGRESS = 3.0
+"""A task says how far it is at most so often, with many ranks less often.
+
+With the second that this waits for that of others (`checkpoint.store`) a kill costs no step that was finished more than
+5 s before, where steps are short and the disk keeps up.
+"""
 
 _MANY_RANKS = 100
 """More ranks say it less often, as rank 0 writes all of it to the disk."""

@@ -35,6 +35,7 @@ from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
+_BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment
 _BYTES_OF_CACHE = 2**16
 _ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
 
@@ -144,7 +145,7 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
     changed: list[str] = []
-    at_once = max(1, int(_BYTES_A_SLAB // completion.store.kind.itemsize))
+    at_once = _records_at_once(completion.store)
     for number, entries in found.items():
         entries.sort(key=lambda entry: entry.row)
         for first in range(0, len(entries), at_once):
@@ -164,6 +165,10 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
         for name in dict.fromkeys(changed)
     ]
     return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))
+
+
+def _records_at_once(store: Store) -> int:
+    return max(1, int(_BYTES_AT_ONCE // store.kind.itemsize))
 
 
 def _read_entries(store: Store, number: int, entries: Sequence[_Entry]) -> tuple[Sequence[_Entry], NDArray[np.void]]:
@@ -202,17 +207,27 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
     if not any("contact" in entry.dimensions for entry in variables.values()):
         file.setncattr("coordinates", _ON_CONTACT)
     for region, first, last in _slabs(shape, slab):
-        records = _read_slab(store, index, first, last)
-        lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
-        for name, entry in variables.items():
-            values = records[name].reshape(*lengths, *records[name].shape[1:])
-            if entry.is_text:
-                values = values.astype(object)
-            if name not in LOOPS:
-                file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
-                continue
-            for place, pair in enumerate(study.outputs.loops):
-                file[name][(*region, slice(None), pair)] = values[..., place, :, :]
+        _write_slab(file, region, variables, study.outputs.loops, _read_slab(store, index, first, last))
+
+
+def _write_slab(
+    file: netCDF4.Dataset,
+    region: Region,
+    variables: Mapping[str, Variable],
+    loops: Sequence[int],
+    records: NDArray[np.void],
+) -> None:
+    """Records of all points of a region; nothing of them stays in memory."""
+    lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
+    for name, entry in variables.items():
+        values = records[name].reshape(*lengths, *records[name].shape[1:])
+        if entry.is_text:
+            values = values.astype(object)
+        if name not in LOOPS:
+            file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+            continue
+        for place, pair in enumerate(loops):
+            file[name][(*region, slice(None), pair)] = values[..., place, :, :]
 
 
 def _create(
@@ -269,7 +284,9 @@ def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np
         places = order[begin:end]
         number = int(files[places[0]])
         if number >= 0:
-            records[places] = store.read(number)[rows[places]]
+            for part in np.array_split(places, math.ceil(len(places) / _records_at_once(store))):
+                # from the file anew: what was used of it once does not stay in memory
+                records[part] = store.read(number)[rows[part]]
             if (records[KEY][places] != keys[places]).any():
                 # between the two times that it was read
                 raise StorageError(

@@ -7,7 +7,7 @@ import signal
 from collections.abc import Iterator
 from types import FrameType
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """Ctrl-C, the end of a job's time, of a terminal, and what batch systems send before that."""
 
 _n_uninterrupted = 0
@@ -16,7 +16,7 @@ _came_meanwhile = False
 
 def take_endings() -> None:
     """From here on each of them raises KeyboardInterrupt in the main thread, once; those that are ignored stay so."""
-    for number in _ENDING:
+    for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
 
@@ -26,7 +26,7 @@ def ignore_endings() -> None:
 
     A launcher sends its signal to all ranks, and rank 0 may hear of it from another rank first.
     """
-    for number in _ENDING:
+    for number in ENDING:
         if signal.getsignal(number) is _interrupt:
             signal.signal(number, signal.SIG_IGN)
 

@@ -1,9 +1,11 @@
-"""Random kills of ranks and launchers, and whether every study still ends with the same result.
+"""Random kills of ranks and launchers: whether every study still ends with the same result, and what the kills cost.
 
     python -m tests.benchmarks.soak [COUNT [SEED]]
 
 Each trial is a study of the stand-in for the solver that is killed at some time, one in four of them twice, and then
-goes on to its end, on another number of ranks. The trial of a seed can be repeated. The tests do a few of these.
+goes on to its end, on another number of ranks; one in eight goes on for so long that what it loses may be old. The
+stand-in notes when it has finished something: what it notes again after a kill was lost with it. The trial of a seed
+can be repeated. The tests do a few of these.
 """
 
 from __future__ import annotations
@@ -13,47 +15,68 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
-import xarray as xr
-
 from tests.mpi.launching import results, run_to_end
-from tests.mpi.test_kills import AT_ONCE, FAKED_STUDY, kill_and_go_on
+from tests.mpi.losses import Losses, all_losses, find_losses
+from tests.mpi.test_kills import AT_ONCE, FAKED_STUDY, LONG_STUDY, kill_and_go_on
+
+_LONG_EVERY = 8
 
 
-def soak(count: int, seed: int, folder: Path) -> tuple[int, int, list[str]]:
-    """Trials with an identical result, kills, and a line for each of the others."""
-    study = FAKED_STUDY
-    assert run_to_end(0, [*study.arguments, "-o", "whole.nc"], folder, study.environment).status == 0
-    expected = results(folder / "whole.nc")
-    same, n_kills, wrong = 0, 0, []
+@dataclass(frozen=True)
+class Soaked:
+    """What came of the trials. same: how many had an identical result. wrong: a line for each of the others."""
+
+    same: int
+    n_kills: int
+    wrong: tuple[str, ...]
+    losses: Losses
+
+
+def soak(count: int, seed: int, folder: Path) -> Soaked:
+    """So many trials, with seeds from this one on."""
+    expected = []
+    for number, study in enumerate((FAKED_STUDY, LONG_STUDY)):
+        arguments = [*study.arguments, "-o", f"whole{number}.nc"]
+        assert run_to_end(0, arguments, folder, {**study.environment, "FAKE_SECONDS": "0"}).status == 0
+        expected.append(results(folder / arguments[-1]))
+    same, n_kills, wrong, losses = 0, 0, [], Losses()
     for first in range(seed, seed + count, AT_ONCE):
         seeds = range(first, min(first + AT_ONCE, seed + count))
         with ThreadPoolExecutor(AT_ONCE) as pool:
-            found = list(pool.map(lambda one: kill_and_go_on(study, folder / str(one), one), seeds))
+            found = list(pool.map(lambda one: _trial(one, folder / str(one)), seeds))
         # netCDF does not like threads: the files are opened here
         for one, how in zip(seeds, found, strict=True):
-            if how.startswith("killed") and _is_same(folder / str(one) / "out.nc", expected):
+            path = folder / str(one)
+            if how.startswith("killed") and results(path / "out.nc").identical(expected[_is_long(one)]):
                 same += 1
                 n_kills += int(how.split()[1])
             else:
                 wrong.append(f"seed {one}: {how}")
-            shutil.rmtree(folder / str(one))
-    return same, n_kills, wrong
+            losses = all_losses([losses, find_losses(path)])
+            shutil.rmtree(path)
+    return Soaked(same, n_kills, tuple(wrong), losses)
 
 
-def _is_same(path: Path, expected: xr.Dataset) -> bool:
-    return results(path).identical(expected)
+def _is_long(seed: int) -> bool:
+    return seed % _LONG_EVERY == _LONG_EVERY - 1
+
+
+def _trial(seed: int, folder: Path) -> str:
+    return kill_and_go_on(LONG_STUDY if _is_long(seed) else FAKED_STUDY, folder, seed)
 
 
 def main() -> int:
-    """Prints what came of it; 1 where a result is another one."""
+    """Prints what came of it; 1 where a result is another one, or too much was lost."""
     count, seed = (int(sys.argv[place]) if len(sys.argv) > place else default for place, default in ((1, 1000), (2, 0)))
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
-        same, n_kills, wrong = soak(count, seed, Path(name))
-    print(f"{same} of {count} identical after {n_kills} kills, {time.monotonic() - began:.0f} s", *wrong, sep="\n")
-    return 1 if wrong else 0
+        done = soak(count, seed, Path(name))
+    print(f"{done.same} of {count} identical after {done.n_kills} kills, {time.monotonic() - began:.0f} s")
+    print(*done.wrong, done.losses, sep="\n")
+    return 1 if done.wrong or done.losses.broken.total() else 0
 
 
 if __name__ == "__main__":

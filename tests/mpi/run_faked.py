@@ -5,7 +5,8 @@ FAKE_FAILURE: rank whose first march gives more results than it should: a bug, w
 others wait for that.
 FAKE_TOGETHER: no march goes on before as many ranks have had one.
 FAKE_STEPS: every march takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
-takes two. Each step is noted in a file, and what was gone on from in another one.
+takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
+FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
 FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
 to the fourth one where "in branch" stands behind.
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
@@ -37,6 +38,7 @@ from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.system import progress
+from tests.mpi.losses import DONE
 from tests.studyrunner.fakes import changed, fake_branch, fake_evaluate
 
 BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)
@@ -65,9 +67,11 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
                     continue
                 if n_steps:
                     time.sleep(2.0 * seconds)
-                    note_step()
+                    note_step(task, place)
                 if started.position in left:
                     left.remove(started.position)
+                    if n_steps:
+                        note_done("result", task, started.position)
                     yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
                 if n_steps:
                     keep(Packed("branch", (np.array([place + 1.0]),)))
@@ -93,6 +97,8 @@ def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iter
                 for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
                     with Path(name).open("a", encoding="utf-8") as file:
                         file.write(f"{result.values['run_time']}\n")
+            if n_steps:
+                note_done("result", task, result.place)
             yield changed(result, error_estimate=carried)
 
     return evaluate
@@ -114,15 +120,22 @@ def walk(task: MarchTask, n_steps: int, seconds: float, keep: Keep) -> float:
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
         time.sleep(seconds)
-        note_step()
+        note_step(task, step)
         keep(Packed("march", (np.array([step + 1.0, carried]),)))
     return carried
 
 
-def note_step() -> None:
+def note_step(task: BranchTask | MarchTask, number: int) -> None:
     """A line for every step of any rank."""
     with Path("steps.txt").open("a", encoding="ascii") as file:
         file.write("step\n")
+    note_done("step", task, number)
+
+
+def note_done(what: str, task: BranchTask | MarchTask, number: int) -> None:
+    """When a step or a result of a task was finished, before anybody hears of it."""
+    with Path(DONE).open("a", encoding="ascii") as file:
+        file.write(f"{time.time()} {what} {task.key} {number}\n")
 
 
 def meet(n_ranks: int) -> None:
@@ -163,7 +176,7 @@ def wait_until(condition: Callable[[], bool], patience: float) -> None:
 
 if __name__ == "__main__":
     run.build_evaluator = build_fake
-    schedule.SECONDS_TO_PROGRESS = 0.03
+    schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
     if "FAKE_TELLING" in os.environ:
         progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])
     if "FAKE_NOTHING" in os.environ and launcher_rank() == 0:

@@ -84,6 +84,23 @@ def test_crashes_are_counted_until_the_run_starts_over(tmp_path: Path) -> None:
     assert (results(tmp_path / "out.nc").outcome == Outcome.CRASHED).sum() == 1
 
 
+def test_what_crashes_twice_after_it_was_tried_again_has_failed_again(whole: xr.Dataset, tmp_path: Path) -> None:
+    """Else --retry-failed would end at the same task for ever; a run without it in between changes nothing."""
+    crash = {"FAKE_CRASH": "abort"}
+    for _ in range(2):
+        assert run_to_end(0, STUDY, tmp_path, crash).status == -signal.SIGABRT
+    assert run_to_end(0, STUDY, tmp_path, crash).status == 3
+    retry = [*STUDY, "--retry-failed"]
+    assert run_to_end(0, retry, tmp_path, crash).status == -signal.SIGABRT
+    assert run_to_end(0, STUDY, tmp_path, crash).status == 3
+    assert run_to_end(0, retry, tmp_path, crash).status == -signal.SIGABRT
+    assert run_to_end(0, retry, tmp_path, crash).status == 3
+    assert results(tmp_path / "out.nc").squeeze().outcome.values.tolist() == [0, Outcome.CRASHED, 0, 0, 0]
+    assert left_of_crashes(tmp_path) == []
+    assert run_to_end(0, retry, tmp_path).status == 0
+    assert results(tmp_path / "out.nc").identical(whole)
+
+
 def is_at_a_task(folder: Path, n_ranks: int) -> bool:
     """Whether the last rank has been given one."""
     notes = [path for path in folder.glob("*.parts/*.crash") if path.name == f"rank-{max(0, n_ranks - 1)}.crash"]

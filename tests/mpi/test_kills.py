@@ -17,7 +17,9 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
+from studyrunner.mpi.schedule import SECONDS_TO_PROGRESS
 from tests.mpi.launching import CHEAP, FAKED, Ended, Running, results, run_to_end
+from tests.mpi.losses import note_end, note_kill
 
 AT_ONCE = 4  # runs side by side: they sleep as long as they compute
 MOST_RUNS = 8
@@ -50,6 +52,19 @@ FAKED_STUDY = Disturbed(
     n_steps=2 * 4 + 4 * N_POINTS,
     latest=2.0,
 )
+LONG_STUDY = Disturbed(
+    (
+        *(FAKED, *CHEAP),
+        *("--set", "axes.frequency=[100, 110]"),
+        *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
+        *("--set", "axes.scheme=['implicit']"),
+    ),
+    {"FAKE_STEPS": "25", "FAKE_SECONDS": "0.2", "FAKE_PROGRESS": str(SECONDS_TO_PROGRESS)},
+    n_steps=2 + 25 * 6,
+    latest=10.0,
+)
+"""Goes on for 10 to 30 s, and says as often as any other how far its tasks are."""
+
 REAL_STUDY = Disturbed(
     (
         *("-m", "studyrunner.cli", "sdof_slider"),
@@ -95,6 +110,7 @@ def kill_one(study: Disturbed, folder: Path, chance: random.Random) -> Callable[
             time.sleep(chance.uniform(0.0, study.latest))
         victims = [running.process.pid, *running.ranks().values()]
         if running.process.poll() is None:
+            note_kill(folder)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(chance.choice(victims), signal.SIGKILL)
 
@@ -112,6 +128,7 @@ def kill_and_go_on(study: Disturbed, folder: Path, seed: int) -> str:
         disturb = kill_one(study, folder, chance) if kills else lambda _: None
         n_ranks = chance.choice([2, 2, 3]) if attempt == 0 else chance.choice([0, 2])
         ended = run_to_end(n_ranks, [*study.arguments, "-o", "out.nc"], folder, study.environment, disturb)
+        note_end(folder)
         if ended.status == 0 and n_killed == 0:
             # it was faster than the one that was to kill it
             shutil.rmtree(folder)

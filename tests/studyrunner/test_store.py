@@ -407,7 +407,7 @@ def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(
         raise OSError(5, "Input/output error")
 
     with monkeypatch.context() as broken:
-        broken.setattr(stock, "load_records", fail)
+        broken.setattr(stock, "load_record_keys", fail)
         with pytest.raises(StorageError, match="Input/output error"):
             Store(folder, KIND)
     store = Store(folder, KIND)

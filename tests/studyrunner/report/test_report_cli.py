@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -102,6 +104,54 @@ def test_an_interrupt_is_one_line(
     monkeypatch.setattr(gallery, "draw_report", interrupt)
     assert main(["results/worn.x.nc"]) == INTERRUPTED
     assert capsys.readouterr().err == "study-report: interrupted\n"
+
+
+APART = """
+import ctypes, os, signal, sys, time
+from studyrunner.report import gallery
+from studyrunner.report.cli import main
+gallery.draw_report = lambda _: {}
+sys.exit(main())
+"""
+
+
+def start_apart(drawing: str, folder: Path) -> subprocess.Popen[str]:
+    """The command, as a shell starts it, with an expression in place of its drawings."""
+    command = [sys.executable, "-c", APART.format(drawing), "results/worn.x.nc"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=folder, env=environment, stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("drawing", "status", "said"),
+    [
+        ("ctypes.string_at(0)", BAD_INPUT, "results/worn.x.nc: the file = damaged: give a result file that is whole\n"),
+        ("os.abort()", BAD_INPUT, "results/worn.x.nc: the file = damaged: give a result file that is whole\n"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", UNEXPECTED, "ended by signal 9 (Killed)\n"),
+        ("[]", WRITTEN, ""),
+    ],
+)
+def test_a_crash_of_a_library_while_it_draws_is_one_line(drawing: str, status: int, said: str, short: Path) -> None:
+    """A file may be damaged where nobody has looked before: most of a large variable is read for the drawings only."""
+    with start_apart(drawing, short) as started:
+        out, error = started.communicate()
+    assert (started.returncode, error) == (status, f"study-report: {said}" if said else "")
+    assert bool(out) == (status == WRITTEN)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_ends_the_command_ends_the_process_that_draws(number: signal.Signals, short: Path) -> None:
+    with start_apart("print(os.getpid(), flush=True) or time.sleep(600)", short) as started:
+        assert started.stdout is not None
+        drawing = int(started.stdout.readline())
+        started.send_signal(number)
+        _, error = started.communicate()
+    assert (started.returncode, error) == (INTERRUPTED, "study-report: interrupted\n")
+    with pytest.raises(ProcessLookupError):
+        os.kill(drawing, 0)
 
 
 def test_help_has_examples_and_does_not_load_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:
