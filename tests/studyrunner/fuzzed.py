@@ -91,11 +91,12 @@ def read_mutations(made: Path, seed: int, numbers: range, kinds: Mapping[str, fl
     """What a process finds in the inputs of these numbers; it is started again where one of them ends it."""
     folder = made / f"{numbers.start}"
     folder.mkdir()
-    for name in _FILES:
-        shutil.copy(made / name, folder)
     parts = []
     first = numbers.start
     while first < numbers.stop:
+        (folder / "number").unlink(missing_ok=True)
+        for name in _FILES:
+            shutil.copy(made / name, folder)
         arguments = [str(folder), str(seed), str(first), str(numbers.stop), json.dumps(kinds)]
         done = subprocess.run(
             [sys.executable, "-m", "tests.studyrunner.fuzzing", *arguments],
@@ -110,9 +111,10 @@ def read_mutations(made: Path, seed: int, numbers: range, kinds: Mapping[str, fl
             parts.append(Found(**{**said, "statuses": Counter(said["statuses"]), "wrong": tuple(said["wrong"])}))
             break
         at = (folder / "number").read_text(encoding="ascii")
-        kind, _, number = at.split()
-        statuses = Counter({"uncounted": int(number) - first, f"{kind} {done.returncode}": 1})
-        parts.append(Found(statuses, (f"{at}: the process ended: {done.returncode} {done.stderr[-1500:]}",)))
+        *making, kind, _, number = at.split()
+        ended = "not made" if making else str(done.returncode)
+        wrong = () if making else (f"{at}: the process ended: {done.returncode} {done.stderr[-1500:]}",)
+        parts.append(Found(Counter({"uncounted": int(number) - first, f"{kind} {ended}": 1}), wrong))
         first = int(number) + 1
     shutil.rmtree(folder)
     return together(parts)

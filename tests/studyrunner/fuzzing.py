@@ -211,6 +211,8 @@ def run(folder: Path, seed: int, numbers: Sequence[int], kinds: Mapping[str, flo
     for number in numbers:
         chance = random.Random(f"{seed} {number}")
         kind = chance.choices(list(kinds), list(kinds.values()))[0]
+        # what is made of a file may crash the library that makes it
+        Path("number").write_text(f"making {kind} {seed} {number}", encoding="ascii")
         _mutate(kind, whole, chance)
         Drawing.save = painted if chance.random() < PAINTED else _lay_out  # type: ignore[method-assign]
         Path("number").write_text(f"{kind} {seed} {number}", encoding="ascii")
