@@ -32,7 +32,7 @@ class Parameters(BaseModel):
         description="stiffness of the retainer that keeps the root from sliding along its slot;"
         " if not given 1e7 under a travelling wave and 0 at nodal diameter 0, N/m",
     )
-    mesh: int = Field(2, ge=1, le=3, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
+    mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
     stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction, -")
 

@@ -7,7 +7,8 @@ leads as the disk turns about +z), then extrados; from the leading to the traili
 end.
 
 The default mesh density 2 has 2 x 8 x 3 pairs; 1 has 2 x 4 x 2 and frequencies up to 7 % higher, enough for trying
-things out; 3 has 2 x 12 x 4 and frequencies within 2 % of the default ones, at about five times the effort.
+things out; 3 has 2 x 12 x 4 and frequencies within 2 % of the default ones, at about five times the effort; 4
+has 2 x 16 x 5 and the finest, 8, has 2 x 32 x 9.
 
 The blade is excited and observed at mid-chord of its tip, perpendicular to the chord, positive to the intrados.
 """
@@ -15,7 +16,6 @@ The blade is excited and observed at mid-chord of its tip, perpendicular to the 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.scene_answers import N_MODES, NaturalFrequencies, SurfaceMesh
@@ -24,9 +24,9 @@ from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chor
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
 from studies.scenes.finite_element.assembly import SectorMatrices, assemble_geometric_stiffness, assemble_sector
 from studies.scenes.finite_element.contact_pairs import ContactPairs, build_contact_pairs, join_pairs
-from studies.scenes.finite_element.cyclic import CyclicSector, build_coordinates
+from studies.scenes.finite_element.cyclic import CyclicSector
 from studies.scenes.finite_element.hex_element import HexElements, elasticity_matrix
-from studies.scenes.finite_element.reduction import build_basis, glued_frequencies, project, solve_glued
+from studies.scenes.finite_element.reduction import GluedSectorError, SectorReduction, order_sector, solve_glued
 from studies.scenes.finite_element.surface import outer_faces
 
 __all__ = ["Parameters", "build"]
@@ -50,10 +50,10 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     check_parameters(parameters)
     mesh = build_dovetail_mesh(parameters)
     pairs = build_pairs(mesh)
-    sector = build_sector(parameters, mesh)
-    matrices, stiffness = _sector_matrices(parameters, mesh, sector, pairs)
+    reduction, matrices = _prepare(parameters, mesh, pairs)
+    elastic = matrices.stiffness if parameters.stress_stiffening else None
     load = parameters.angular_speed**2 * matrices.load
-    tip = tip_row(parameters, mesh)
+    vectors = np.stack([load, tip_row(parameters, mesh)], axis=1)
     excited = parameters.nodal_diameter
     wanted = needed_nodal_diameters(excited, parameters.n_sectors, n_harmonics)
     linear: dict[int, LinearModel] = {}
@@ -61,21 +61,20 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     # The excited nodal diameter first: the damping of all of them is scaled by its first frequency.
     for k in sorted({excited, *wanted}, key=lambda k: (k != excited, k)):
         try:
-            coordinates = build_coordinates(sector, pairs, k)
-            basis = build_basis(stiffness, matrices.mass, coordinates, parameters.stuck_modes)
-        except ValueError as error:
+            reduced = reduction.reduce(k, parameters.stuck_modes, elastic, vectors)
+        except GluedSectorError as error:
             raise SceneError("rotation_speed", str(parameters.rotation_speed), f"reduce it: {error}") from error
         if k == excited:
-            damping = parameters.loss_factor / basis.frequencies[0]
+            damping = parameters.loss_factor / reduced.frequencies[0]
         if k in wanted:
-            nodes = basis.nodal
+            static, tip = reduced.vectors.T
             linear[k] = LinearModel(
-                mass=project(matrices.mass, nodes),
-                damping=damping * project(matrices.stiffness, nodes),
-                stiffness=_retained(project(stiffness, nodes), pairs, parameters.retainer),
-                load_static=(nodes.real.T @ load) * (k == 0),
-                load_harmonic=(nodes.conj().T @ tip).astype(complex) * (k == excited),
-                response=(tip @ nodes)[None, :],
+                mass=reduced.mass,
+                damping=damping * reduced.elastic,
+                stiffness=_retained(reduced.stiffness, pairs, parameters.retainer),
+                load_static=static.real * (k == 0),
+                load_harmonic=tip.astype(complex) * (k == excited),
+                response=tip.conj()[None, :],
             )
     n_contact = len(pairs.area)
     return ReducedModel(
@@ -117,16 +116,14 @@ def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
     """
     check_parameters(parameters)
     mesh = build_dovetail_mesh(parameters)
-    pairs, sector = build_pairs(mesh), build_sector(parameters, mesh)
-    matrices, stiffness = _sector_matrices(parameters, mesh, sector, pairs)
+    reduction, _ = _prepare(parameters, mesh, build_pairs(mesh))
     nodal_diameters = tuple(range(parameters.n_sectors // 2 + 1))
     frequencies = np.empty((len(nodal_diameters), N_MODES))
     for k in nodal_diameters:
         try:
-            found = glued_frequencies(stiffness, matrices.mass, build_coordinates(sector, pairs, k), N_MODES)
-        except ValueError as error:
+            frequencies[k] = reduction.frequencies(k, N_MODES) / (2.0 * np.pi)
+        except GluedSectorError as error:
             raise SceneError("rotation_speed", str(parameters.rotation_speed), f"reduce it: {error}") from error
-        frequencies[k] = found / (2.0 * np.pi)
     return NaturalFrequencies(nodal_diameters, frequencies)
 
 
@@ -143,21 +140,21 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retention_stiffness: float
     return stiffness + retention_stiffness * np.outer(axial, axial)
 
 
-def _sector_matrices(
-    parameters: Parameters, mesh: DovetailMesh, sector: CyclicSector, pairs: ContactPairs
-) -> tuple[SectorMatrices, sparse.csr_matrix]:
-    """Matrices at rest, and the stiffness (3 n_nodes, 3 n_nodes), N/m, with the effects of rotation if wanted."""
+def _prepare(parameters: Parameters, mesh: DovetailMesh, pairs: ContactPairs) -> tuple[SectorReduction, SectorMatrices]:
+    """The sector with the effects of rotation if wanted, to be reduced, and its matrices at rest."""
     try:
         hexes = build_elements(parameters, mesh)
     except ValueError as error:
         raise SceneError("mesh", str(parameters.mesh), f"change the geometry: {error}") from error
     matrices = assemble_sector(mesh.mesh, hexes)
-    if not parameters.stress_stiffening:
-        return matrices, matrices.stiffness
-    rotation = parameters.angular_speed**2
-    glued = solve_glued(matrices.stiffness, rotation * matrices.load, build_coordinates(sector, pairs, 0))
-    geometric = assemble_geometric_stiffness(mesh.mesh, hexes, glued)
-    return matrices, matrices.stiffness + geometric - rotation * matrices.spin_mass
+    ordered = order_sector(build_sector(parameters, mesh), pairs, matrices.stiffness, mesh.stations)
+    stiffness = matrices.stiffness
+    if parameters.stress_stiffening:
+        rotation = parameters.angular_speed**2
+        displacements = solve_glued(ordered, matrices.stiffness, rotation * matrices.load)
+        geometric = assemble_geometric_stiffness(mesh.mesh, hexes, displacements)
+        stiffness = stiffness + geometric - rotation * matrices.spin_mass
+    return SectorReduction(ordered, stiffness, matrices.mass), matrices
 
 
 def build_elements(parameters: Parameters, mesh: DovetailMesh) -> HexElements:

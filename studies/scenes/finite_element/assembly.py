@@ -29,38 +29,52 @@ class SectorMatrices:
     it is the spin softening. load (3 n_nodes,): centrifugal load at Omega = 1 rad/s, N s2.
     """
 
-    stiffness: sparse.csr_matrix
-    mass: sparse.csr_matrix
-    spin_mass: sparse.csr_matrix
+    stiffness: sparse.bsr_matrix
+    mass: sparse.bsr_matrix
+    spin_mass: sparse.bsr_matrix
     load: FloatArray
 
 
-def assemble(element_matrices: FloatArray, elements: IntArray, n_nodes: int) -> sparse.csr_matrix:
-    """Sum of element matrices: (n_elements, 8, 8) gives (n_nodes, n_nodes), (n_elements, 24, 24) three times that."""
+def assemble(element_matrices: FloatArray, elements: IntArray, n_nodes: int) -> sparse.bsr_matrix:
+    """Sum of element matrices: (n_elements, 8, 8) gives (n_nodes, n_nodes), (n_elements, 24, 24) three times that.
+
+    There is one block for each two nodes that share an element.
+    """
     per_node = element_matrices.shape[1] // 8
-    dofs = (per_node * elements[:, :, None] + np.arange(per_node)).reshape(len(elements), -1)
-    n_local, n_dofs = dofs.shape[1], per_node * n_nodes
-    rows = np.repeat(dofs, n_local, axis=1).ravel()
-    columns = np.tile(dofs, (1, n_local)).ravel()
-    return sparse.csr_matrix((element_matrices.ravel(), (rows, columns)), shape=(n_dofs, n_dofs))
+    blocks = element_matrices.reshape(-1, 8, per_node, 8, per_node).transpose(0, 1, 3, 2, 4).reshape(-1, per_node**2)
+    key = (elements[:, :, None] * n_nodes + elements[:, None, :]).ravel()
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    # Adds the blocks that stand at the same place.
+    add = sparse.csr_matrix((np.ones(len(key)), order, np.append(first, len(key))), shape=(len(first), len(key)))
+    starts = np.searchsorted(key[first], np.arange(n_nodes + 1) * n_nodes)
+    data = (add @ blocks).reshape(-1, per_node, per_node)
+    return sparse.bsr_matrix((data, key[first] % n_nodes, starts), shape=(per_node * n_nodes,) * 2)
+
+
+def _in_directions(scalar: sparse.bsr_matrix, weights: FloatArray) -> sparse.bsr_matrix:
+    """The matrix (3 n_nodes, 3 n_nodes) with the blocks `weights` (3, 3) times each entry of a scalar one."""
+    blocks = scalar.data * weights
+    return sparse.bsr_matrix((blocks, scalar.indices, scalar.indptr), shape=(3 * scalar.shape[0],) * 2)
 
 
 def assemble_sector(mesh: HexMesh, hexes: HexElements) -> SectorMatrices:
     """Elastic stiffness, mass and centrifugal load of the elements `hexes` of the mesh; the rotation is about z."""
     n_nodes = len(mesh.nodes)
     scalar_mass = assemble(hexes.mass(), mesh.elements, n_nodes)
-    spin_mass = sparse.kron(scalar_mass, IN_PLANE, format="csr")
+    spin_mass = _in_directions(scalar_mass, IN_PLANE)
     return SectorMatrices(
         stiffness=assemble(hexes.stiffness(), mesh.elements, n_nodes),
-        mass=sparse.kron(scalar_mass, np.eye(3), format="csr"),
+        mass=_in_directions(scalar_mass, np.eye(3)),
         spin_mass=spin_mass,
         # Isoparametric elements: the integral of N rho x is exactly the consistent mass times the nodal positions.
         load=spin_mass @ mesh.nodes.ravel(),
     )
 
 
-def assemble_geometric_stiffness(mesh: HexMesh, hexes: HexElements, displacements: FloatArray) -> sparse.csr_matrix:
+def assemble_geometric_stiffness(mesh: HexMesh, hexes: HexElements, displacements: FloatArray) -> sparse.bsr_matrix:
     """Geometric stiffness (3 n_nodes, 3 n_nodes), N/m, of the linear stress under `displacements` (3 n_nodes,) in m."""
     local = displacements.reshape(-1, 3)[mesh.elements].reshape(len(mesh.elements), 24)
     scalar = assemble(hexes.geometric_stiffness(hexes.stress(local)), mesh.elements, len(mesh.nodes))
-    return sparse.kron(scalar, np.eye(3), format="csr")
+    return _in_directions(scalar, np.eye(3))

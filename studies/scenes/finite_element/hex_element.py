@@ -11,7 +11,8 @@ in the order of `CORNERS`: counterclockwise at zeta = -1, then the same at zeta 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +23,8 @@ CORNERS: FloatArray = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
 )
 GAUSS_POINTS: FloatArray = CORNERS / np.sqrt(3.0)
+# Elements computed at a time, so that what is kept of them on the way stays in the cache.
+_BATCH = 128
 # Row of the strain vector, direction of the displacement, direction of the derivative.
 _STRAIN_TERMS = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 0, 1), (3, 1, 0), (4, 1, 2), (4, 2, 1), (5, 0, 2), (5, 2, 0))
 
@@ -130,8 +133,15 @@ class HexElements:
             return self._strains
         return self._strains + self._incompatible_strains @ self._incompatible_from_nodes
 
+    def _batches(self) -> Iterator[HexElements]:
+        for first in range(0, len(self.coordinates), _BATCH):
+            yield replace(self, coordinates=self.coordinates[first : first + _BATCH])
+
     def stiffness(self) -> FloatArray:
         """Stiffness matrices (n_elements, 24, 24), N/m, displacements node by node in x, y, z."""
+        return np.concatenate([batch._stiffness() for batch in self._batches()])
+
+    def _stiffness(self) -> FloatArray:
         weights = np.repeat(self.volumes, 6, axis=1)[:, :, None]
         strains = self._effective_strains
         matrices = np.swapaxes(strains, 1, 2) @ (self._stresses(strains) * weights)
@@ -145,11 +155,18 @@ class HexElements:
 
     def stress(self, displacements: FloatArray) -> FloatArray:
         """Stress (n_elements, 8 points, 6), Pa, under nodal displacements (n_elements, 24) in m."""
-        strains = self._effective_strains @ displacements[:, :, None]
-        return self._stresses(strains).reshape(-1, 8, 6)
+        parts = []
+        for number, batch in enumerate(self._batches()):
+            moved = displacements[number * _BATCH : (number + 1) * _BATCH, :, None]
+            parts.append(batch._stresses(batch._effective_strains @ moved).reshape(-1, 8, 6))
+        return np.concatenate(parts)
 
     def geometric_stiffness(self, stress: FloatArray) -> FloatArray:
         """Geometric stiffness (n_elements, 8, 8), N/m, the same for the three directions, of a stress from `stress`."""
-        tensor = stress[:, :, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] * self.volumes[:, :, None, None]
-        terms = self.gradients @ tensor @ np.swapaxes(self.gradients, -1, -2)
-        return np.asarray(terms.sum(axis=1))
+        parts = []
+        for number, batch in enumerate(self._batches()):
+            own = stress[number * _BATCH : (number + 1) * _BATCH]
+            tensor = own[:, :, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] * batch.volumes[:, :, None, None]
+            terms = batch.gradients @ tensor @ np.swapaxes(batch.gradients, -1, -2)
+            parts.append(terms.sum(axis=1))
+        return np.concatenate(parts)

@@ -1,0 +1,1 @@
+"""Static condensation of sparse structures: nested dissection, elimination in dense blocks, projection, modes."""
