@@ -5,10 +5,12 @@ which the pairs stick, and these on all vibration before. A sweep therefore walk
 by what happens to the tangential history, and by nothing else. A state that is asked for between two nodes is reached
 from the node before it and leaves the walk as it is, so that a point has the same state whatever else is asked for.
 
-Every second node is also reached in one step from the second but last, with fewer harmonics and samples where these
-are automatic. This coarse walk, which is never corrected by the other one, shows what the steps of the sweep and its
-harmonics are wrong by: the error falls with the length of the steps, so that the difference of both is the error of
-the coarse one, and at least that of the fine one.
+A coarse walk goes beside it, in steps of twice the length and with fewer harmonics and samples where these are
+automatic; it is never corrected by the other one. What the steps of a sweep do wrong is that a pair which sticks from
+some frequency on keeps the history of the last node at which it slipped, which is up to a step too early. The nodes
+of the coarse walk therefore lie midway between those of the fine one: with nodes in common both walks would often
+take the same history of a pair from the same node and agree by chance. The difference of both is then at least half
+the error of the fine walk, and as a rule that of the coarse one.
 """
 
 from __future__ import annotations
@@ -218,6 +220,8 @@ class Sweep:
 
     def _advance(self, step: Step) -> None:
         """Make the next node the current one."""
+        before_node = self.here
+        assert before_node is not None
         self.here, self.ahead = step.point, None
         self.branch += len(step.folds)
         self.fold = step.folds[-1] if step.folds else self.fold
@@ -227,7 +231,7 @@ class Sweep:
             # behind a jump both walks begin anew: where the coarse one jumps says nothing of the steps
             self._begin_coarse()
         elif self.n_nodes % 2 == 0 and self.coarse is not None:
-            target = step.point.parameter
+            target = 0.5 * (before_node.parameter + step.point.parameter)
             coarse = self.coarse_route.step(self.coarse, target, self.coarse_solver, self.effort)
             if isinstance(coarse, Outcome) or coarse.folds:
                 # one that does not arrive, or jumps, goes on from the other

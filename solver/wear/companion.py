@@ -48,6 +48,7 @@ class Lag(TypedDict):
     waiting: int
     followed: Resolution
     start_error: float
+    spare: int
     met: list[tuple[float, float]]
 
 
@@ -67,7 +68,8 @@ class Companion:
     start_error: difference of the wear rates of both start states, pair by pair, over that of the joint: a later state
     that happens to be the same does not make the start better known. met: counts at which it has come to the history,
     and the difference of both there, as volume of all pairs, m3. waiting: steps of the history that it has still to
-    follow. followed: harmonics and samples of the history for which its own were chosen.
+    follow. spare: Newton iterations that it may have taken beyond those of the history. followed: harmonics and
+    samples of the history for which its own were chosen.
     """
 
     def __init__(self, main: Trajectory, start: StartState, cycles: FloatArray) -> None:
@@ -83,6 +85,7 @@ class Companion:
         self.start_error = 0.0
         self.met: list[tuple[float, float]] = []
         self.waiting = 0
+        self.spare = WEAR.companion_spare
         self.followed = main.case.resolution
         self.steps: AdaptiveSteps | None = None
 
@@ -121,8 +124,10 @@ class Companion:
             return
         self.waiting = 0
         self.effort.deadline = self.main.effort.deadline
-        # one that has spent more is lost between jumps
-        lost = self.effort.iterations > self.main.effort.iterations + WEAR.companion_spare
+        # one that has spent more is lost between jumps; behind them it may be found again
+        lost = self.effort.iterations > self.main.effort.iterations + self.spare
+        if lost and self.spare < WEAR.companion_most_spare:
+            self.spare = self.effort.iterations - self.main.effort.iterations + WEAR.companion_spare
         lost = lost or (self.main.case.resolution != self.followed and not self._take_case())
         if lost or not self._catch_up():
             self._begin_anew()

@@ -72,6 +72,9 @@ class WearOptions:
     """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
     companion_spare: int = 500
     """Newton iterations that the companion may take beyond those of the history: more, and it is lost between jumps."""
+    companion_most_spare: int = 2500
+    """The same, beyond which it is not followed again and the history counts as one that no other computation confirms.
+    A travelling wave at its resonance: lost once, in a corner within the first 500 cycles, and found again."""
 
 
 WEAR = WearOptions()

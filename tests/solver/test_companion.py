@@ -19,6 +19,7 @@ from solver.results.recorder import _before
 from solver.settings import Scheme, SolverSettings
 from solver.wear import march as march_module
 from solver.wear import trajectory
+from solver.wear.companion import Companion
 from solver.wear.march import march_wear
 from solver.wear.trajectory import Trajectory
 from tests.references import slider_amplitude, slider_wear_depth
@@ -197,3 +198,27 @@ def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkey
     rates = np.array(found[0.1])
     rates = rates[rates > 0.3 * rates.max()]
     assert (np.abs(np.diff(rates)) < 0.3 * np.maximum(rates[1:], rates[:-1])).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("detours", "found_again"), [(1, True), (100, False)])
+def test_a_companion_that_was_lost_once_is_followed_again(
+    detours: int, found_again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = worn("implicit", 1000.0)
+    step, left = Companion._step, [detours]
+
+    def go_astray(self: Companion) -> bool:
+        if left[0] > 0 and self.trajectory.cycle > 0.0:
+            left[0] -= 1
+            self.effort.iterations += 1000
+        return step(self)
+
+    monkeypatch.setattr(Companion, "_step", go_astray)
+    model, found = start()
+    history = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+    assert np.array_equal(history.worn_volume, usual.worn_volume)
+    # what was worn while it was lost is not confirmed; once it is given up, nothing that comes after
+    assert usual.error_estimate < history.error_estimate
+    assert (history.error_estimate < 0.4) == found_again
+    assert (history.error_estimate > 0.8) == (not found_again)

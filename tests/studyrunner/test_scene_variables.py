@@ -11,6 +11,7 @@ import xarray as xr
 
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import dovetail_sector, scene_mesh
+from studies.scenes.finite_element.reduction import GluedSectorError, SectorReduction
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.output import parts_folder
@@ -131,9 +132,9 @@ def test_a_sector_that_spins_too_fast_is_bad_input(
     monkeypatch.chdir(tmp_path)
 
     def unstable(*_: object) -> None:
-        raise ValueError("the glued sector is unstable: spin softening exceeds its stiffness")
+        raise GluedSectorError("the glued sector is unstable: spin softening exceeds its stiffness")
 
-    monkeypatch.setattr(dovetail_sector, "glued_frequencies", unstable)
+    monkeypatch.setattr(SectorReduction, "frequencies", unstable)
     overrides = (*COARSE, "outputs.variables=['natural_frequency']")
     assert main(["dovetail", "-o", "out.nc", *(part for text in overrides for part in ("--set", text))]) == 2
     said = capsys.readouterr().err.splitlines()
