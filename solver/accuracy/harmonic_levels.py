@@ -24,7 +24,7 @@ def n_unknowns(resolution: Resolution, n_rel: int) -> int:
     return n_rel * (2 * len(resolution.orders) + 1)
 
 
-def room_for(unknowns: int, n_rel: int) -> float:
+def room_for(unknowns: float, n_rel: int) -> float:
     """Unknowns that a joint may have where one of 48 pairs may have `unknowns`: a large one has the same harmonics."""
     return unknowns * max(1.0, n_rel / ACCURACY.displacements_of_limits)
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import fewer, n_unknowns, room_for, shifted
+from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.harmonic_levels import room_for, shifted
 from solver.accuracy.level import Level
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
@@ -41,7 +41,14 @@ class Refined:
     accurate: bool
 
 
-def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoint, effort: Effort) -> Refined:
+def refine(
+    case: Case,
+    omega: float,
+    excitation_amplitude: float,
+    point: PathPoint,
+    effort: Effort,
+    most: float = ACCURACY.most_unknowns,
+) -> Refined:
     """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
 
     Parameters
@@ -54,6 +61,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         The state.
     effort
         Newton iterations spent are added to it.
+    most
+        Unknowns of a joint of 48 pairs up to which more harmonics are taken (`room_for`).
 
     Returns
     -------
@@ -91,7 +100,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         by_samples, finer = here.samples_error(effort)
         by_harmonics, richer = here.harmonics_error(effort, richer)
         above = shifted(resolution, 1)
-        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and _allowed(here, above)
+        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and _allowed(here, above, most)
         if richer is None and settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
             richer = here.by_homotopy(above, effort)
@@ -114,8 +123,8 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         next_level = None
         few = here.unknowns(shifted(resolution, 2)) <= ACCURACY.cheap_unknowns
-        most = begun + (ACCURACY.cheap_refinement_iterations if few else ACCURACY.refinement_iterations)
-        if wanted != resolution and _allowed(here, wanted) and effort.iterations < most:
+        limit = begun + (ACCURACY.cheap_refinement_iterations if few else ACCURACY.refinement_iterations)
+        if wanted != resolution and _allowed(here, wanted, most) and effort.iterations < limit:
             if finer is not None and finer.case.resolution == wanted:
                 next_level = finer
             elif richer is not None and richer.case.resolution == wanted:
@@ -126,7 +135,7 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
                 # what is not found from below may be found from above
                 next_level = richer.solve_at(wanted, effort)
             if next_level is None and settings.harmonics == settings.samples and richer is not None:
-                next_level = richer if _allowed(here, richer.case.resolution) else None
+                next_level = richer if _allowed(here, richer.case.resolution, most) else None
         if next_level is None:
             # slip that few samples see is no reason to give up a motion that is known
             judged = estimate.response if faint else estimate.largest
@@ -134,36 +143,18 @@ def refine(case: Case, omega: float, excitation_amplitude: float, point: PathPoi
         here = next_level
 
 
-def coarse_state(
-    refined: Refined, omega: float, excitation_amplitude: float, most: int, effort: Effort
-) -> Refined | None:
-    """The same state with so few harmonics that it has at most `most` unknowns (of 48 pairs); None where there is none.
-
-    omega: rad/s. excitation_amplitude: N. Its error is not known.
-    """
-    here = Level(refined.case, refined.case.joint(omega, excitation_amplitude), refined.point)
-    n_rel = here.joint.component_index.size
-    while n_unknowns(here.case.resolution, n_rel) > room_for(most, n_rel):
-        lower = fewer(here.case.resolution, here.case.settings)
-        level = here.solve_at(lower, effort) if lower != here.case.resolution else None
-        if level is None:
-            return None
-        here = level
-    return Refined(here.case, here.point, UNKNOWN, False)
-
-
 def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
     """Relative differences of response and wear rate of two states of one joint, judged like any error."""
     return Level(case, joint, one).difference(Level(case, joint, other))
 
 
-def _allowed(here: Level, resolution: Resolution) -> bool:
+def _allowed(here: Level, resolution: Resolution, most_unknowns: float) -> bool:
     """Whether "auto" may go on with these harmonics and samples."""
     if not here.case.model.holds(resolution.highest):
         return False
     n_rel = here.joint.component_index.size
     small = n_rel <= NEWTON.small_joint_displacements
-    most = room_for(ACCURACY.few_pairs_unknowns if small else ACCURACY.most_unknowns, n_rel)
+    most = room_for(min(most_unknowns, ACCURACY.few_pairs_unknowns) if small else most_unknowns, n_rel)
     if resolution.highest > ACCURACY.most_mixed_harmonics:
         # friction alone: motions that hit something take more in vain
         if not all(order % 2 for order in resolution.orders):

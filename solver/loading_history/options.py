@@ -43,6 +43,9 @@ class LoadingOptions:
     """Upper limit of that change: larger ones miss the states in which pairs let go."""
     aimed_history_change: float = 0.9
     """Of that change: what the length of the next step is chosen for."""
+    most_growth: float = 1.5
+    """Of the rate at which the history changes, from one step to the next: as far as it is foreseen (160 pairs, to the
+    resonance: 20 of 82 steps are sought more than once, 37 without)."""
     longest_sweep_step: float = 0.03
     """Of the parameter: longest step where nothing slips."""
     shortest_sweep_step: float = 2e-5

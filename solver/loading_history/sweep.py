@@ -20,9 +20,9 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer, n_unknowns, room_for
+from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
-from solver.accuracy.refinement import Refined, coarse_state, refine
+from solver.accuracy.refinement import Refined, refine
 from solver.contact.coulomb import STICK, friction_limit
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.loading_history.options import LOADING
@@ -42,6 +42,7 @@ class NodeState(TypedDict):
     coarse: PathPoint | None
     checked: PathPoint | None
     length: float
+    slope: float
     n_nodes: int
     n_walked: int
     branch: int
@@ -76,7 +77,7 @@ class Sweep:
         self.coarse: PathPoint | None = None
         self.checked: PathPoint | None = None
         self.ahead: Step | None = None
-        self.length = 0.0
+        self.length = self.slope = 0.0
         self.n_nodes = self.n_walked = 0
         self.saved: SweepState | None = None
         self.lost_at = float("nan")
@@ -208,8 +209,11 @@ class Sweep:
             if step is not None:
                 change = self._history_change(here, step.point)
                 if change <= most or at_last or (step.folds and length <= LOADING.free_step * scale):
-                    ratio = np.clip(aim / max(change, 1e-12), LOADING.most_shortening, LOADING.most_lengthening)
-                    self.length = length * float(ratio)
+                    # towards a resonance the history changes ever faster: as much faster as in the last step
+                    slope = max(change, 1e-12) / length
+                    growth = float(np.clip(slope / self.slope, 1.0, LOADING.most_growth)) if self.slope > 0.0 else 1.0
+                    ratio = np.clip(aim / (slope * growth * length), LOADING.most_shortening, LOADING.most_lengthening)
+                    self.length, self.slope = length * float(ratio), slope
                     return step
                 shorter = 0.8 * most / change
             elif at_last or self.effort.exhausted:
@@ -266,7 +270,9 @@ class Sweep:
         if not self.case.settings.automatic:
             return
         joint = self.route.joint_at(self.here.parameter)
-        refined = refine(self.case, joint.omega, joint.excitation_amplitude, self.here, self.effort)
+        # what the walk misses for want of harmonics shows in the difference to the coarse one
+        most = ACCURACY.coarse_unknowns
+        refined = refine(self.case, joint.omega, joint.excitation_amplitude, self.here, self.effort, most)
         fewest = first_resolution(self.case.settings)
         if refined.case.resolution.highest < fewest.highest:
             # a joint that sticks needs one harmonic, but the next node may be the first one that slips
@@ -277,10 +283,6 @@ class Sweep:
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
             )
             refined = refined if level is None else replace(refined, case=case, point=level)
-        n_rel = joint.component_index.size
-        if n_unknowns(refined.case.resolution, n_rel) > room_for(ACCURACY.costly_unknowns, n_rel):
-            most = ACCURACY.coarse_unknowns
-            refined = coarse_state(refined, joint.omega, joint.excitation_amplitude, most, self.effort) or refined
         if refined.case is not self.case:
             self._change_case(refined)
         else:

@@ -156,7 +156,7 @@ def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest
         (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
         (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
     ):
-        monkeypatch.setattr(sweep, "ACCURACY", replace(sweep.ACCURACY, costly_unknowns=200))
+        monkeypatch.setattr(sweep, "ACCURACY", replace(sweep.ACCURACY, coarse_unknowns=200))
         kept: list[tuple[frozenset[int], Packed]] = []
         whole: dict[int, StartState] = {}
 
