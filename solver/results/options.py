@@ -18,6 +18,9 @@ class ResultOptions:
     """The same. Short steps: 1/3; dovetail: 0.2 to 0.9."""
     adaptive_safety: float = 0.6
     """The same. Short steps: 1/3; dovetail: 0.05 to 0.4."""
+    unknown_wear_rate_error: float = 10.0
+    """Relative error that a wear rate counts with where it is not known at all, or only to more: as long as a single
+    state of a history is not known the others still say something."""
     start_safety: float = 3.0
     """Error of a worn volume over that of the wear rates of its start state, at least: it grows while the joint wears.
     Dovetail at 212.5 Hz, where the rates are known to 3 %: tangential histories changed pair by pair at random by as

@@ -127,7 +127,9 @@ class Recorder:
             # what the wear rates are wrong by for want of harmonics and samples, of all pairs together and of each
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)
-                self.truncation += half * value * float(np.nan_to_num(of.certificate.wear_rate_error))
+                wrong = min(of.certificate.wear_rate_error, RESULTS.unknown_wear_rate_error)
+                # of fixed harmonics and samples it may not have been estimated
+                self.truncation += half * value * (0.0 if np.isnan(wrong) else wrong)
                 self.pair_truncation = self.pair_truncation + half * gain * of.slip_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.slip_work)) for of in (before_report, report)]

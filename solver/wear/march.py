@@ -171,11 +171,17 @@ def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tup
     if history.error_estimate > SENSITIVE_ERROR:
         area = march.joint.contact.area
         volume, other = (1e9 * float(depth @ area) for depth in (history.wear_depth[-1], companion.kept[-1]))
-        known = history.error_estimate < 1.0
-        return Outcome.SENSITIVE, (
-            f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 with steps twice as long from the start state of a "
-            f"coarser sweep: {f'known to {100.0 * history.error_estimate:.2g} % only' if known else 'not known'}"
-        )
+        known = "not known" if history.error_estimate >= 1.0 else f"known to {100 * history.error_estimate:.2g} % only"
+        coarser = "steps twice as long from the start state of a coarser sweep"
+        if not np.isfinite(other):
+            return Outcome.SENSITIVE, f"worn volume {volume:.3g} mm3, {known}: {coarser} do not lead so far"
+        if abs(volume - other) < 0.5 * history.error_estimate * volume:
+            elsewhere = "where other pairs wear, or by other values on the way"
+            return (
+                Outcome.SENSITIVE,
+                f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 with {coarser}, {elsewhere}",
+            )
+        return Outcome.SENSITIVE, f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 with {coarser}: {known}"
     if march.inaccurate_from < float("inf"):
         what = "wear rate" if march.worst.wear_rate >= march.worst.response else "response"
         return Outcome.INACCURATE, (

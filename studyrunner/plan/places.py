@@ -24,9 +24,11 @@ def known_to(error: float) -> str:
 
 
 def describe_reach(last: float, end: float, error: float) -> str:
-    """How far a history was computed that ends early, and the relative error of the worn volume there."""
+    """How far a history was computed that ends early, and the relative error of the last worn volume that is known."""
     reached = f"computed up to cycle {show_count(last)} of {show_count(end)}"
-    return f"{reached}, the worn volume there to {show_percent(error)}" if last > 0.0 and error < math.inf else reached
+    # before the first count that was asked for nothing has worn, and that is known exactly
+    known = last > 0.0 and 0.0 < error < math.inf
+    return f"{reached}, the worn volume there to {show_percent(error)}" if known else reached
 
 
 def show_count(cycle: float) -> str:

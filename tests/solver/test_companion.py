@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -222,3 +223,37 @@ def test_a_companion_that_was_lost_once_is_followed_again(
     assert usual.error_estimate < history.error_estimate
     assert (history.error_estimate < 0.4) == found_again
     assert (history.error_estimate > 0.8) == (not found_again)
+
+
+@pytest.mark.parametrize(
+    ("other", "error", "said"),
+    [
+        (0.5, 0.6, "worn volume 1 mm3, but 0.5 mm3 with steps twice as long from the start state of a coarser sweep: "),
+        (0.9, 3.0, "worn volume 1 mm3, not known: 0.9 mm3 with steps twice as long from the start state of a coarser "),
+        (np.nan, 0.6, "worn volume 1 mm3, known to 60 % only: steps twice as long from the start state of a coarser "),
+    ],
+)
+def test_a_sensitive_volume_is_told_with_what_differs(other: float, error: float, said: str) -> None:
+    area = np.array([2.0])
+    march: Any = SimpleNamespace(joint=SimpleNamespace(contact=SimpleNamespace(area=area)))
+    history: Any = SimpleNamespace(error_estimate=error, wear_depth=np.array([[0.0], [0.5e-9]]))
+    companion: Any = SimpleNamespace(kept=np.array([[0.0], [0.5e-9 * other]]))
+    outcome, message = march_module._judge(march, history, companion)
+    assert outcome is Outcome.SENSITIVE
+    assert message.startswith(said)
+
+
+@pytest.mark.slow
+def test_a_state_whose_wear_rate_is_not_known_counts_for_its_own_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, report = worn("implicit", 1000.0), Trajectory.report
+
+    def not_known(self: Trajectory) -> Any:
+        known = report(self)
+        unknown = replace(known.certificate, wear_rate_error=np.inf)
+        return replace(known, certificate=unknown) if self.cycle == 1000.0 else known
+
+    monkeypatch.setattr(Trajectory, "report", not_known)
+    model, found = start()
+    history = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+    assert usual.error_estimate < history.error_estimate < 10.0
+    assert np.isfinite(history.worn_volume_error).all()
