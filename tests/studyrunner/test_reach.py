@@ -11,8 +11,8 @@ from studyrunner.plan.places import describe_reach
 
 @pytest.mark.parametrize(
     ("error", "said"),
-    [(0.05, "computed up to cycle 2 000 of 100 000, the worn volume there to 5 %"), (0.0, ""), (math.inf, "")],
+    [(0.05, "computed up to cycle 2000 of 100 000, the worn volume there to 5 %"), (0.0, ""), (math.inf, "")],
 )
 def test_a_volume_that_is_known_comes_with_its_error(error: float, said: str) -> None:
     reached = describe_reach(2000.0, 1e5, error)
-    assert reached == (said or "computed up to cycle 2 000 of 100 000")
+    assert reached == (said or "computed up to cycle 2000 of 100 000")
