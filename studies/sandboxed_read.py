@@ -20,7 +20,7 @@ from typing import NoReturn
 from studies.guards.search_path import search_path
 from studies.scene_error import SceneError
 
-LARGEST_MEMORY = 2**30
+LARGEST_MEMORY = 2**31
 """Bytes of address space for reading a file."""
 
 LONGEST = 2

@@ -3,7 +3,8 @@
 Numbers may be of any integer or floating type; complex ones are compounds `{r, i}`, as h5py, PyTables and netCDF4 write
 them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
 following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
-other than `n_sectors` and `nodal_diameter` are the user's own.
+other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: the coefficients
+of mass and stiffness.
 """
 
 from __future__ import annotations
@@ -200,16 +201,33 @@ def _read_linear(datasets: Mapping[str, h5py.Dataset], prefix: str, *, real: boo
     response = _read_matrix(datasets, f"{prefix}response/dofs", real)
     if response.ndim == 1:
         response = _selection(f"{prefix}response/dofs", response, len(stiffness))
-    damping_key = f"{prefix}damping"
     harmonic: ComplexArray = _read_numbers(datasets, f"{prefix}load/harmonic").astype(np.complex128)
+    mass = _read_matrix(datasets, f"{prefix}mass", real)
     return LinearModel(
-        mass=_read_matrix(datasets, f"{prefix}mass", real),
-        damping=_read_matrix(datasets, damping_key, real) if damping_key in datasets else np.zeros(stiffness.shape),
+        mass=mass,
+        damping=_read_damping(datasets, f"{prefix}damping", mass, stiffness, real=real),
         stiffness=stiffness,
         load_static=_read_real(datasets, f"{prefix}load/static"),
         load_harmonic=harmonic,
         response=response,
     )
+
+
+def _read_damping(
+    datasets: Mapping[str, h5py.Dataset], key: str, mass: Matrix, stiffness: Matrix, *, real: bool
+) -> Matrix:
+    """The matrix; or `a M + b K` from two coefficients a, 1/s, and b, s; or zeros where there is none."""
+    if key not in datasets:
+        return np.zeros(stiffness.shape)
+    damping = _read_matrix(datasets, key, real)
+    if damping.shape != (2,):
+        return damping
+    if np.iscomplexobj(damping) or not np.isfinite(damping).all():
+        raise SceneError(key, f"{damping[0]}, {damping[1]}", "give two finite numbers: of mass, 1/s, and stiffness, s")
+    if mass.shape != stiffness.shape:
+        # what fits not is said of the mass
+        return np.zeros(stiffness.shape)
+    return damping[0] * mass + damping[1] * stiffness
 
 
 def _selection(key: str, indices: Matrix, n: int) -> FloatArray:

@@ -108,6 +108,17 @@ def test_responses_can_be_indices(tmp_path: Path) -> None:
     assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
 
 
+def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path: Path) -> None:
+    linear = read_scene(changed(tmp_path, plain(), put("damping", np.array([3.0, 1e-5])))).linear[0]
+    assert np.array_equal(linear.damping, 3.0 * plain().linear[0].mass + 1e-5 * plain().linear[0].stiffness)
+
+
+@pytest.mark.parametrize("given", [np.array([np.nan, 1e-5]), np.array([1j, 1e-5])])
+def test_coefficients_of_damping_are_finite_and_real(tmp_path: Path, given: np.ndarray) -> None:
+    with pytest.raises(SceneError, match="two finite numbers"):
+        read_scene(changed(tmp_path, plain(), put("damping", given)))
+
+
 def test_other_types_of_numbers_are_read(tmp_path: Path) -> None:
     def change(file: h5py.File) -> None:
         put("contact/dofs", np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]], dtype=np.float64))(file)
