@@ -3,7 +3,7 @@
 Numbers may be of any integer or floating type; complex ones are compounds `{r, i}`, as h5py, PyTables and netCDF4 write
 them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
 following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
-other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: the coefficients
+other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
 of mass and stiffness.
 """
 
