@@ -227,7 +227,8 @@ def _read_damping(
     if mass.shape != stiffness.shape:
         # what fits not is said of the mass
         return np.zeros(stiffness.shape)
-    return damping[0] * mass + damping[1] * stiffness
+    combined: Matrix = damping[0] * mass + damping[1] * stiffness
+    return combined
 
 
 def _selection(key: str, indices: Matrix, n: int) -> FloatArray:

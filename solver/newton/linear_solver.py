@@ -144,7 +144,7 @@ class JacobianSolver:
 
         def product(vector: FloatArray) -> FloatArray:
             full[rows] = precondition(vector)
-            return tangent.apply(full)[rows].ravel()
+            return tangent.apply(full, roughly=True)[rows].ravel()
 
         # preconditioned from the right, so that the residual that GMRES watches is the true one
         solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts)

@@ -32,6 +32,7 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON
 from solver.structure.fourier import FourierBasis, build_basis
+from solver.structure.harmonic_stiffness import SingleArray
 from solver.structure.joint import Joint
 
 
@@ -45,15 +46,15 @@ class SampleMarch:
 
     joint: Joint
     basis: FourierBasis
-    inverse: FloatArray
-    coupling: FloatArray
+    inverse: SingleArray
+    coupling: SingleArray
     own: FloatArray
     carried: FloatArray
 
     def solve(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Step `T r` and change of the state `T_x r` (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
         spread = self.joint.to_pairs(right).reshape(-1, right.shape[1])
-        right_t = np.ascontiguousarray((spread @ self.basis.synthesis).T)
+        right_t = np.ascontiguousarray((spread @ self.basis.synthesis).T, np.float32)
         both_t = march_samples(self.inverse, self.coupling, self.own, self.carried, right_t, NEWTON.march_periods)
         step, state = (
             self.joint.to_relative((part_t.T @ self.basis.analysis).reshape(-1, 3, right.shape[1])) for part_t in both_t
@@ -113,12 +114,14 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
     coupling[joint.component_index, joint.component_index] -= 1.0
     blocks = np.ascontiguousarray(coupling.reshape(size, n_contact, 3).transpose(1, 0, 2))
-    matrix = np.empty((n_samples, size, size))
+    # in single precision: the matrices are read from memory at every solve, and this is only a preconditioner
+    matrix = np.empty((n_samples, size, size), np.float32)
     for sample in range(n_samples):
         matrix[sample] = np.matmul(blocks, own[sample]).transpose(1, 0, 2).reshape(size, size)
     matrix[:, np.arange(size), np.arange(size)] += 1.0
     basis = build_basis(joint.basis.orders, n_samples)
-    return SampleMarch(joint, basis, np.asarray(np.linalg.inv(matrix), np.float64), coupling, own, carried)
+    inverse = np.asarray(np.linalg.inv(matrix), np.float32)
+    return SampleMarch(joint, basis, inverse, coupling.astype(np.float32), own, carried)
 
 
 def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
@@ -168,7 +171,12 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
 
 @njit(cache=True)
 def march_samples(
-    inverse: FloatArray, coupling: FloatArray, own: FloatArray, carried: FloatArray, right_t: FloatArray, periods: int
+    inverse: SingleArray,
+    coupling: SingleArray,
+    own: FloatArray,
+    carried: FloatArray,
+    right_t: SingleArray,
+    periods: int,
 ) -> tuple[FloatArray, FloatArray]:
     """March through the samples of some periods, without any change of the state before the first one.
 
@@ -189,7 +197,7 @@ def march_samples(
     n_samples, size = right_t.shape
     n_contact = size // 3
     step_t, state_t = np.zeros((n_samples, size)), np.zeros((n_samples, size))
-    state, before = np.zeros((n_contact, 2)), np.zeros(size)
+    state, before = np.zeros((n_contact, 2)), np.zeros(size, right_t.dtype)
     for _ in range(periods):
         for n in range(n_samples):
             for pair in range(n_contact):

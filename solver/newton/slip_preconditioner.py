@@ -129,7 +129,7 @@ class SlipFactor:
         both = np.matmul(self.back, slips[:, :, None]).reshape(-1, 2, 3, m)
         motion, force = np.zeros((2, joint.contact.n_contact, 3, m))
         motion[pairs], force[pairs] = both[:, 0], both[:, 1]
-        return right - joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
+        return right - joint.structure.apply_roughly(joint.to_relative(motion)) + joint.to_relative(force)
 
 
 def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:

@@ -61,6 +61,11 @@ class CondensedStructure:
         force = self.moving.apply(displacement_h)
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
 
+    def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
+        """The same to six digits at least, in less time."""
+        force = self.moving.apply_roughly(displacement_h)
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
+
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]

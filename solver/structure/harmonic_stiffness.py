@@ -7,9 +7,12 @@ from functools import cached_property
 from typing import Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import to_complex
+
+SingleArray = NDArray[np.float32]
 
 
 class HarmonicStiffness(Protocol):
@@ -22,6 +25,9 @@ class HarmonicStiffness(Protocol):
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
 
+    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
+        """The same to six digits at least, in less time: for directions of Newton's method, not for its residual."""
+
 
 @dataclass(frozen=True)
 class DenseStiffness:
@@ -33,6 +39,8 @@ class DenseStiffness:
         """As in HarmonicStiffness."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
+
+    apply_roughly = apply
 
 
 @dataclass(frozen=True)
@@ -69,16 +77,32 @@ class SharedStiffness:
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in HarmonicStiffness."""
-        forces = self._combine(self.columns, displacement_h[:, 1:])
+        return self._apply(displacement_h, self.columns, self.back)
+
+    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
+        """As in HarmonicStiffness: the matrices are read in single precision, which is what takes the time."""
+        return self._apply(displacement_h, *self._single)
+
+    @cached_property
+    def _single(self) -> tuple[SingleArray, SingleArray]:
+        return self.columns.astype(np.float32), self.back.astype(np.float32)
+
+    def _apply(
+        self, displacement_h: FloatArray, columns: FloatArray | SingleArray, back: FloatArray | SingleArray
+    ) -> ComplexArray:
+        forces = self._combine(columns, displacement_h[:, 1:])
         behind = np.matmul(self.held_compliance, forces[self.n_rel :].T[:, :, None])[:, :, 0].T
         parts = np.empty((behind.shape[0], 2 * self.rates.size))
         parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
-        return forces[: self.n_rel] - self._combine(self.back, parts)
+        return forces[: self.n_rel] - self._combine(back, parts)
 
-    def _combine(self, forms: FloatArray, moving: FloatArray) -> ComplexArray:
+    def _combine(self, forms: FloatArray | SingleArray, moving: FloatArray) -> ComplexArray:
         """`(K + i n w C - (n w)^2 M) u` (rows, H) from K, M, C (3, rows, k) and harmonics cosine, sine, ... (k, 2H)."""
         n_rows = forms.shape[1]
-        parts = (forms.reshape(3 * n_rows, -1) @ moving).reshape(3, n_rows, -1, 2)
+        if forms.dtype == np.float32:
+            # displacements of the order of 1e-6 m and stiffnesses of 1e9 N/m are far within its range
+            moving = moving.astype(np.float32)
+        parts = (forms.reshape(3 * n_rows, -1) @ moving).reshape(3, n_rows, -1, 2).astype(np.float64, copy=False)
         spring = parts[0] - self.rates[:, None] ** 2 * parts[1]
         drag = self.rates[:, None] * parts[2]
         # i (cosine - i sine) = sine + i cosine

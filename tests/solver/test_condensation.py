@@ -252,6 +252,8 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     displacement_h = np.random.default_rng(0).normal(size=(each.static_force.size, 9))
     expected = each.apply(displacement_h)
     np.testing.assert_allclose(shared.apply(displacement_h), expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
+    for roughly in (shared.apply_roughly(displacement_h), each.apply_roughly(displacement_h)):
+        np.testing.assert_allclose(roughly, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
     # nothing behind the joint
     bare = replace(model, linear={0: only_pairs(model.linear[0], model.contact.n_contact)})
     assert build_structure(bare, OMEGA, AMPLITUDE, orders).apply(displacement_h).shape == expected.shape

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, sample_tangents
 from solver.harmonic_balance.dlft import Balance, Linearisation
@@ -91,14 +92,19 @@ def test_the_march_solves_what_it_says_sample_by_sample() -> None:
     n_samples, size = found.inverse.shape[:2]
     n_contact = size // 3
     right = np.random.default_rng(4).normal(size=(n_samples, size))
-    steps, states = march_samples(found.inverse, found.coupling, found.own, found.carried, right, NEWTON.march_periods)
+    # in double precision, so that the comparison is one of formulas
+    coupling = found.coupling.astype(float)
+    eliminated = np.array([np.eye(size) + coupling @ scipy.linalg.block_diag(*own) for own in found.own])
+    inverse = np.linalg.inv(eliminated)
+    assert np.abs(found.inverse - inverse).max() < 1e-5 * np.abs(inverse).max()
+    steps, states = march_samples(inverse, coupling, found.own, found.carried, right, NEWTON.march_periods)
     state = np.zeros((n_contact, 3))
     for _ in range(NEWTON.march_periods):
         slow = np.empty((2, n_samples, size))
         for n in range(n_samples):
             # step and state as two unknowns, nothing eliminated
             whole = np.eye(2 * size)
-            whole[:size, size:] = found.coupling
+            whole[:size, size:] = coupling
             held = np.zeros((n_contact, 3))
             for pair in range(n_contact):
                 here = slice(3 * pair, 3 * pair + 3)
@@ -166,7 +172,8 @@ def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_st
     assert np.count_nonzero((tangent.at.status_t == SLIP).any(axis=1)) > 4
     step = np.random.default_rng(6).normal(size=predicted.shape)
     found = factor_of(tangent).solve(tangent.apply(step))
-    assert np.linalg.norm(found - step) < 1e-9 * np.linalg.norm(step)
+    # but for its single precision, 6e-8
+    assert np.linalg.norm(found - step) < 1e-5 * np.linalg.norm(step)
     # and is none of the identity
     assert np.linalg.norm(tangent.apply(step) - step) > 0.1 * np.linalg.norm(step)
 
@@ -184,9 +191,9 @@ def products(monkeypatch: pytest.MonkeyPatch, solver: JacobianSolver, tangent: L
     counted = [0]
     plain = Linearisation.apply
 
-    def apply(self: Linearisation, step: FloatArray) -> FloatArray:
+    def apply(self: Linearisation, step: FloatArray, *, roughly: bool = False) -> FloatArray:
         counted[0] += 1
-        return plain(self, step)
+        return plain(self, step, roughly=roughly)
 
     with monkeypatch.context() as patch:
         patch.setattr(Linearisation, "apply", apply)
