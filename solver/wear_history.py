@@ -8,12 +8,14 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word
 from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
+from solver.structure.joint import friction_of_pairs
 from solver.wear.march import march_wear as march_from_start
 
 
@@ -29,6 +31,7 @@ def march_wear(
     step: float | None = None,
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
+    law: WearLaw = ARCHARD,
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state on.
 
@@ -45,7 +48,7 @@ def march_wear(
     friction_coefficient
         Of all pairs, or (n_contact,) of each; None for a model that has one of each pair, as a scene file may.
     wear_coefficient
-        k_w of Eq. (2), 1/Pa.
+        k_w of Eq. (2), 1/Pa; the energy wear coefficient with the law "energy".
     cycles
         Ascending cycle counts at which the history is reported, or the last one alone; the march ends there. It begins
         at 0, which is put in front where it is missing.
@@ -56,13 +59,15 @@ def march_wear(
         How the unworn state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
     settings
         The defaults of `SolverSettings` if not given.
+    law
+        What of the slip work wears, Archard's law if not given: `solver.contact.wear_law`.
 
     Raises
     ------
     ValueError
         Where a number is out of its range, counts do not ascend, a scheme of a given step has none, the model does not
-        hold the nodal diameters that the harmonics need, or friction coefficients are given twice, not at all, or not
-        to each pair.
+        hold the nodal diameters that the harmonics need, friction coefficients are given twice, not at all, or not to
+        each pair, or the law is none of `wear_law.LAWS` or names other surfaces than the model has.
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
@@ -76,5 +81,7 @@ def march_wear(
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
     counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
+    # that the law is none of these pairs is the fault of the caller, not of the march
+    wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
-    return march_from_start(model, friction, start, per_pressure, length, scheme, counts, settings)
+    return march_from_start(model, friction, start, per_pressure, length, scheme, counts, settings, law=law)

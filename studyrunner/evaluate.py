@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
@@ -30,15 +31,15 @@ from studyrunner.variables import KEPT
 _ROUND_OFF = 1e-10
 
 
-def build_evaluator(model: ReducedModel, friction_coefficient: float | None) -> Evaluate:
-    """The function that does the tasks of a study on this model and gives their results one by one."""
+def build_evaluator(model: ReducedModel, friction_coefficient: float | None, law: WearLaw = ARCHARD) -> Evaluate:
+    """The function that does the tasks of a study on this model by this wear law and gives their results one by one."""
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         guard_kernel_cache()
         if isinstance(task, BranchTask):
             yield from follow(model, friction_coefficient, task, keep)
         else:
-            yield from march(model, friction_coefficient, task, keep)
+            yield from march(model, friction_coefficient, task, keep, law)
 
     return evaluate
 
@@ -88,7 +89,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 
 
 def march(
-    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep
+    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep, law: WearLaw = ARCHARD
 ) -> Iterator[MarchResult]:
     """The histories of a task, the one of the march itself first.
 
@@ -102,7 +103,7 @@ def march(
         reached = progress
         keep(progress)
 
-    history = _solve(model, friction_coefficient, task, note)
+    history = _solve(model, friction_coefficient, task, law, note)
     # with more time it goes on from there
     left = reached if history.outcome is Outcome.TIME_LIMIT else None
     yield replace(build_result(task, history), progress=left)
@@ -111,11 +112,15 @@ def march(
             yield replace(build_result(task, history, place), progress=left)
         else:
             alone = replace(task, histories=(scaled,), resume=None)
-            yield replace(build_result(alone, _solve(model, friction_coefficient, alone)), place=place)
+            yield replace(build_result(alone, _solve(model, friction_coefficient, alone, law)), place=place)
 
 
 def _solve(
-    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep | None = None
+    model: ReducedModel,
+    friction_coefficient: float | None,
+    task: MarchTask,
+    law: WearLaw,
+    keep: Keep | None = None,
 ) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.march import march_wear
@@ -138,6 +143,7 @@ def _solve(
         loops=task.loops,
         keep=keep,
         resume=task.resume,
+        law=law,
     )
     _raise_fault(history)
     return history

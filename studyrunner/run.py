@@ -39,6 +39,7 @@ from studyrunner.user_error import UserError, Verbatim
 if TYPE_CHECKING:
     import numpy as np
 
+    from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
     from studyrunner.netcdf.gather import Gathered
 
@@ -57,6 +58,7 @@ class Job:
 
     model: ReducedModel
     friction_coefficient: float | None
+    law: WearLaw
     folder: Path
 
 
@@ -153,7 +155,7 @@ def serve_study(
             return _summarise(plan, n_found, gathered, keep_finished)
 
         try:
-            job = Job(model, study.friction_coefficient, store.folder)
+            job = Job(model, study.friction_coefficient, study.wear_law, store.folder)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
             with _evaluator(job, rank=0) as evaluate:
@@ -231,7 +233,7 @@ def work_on_job(ranks: Ranks, job: Job) -> None:
 
 def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
     """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
-    compute = build_evaluator(job.model, job.friction_coefficient)
+    compute = build_evaluator(job.model, job.friction_coefficient, job.law)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         given: set[int] = set()

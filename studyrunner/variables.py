@@ -42,7 +42,8 @@ ASKED = {
         ("cycle",),
         "m3 per cycle",
         "volume worn in a cycle",
-        comment="Archard's law, Eq. (2) of the reference: wear_coefficient times normal force times sliding.",
+        comment="wear_coefficient times the work that wears: with Archard's law, Eq. (2) of the reference, normal force"
+        " times sliding; the attribute study says which law, under [wear].",
     ),
     "wear_depth": Variable(
         ("cycle", "contact"), "m", "wear depth", comment="Of both surfaces of the pair together; it opens the pair."
@@ -295,7 +296,8 @@ COORDINATES = {
         (),
         "1/Pa",
         "wear coefficient",
-        comment="Worn volume over normal force times sliding distance, Archard's law, Eq. (2) of the reference.",
+        comment="Worn volume over normal force times sliding distance, Archard's law, Eq. (2) of the reference; over"
+        " dissipated energy with the law energy; the attribute study says which law, under [wear].",
     ),
     "excitation_amplitude": Variable((), "N", "excitation amplitude, factor of the unit harmonic load"),
     "step": Variable((), "1", "step of the slow time scale, cycles", comment="Not used by the adaptive scheme."),

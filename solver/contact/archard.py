@@ -1,4 +1,6 @@
-"""Archard's wear law: all that depends on which law it is. Nothing here is compiled; the kernels compile what they use.
+"""Archard's wear law: slip work, rate, growth. All laws are this one with another work (`solver.contact.wear_law`).
+
+Nothing here is compiled; the kernels compile what they use.
 
 The depth of a pair grows by `k_w / alpha` times the normal force times the slip, Eq. (7); over a cycle, Eq. (21):
 
@@ -17,25 +19,7 @@ its gain is the derivative of the growth with respect to the slip work (the prin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from solver.model import FloatArray
-
-
-@dataclass(frozen=True)
-class WearLaw:
-    """What others than the solver have to know of a wear law.
-
-    name: as a study names it. proportional: whether the rate is proportional to the wear coefficient,
-    `dW/dt = k_w f(W)`: then a history depends on wear coefficient and cycles through `k_w` times cycles only, and
-    nothing wears at 0.
-    """
-
-    name: str
-    proportional: bool
-
-
-ARCHARD = WearLaw("archard", proportional=True)
 
 
 def slip_work_rate(normal: float, speed: float) -> float:
@@ -56,21 +40,11 @@ def wear_gain(wear_coefficient: float, area: FloatArray, cycles: float) -> Float
     return cycles * wear_coefficient / area
 
 
-def wear_growth(gain: FloatArray, slip_work: FloatArray) -> FloatArray:
-    """Growth of the depth (n_contact,), m, from the gain, m/J, and the slip work of a cycle, J, both (n_contact,)."""
-    return gain * slip_work
+def wear_rate(wear_coefficient: float, area: FloatArray, wearing_work: FloatArray) -> FloatArray:
+    """Wear rate g (n_contact,), m per cycle, Eqs. (7), (21), of the work that wears in a cycle (n_contact,), J."""
+    return wear_gain(wear_coefficient, area, 1.0) * wearing_work
 
 
-def wear_growth_tangent(gain: FloatArray, slip_work_tangent: FloatArray) -> FloatArray:
-    """Derivative of the growth, (n_contact, k), from that of the slip work (n_contact, k)."""
-    return gain[:, None] * slip_work_tangent
-
-
-def wear_rate(wear_coefficient: float, area: FloatArray, slip_work: FloatArray) -> FloatArray:
-    """Wear rate g (n_contact,), m per cycle, Eqs. (7), (21)."""
-    return wear_growth(wear_gain(wear_coefficient, area, 1.0), slip_work)
-
-
-def volume_rate(wear_coefficient: float, slip_work: float) -> float:
-    """Volume that a slip work, J, wears off in a cycle, m3: depth times area, so that the area does not matter."""
-    return wear_coefficient * slip_work
+def volume_rate(wear_coefficient: float, wearing_work: float) -> float:
+    """Volume that a work, J, wears off in a cycle, m3: depth times area, so that the area does not matter."""
+    return wear_coefficient * wearing_work

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
-from solver.contact.archard import wear_growth, wear_growth_tangent
+from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.harmonic_balance.options import BALANCE
 from solver.model import ComplexArray, FloatArray, IntArray, Matrix
 from solver.packing import packable
@@ -36,13 +36,14 @@ class Balance:
 
     history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start
     of the slow step; the same all period, Eq. (6). wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; zero
-    where W does not grow with the motion.
+    where W does not grow with the motion. wearing: what of the slip work wears.
     """
 
     joint: Joint
     history: FloatArray
     wear_depth: FloatArray
     wear_gain: FloatArray
+    wearing: WearingWork = ARCHARDS_WORK
 
     @classmethod
     def frozen(cls, joint: Joint, history: FloatArray, wear_depth: FloatArray) -> Balance:
@@ -66,7 +67,9 @@ class Balance:
         pairs = joint.to_pairs(predicted_h)
         pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
         marched = march_law(joint, pairs, self.history)
-        wear_depth = self.wear_depth + wear_growth(self.wear_gain, marched.slip_work)
+        wear_depth = self.wear_depth + self.wearing.growth(
+            self.wear_gain, marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
+        )
         displacement_h = joint.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         inertial = joint.penalty.inertial
@@ -91,7 +94,9 @@ class Balance:
         m = joint.basis.synthesis.shape[0]
         correction_tangent = (np.eye(3 * m) - force_tangent).reshape(-1, 3, m, 3 * m)
         motion_tangent = joint.motion(correction_tangent).reshape(-1, 3 * m, 3 * m)
-        motion_tangent[:, 0, :] += wear_growth_tangent(self.wear_gain, slip_work_tangent)
+        motion_tangent[:, 0, :] += self.wearing.growth_tangent(
+            self.wear_gain, worn_by(at), slip_work_tangent, force_tangent[:, 0, :]
+        )
         return Linearisation(joint, at, force_tangent, motion_tangent)
 
 
@@ -117,6 +122,11 @@ class Evaluation(Marched):
         return float(
             np.hypot(np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving)
         )
+
+
+def worn_by(at: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What a wear law takes of a state, each (n_contact,): slip work, J, mean normal force, N, depth, m."""
+    return at.slip_work, at.force_h[:, 0, 0], at.wear_depth
 
 
 def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tuple[float, float]:

@@ -114,7 +114,7 @@ class Recorder:
         area = self.model.contact.area
         gain, rate = (
             wear_gain(wear_coefficient, area, 1.0),
-            volume_rate(wear_coefficient, float(report.slip_work.sum())),
+            volume_rate(wear_coefficient, float(report.wearing_work.sum())),
         )
         smooth = self.scheme == "adaptive"
         if self.last is None:
@@ -130,9 +130,9 @@ class Recorder:
                 wrong = min(of.certificate.wear_rate_error, RESULTS.unknown_wear_rate_error)
                 # of fixed harmonics and samples it may not have been estimated
                 self.truncation += half * value * (0.0 if np.isnan(wrong) else wrong)
-                self.pair_truncation = self.pair_truncation + half * gain * of.slip_work_error
+                self.pair_truncation = self.pair_truncation + half * gain * of.wearing_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
-        ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.slip_work)) for of in (before_report, report)]
+        ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.wearing_work)) for of in (before_report, report)]
         depth = depth_within(fraction, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
             fraction = self._worn_fraction(depth, before_report.wear_depth, report.wear_depth, fraction)

@@ -39,12 +39,13 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 class StateReport:
     """What is reported of a state; units and shapes as in `WearHistory`, without the cycle dimension.
 
-    slip_work (n_contact,): N m, and what it is wrong by for want of harmonics.
+    wearing_work (n_contact,): J, the work that wears in a cycle: the slip work, but for what another wear law than
+    Archard's makes of it; and what it is wrong by for want of harmonics.
     """
 
     wear_depth: FloatArray
-    slip_work: FloatArray
-    slip_work_error: FloatArray
+    wearing_work: FloatArray
+    wearing_work_error: FloatArray
     mean_pressure: FloatArray
     slip_range: FloatArray
     open_fraction: FloatArray
@@ -63,7 +64,7 @@ def report_state(
     slip_work_error: FloatArray,
     loops: tuple[int, ...] = (),
 ) -> StateReport:
-    """Pressures, slip and responses of a converged state.
+    """Pressures, slip and responses of a converged state; all of its slip work wears.
 
     Parameters
     ----------
@@ -78,8 +79,8 @@ def report_state(
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     return StateReport(
         wear_depth=evaluation.wear_depth,
-        slip_work=evaluation.slip_work,
-        slip_work_error=slip_work_error,
+        wearing_work=evaluation.slip_work,
+        wearing_work_error=slip_work_error,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
         slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),

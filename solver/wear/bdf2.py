@@ -30,7 +30,7 @@ from solver.accuracy.error_estimate import euler_error
 from solver.contact.archard import wear_gain, wear_rate
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
-from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.dlft import Balance, worn_by
 from solver.model import FloatArray
 from solver.newton.solve_balance import solve_balance
 from solver.packing import attributes, set_attributes
@@ -140,7 +140,7 @@ class AdaptiveSteps:
             base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
             factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
         gain = wear_gain(trajectory.wear_coefficient, area, factor * length)
-        balance = Balance(trajectory.joint, trajectory.point.history, base, gain)
+        balance = Balance(trajectory.joint, trajectory.point.history, base, gain, trajectory.wearing)
         start = trajectory.predicted(balance, length)
         result = solve_balance(
             balance,
@@ -153,7 +153,7 @@ class AdaptiveSteps:
         if not result.converged:
             return None
         new = result.evaluation
-        new_rate = wear_rate(trajectory.wear_coefficient, area, new.slip_work)
+        new_rate = wear_rate(trajectory.wear_coefficient, area, trajectory.wearing.work(*worn_by(new)))
         if self.before is None:
             error = euler_error(length, new_rate - rate)
         else:

@@ -76,7 +76,7 @@ class Companion:
         self.main = main
         coarse = replace(start, state=start.coarse or start.state)
         scheme: Scheme = "implicit" if main.scheme == "explicit" else main.scheme
-        self.trajectory = Trajectory(main.case, coarse, main.wear_coefficient, scheme)
+        self.trajectory = Trajectory(main.case, coarse, main.wear_coefficient, scheme, wear_law=main.wear_law)
         self.effort = self.trajectory.effort
         self.trajectory.bounded = False
         self.cycles = cycles

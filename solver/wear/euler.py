@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from solver.contact.archard import wear_gain, wear_rate
+from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.converged import BalanceAt
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray
 from solver.settings import Scheme
 from solver.structure.joint import Joint
@@ -19,19 +20,21 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
     return balance_at
 
 
-def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray) -> BalanceAt:
-    """Depths that grow by `gain` (n_contact,), m/J, times the slip work of the state that is sought, Eqs. (24) to (26).
+def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray, wearing: WearingWork) -> BalanceAt:
+    """Depths that grow by `gain` (n_contact,), m/J, times the wearing work of the state sought, Eqs. (24) to (26).
 
     gain: `archard.wear_gain` of the whole step.
     """
 
     def balance_at(fraction: float, history: FloatArray) -> Balance:
-        return Balance(joint, history, before, fraction * gain)
+        return Balance(joint, history, before, fraction * gain, wearing)
 
     return balance_at
 
 
-def euler_step(joint: Joint, scheme: Scheme, before: Evaluation, length: float, wear_coefficient: float) -> BalanceAt:
+def euler_step(
+    joint: Joint, scheme: Scheme, before: Evaluation, length: float, wear_coefficient: float, wearing: WearingWork
+) -> BalanceAt:
     """What a step from a state is solved for: Eqs. (20), (23) if explicit, else Eqs. (24) to (26).
 
     Parameters
@@ -44,6 +47,8 @@ def euler_step(joint: Joint, scheme: Scheme, before: Evaluation, length: float, 
         h, cycles.
     wear_coefficient
         k_w, 1/Pa.
+    wearing
+        What of the slip work wears.
 
     Returns
     -------
@@ -52,5 +57,7 @@ def euler_step(joint: Joint, scheme: Scheme, before: Evaluation, length: float, 
     """
     area, depth = joint.contact.area, before.wear_depth
     if scheme == "explicit":
-        return held_wear(joint, depth, depth + length * wear_rate(wear_coefficient, area, before.slip_work))
-    return implicit_wear(joint, depth, wear_gain(wear_coefficient, area, length))
+        return held_wear(
+            joint, depth, depth + length * wear_rate(wear_coefficient, area, wearing.work(*worn_by(before)))
+        )
+    return implicit_wear(joint, depth, wear_gain(wear_coefficient, area, length), wearing)

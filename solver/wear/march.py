@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.clock import computing_time
+from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
@@ -36,6 +37,7 @@ def march_wear(
     loops: tuple[int, ...] = (),
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
+    law: WearLaw = ARCHARD,
 ) -> WearHistory:
     """Wear history of one point of a study, Eqs. (20) to (26).
 
@@ -63,6 +65,8 @@ def march_wear(
     resume
         Such progress of a march with the same arguments, from which this one goes on: its history is the same to the
         last bit, but for `run_time`.
+    law
+        Of the wear.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def march_wear(
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-    march = Trajectory(case, start, wear_coefficient, scheme, loops)
+    march = Trajectory(case, start, wear_coefficient, scheme, loops, law)
     companion = Companion(march, start, cycles)
     spent_before, message = 0.0, ""
     march.effort.deadline = started + settings.time_limit

@@ -21,9 +21,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.contact.archard import wear_growth
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.contact.wear_law import WearingWork
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
@@ -31,7 +31,9 @@ from solver.structure.joint import Joint
 from solver.wear.options import WEAR
 
 
-def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, solver: JacobianSolver) -> float:
+def explicit_step_limit(
+    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, solver: JacobianSolver
+) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
     The eigenvalues are those that Arnoldi's method knows after `arnoldi_products` solves; complex ones count where the
@@ -43,6 +45,8 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, solver: 
         The joint and its converged state.
     gain
         (n_contact,), `archard.wear_gain` of one cycle, m/J.
+    wearing
+        What of the slip work wears. How a table itself depends on the depth is left out: only what the motion does.
     solver
         Solves with the Jacobian of the state.
 
@@ -51,19 +55,19 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, solver: 
     float
         h, cycles; inf where the wear rate falls nowhere.
     """
-    rate = wear_growth(gain, at.slip_work)
+    rate = gain * wearing.work(*worn_by(at))
     if not rate.max(initial=0.0) > 0.0:
         return float("inf")
     frozen = Balance.frozen(joint, at.history, at.wear_depth)
     # a step in which the fastest pair wears as much as the joint moves: both Jacobians differ in more than round-off
     step = float(np.abs(at.displacement_h).max()) / float(rate.max())
     plain = frozen.linearise(at)
-    wearing = replace(frozen, wear_gain=step * gain).linearise(at)
+    worn = replace(frozen, wear_gain=step * gain, wearing=replace(wearing, depth_held=True)).linearise(at)
     shape = at.predicted_h.shape
 
     def product(vector: FloatArray) -> FloatArray:
         predicted = vector.reshape(shape)
-        return solver.solve(plain, wearing.apply(predicted) - plain.apply(predicted)).ravel()
+        return solver.solve(plain, worn.apply(predicted) - plain.apply(predicted)).ravel()
 
     start = product(np.random.default_rng(0).normal(size=at.predicted_h.size))
     if not np.all(np.isfinite(start)) or not start.any():

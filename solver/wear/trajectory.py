@@ -14,10 +14,11 @@ from solver.accuracy.pair_error import slip_work_error
 from solver.accuracy.period_events import lacks_even
 from solver.accuracy.refinement import refine
 from solver.contact.archard import volume_rate, wear_gain, wear_rate
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history, vibration_change
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
@@ -75,11 +76,13 @@ class Trajectory:
     wear_coefficient: float
     scheme: Scheme
     loops: tuple[int, ...] = ()
+    wear_law: WearLaw = ARCHARD
 
     def __post_init__(self) -> None:
         state = self.start.state
         assert state is not None
         self.joint: Joint = self.case.joint(state.omega, state.excitation_amplitude)
+        self.wearing = wearing_work(self.wear_law, self.joint.contact, self.joint.friction_coefficient)
         self.solver = JacobianSolver()
         self.effort = Effort()
         self.cycle = 0.0
@@ -179,7 +182,7 @@ class Trajectory:
         self.certificate = replace(
             certify(self.joint, self.point.evaluation),
             response_error=self.estimate.response,
-            wear_rate_error=self.estimate.wear_rate,
+            wear_rate_error=self.wearing.amplification(*worn_by(self.point.evaluation)) * self.estimate.wear_rate,
         )
         return self.certificate.holds(self.case.settings.tolerance)
 
@@ -203,11 +206,18 @@ class Trajectory:
     def report(self) -> StateReport:
         """What is reported of the current state, which has been checked."""
         assert self.certificate is not None
-        return report_state(self.joint, self.point.evaluation, self.certificate, self.slip_work_error, self.loops)
+        at = worn_by(self.point.evaluation)
+        report = report_state(self.joint, self.point.evaluation, self.certificate, self.slip_work_error, self.loops)
+        by_slip_work, _, _ = self.wearing.slopes(*at)
+        return replace(
+            report, wearing_work=self.wearing.work(*at), wearing_work_error=by_slip_work * report.wearing_work_error
+        )
 
     def rate(self) -> FloatArray:
         """Wear rate (n_contact,) of the current state, m per cycle, Eqs. (7), (21), (25)."""
-        return wear_rate(self.wear_coefficient, self.joint.contact.area, self.point.evaluation.slip_work)
+        return wear_rate(
+            self.wear_coefficient, self.joint.contact.area, self.wearing.work(*worn_by(self.point.evaluation))
+        )
 
     def wears(self) -> bool:
         """Whether anything wears at all, more than round-off of the slip that the static load has caused."""
@@ -218,7 +228,9 @@ class Trajectory:
         as there is a stable state, to within `fold_resolution`, and `jump` goes on.
         """
         length = reach - self.cycle
-        balance_at = euler_step(self.joint, self.scheme, self.point.evaluation, length, self.wear_coefficient)
+        balance_at = euler_step(
+            self.joint, self.scheme, self.point.evaluation, length, self.wear_coefficient, self.wearing
+        )
         base = PathPoint(0.0, self.point.evaluation, self.point.history)
         if (found := self._extrapolated(balance_at(1.0, base.history), length)) is not None:
             self.take(PathPoint(1.0, found, base.history), balance_at, length)
@@ -306,10 +318,11 @@ class Trajectory:
         motion = self.point.evaluation.displacement_h[:, 1:]
         pressed = np.abs(self.point.evaluation.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(motion, axis=(1, 2)))
-        self.largest_rate = max(self.largest_rate, volume_rate(self.wear_coefficient, moved))
+        most = self.wearing.largest_factor * moved
+        self.largest_rate = max(self.largest_rate, volume_rate(self.wear_coefficient, most))
         if np.isnan(self.step_limit) and self.wears():
             gain = wear_gain(self.wear_coefficient, self.joint.contact.area, 1.0)
-            self.step_limit = explicit_step_limit(self.joint, self.point.evaluation, gain, self.solver)
+            self.step_limit = explicit_step_limit(self.joint, self.point.evaluation, gain, self.wearing, self.solver)
 
     def predicted(self, balance: Balance, length: float) -> FloatArray:
         """Predicted force (n_rel, m), N, to begin a step with: extrapolated over the last step, or that of now."""

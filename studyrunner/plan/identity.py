@@ -34,6 +34,7 @@ class Identities:
     def __init__(self, study: Study, scene_digest: str, kind: str) -> None:
         self._kind = kind
         self._scene = (scene_digest, study.friction_coefficient, solver_digest())
+        self._law = asdict(study.wear_law)
         self._lines: dict[int, tuple[str, ...]] = {}
         self._kept: dict[tuple[object, ...], str] = {}
 
@@ -54,7 +55,7 @@ class Identities:
         kept = march.cycles, march.loops
         if kept not in self._kept:
             self._kept[kept] = _digest(self._kind, kept)
-        base = ("history", start, self._kept[kept], own, march.largest_depth)
+        base = ("history", start, self._kept[kept], own, march.largest_depth, self._law)
         wear = (self._wear(march, scaled) for scaled in march.histories)
         return tuple(_digest(*base, place > 0, each) for place, each in enumerate(wear))
 

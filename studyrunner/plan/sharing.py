@@ -1,9 +1,9 @@
 """Which choices of wear coefficient, step and scheme have the same wear history, so that it is computed once, and why.
 
-Where the rate of the wear law is proportional to its coefficient (`WearLaw.proportional`), as Archard's is, the wear
-equation is dW/dt = k_w f(W), Eq. (7): with s k_w and the step h / s the same states follow each other, each at the
-count t / s. A march computes the history of the largest k_w; the others are read from it at the counts s t. With any
-other law histories of different k_w have nothing in common.
+Where the rate of the wear law is proportional to its coefficient (`WearLaw.proportional`), as those of all laws are
+that there are, the wear equation is dW/dt = k_w f(W), Eq. (7): with s k_w and the step h / s the same states follow
+each other, each at the count t / s. A march computes the history of the largest k_w; the others are read from it at the
+counts s t. With any other law histories of different k_w have nothing in common.
 """
 
 from __future__ import annotations

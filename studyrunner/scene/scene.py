@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.contact.wear_law import surface_factors
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.variables import build_mesh, check_outputs
@@ -54,6 +55,7 @@ def build_study_scene(study: Study) -> ReducedModel:
     """
     model = _build(study)
     check_outputs(study, model)
+    _check_surfaces(study, model)
     return model
 
 
@@ -81,6 +83,16 @@ def _check_friction(study: Study, model: ReducedModel) -> None:
     if own is not None and value is not None:
         remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
         raise UserError(study.source, key, value, remedy)
+
+
+def _check_surfaces(study: Study, model: ReducedModel) -> None:
+    """Raises UserError where the study gives factors of the wear to other surfaces than the scene has."""
+    if study.wear.surfaces is None:
+        return
+    try:
+        surface_factors(model.contact.surface, study.wear_law.surfaces)
+    except ValueError as error:
+        raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
 
 
 def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:

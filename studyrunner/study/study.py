@@ -9,9 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, TypeAdapter, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdapter, model_validator
 
-from solver.contact.archard import ARCHARD, WearLaw
+from solver.contact.wear_law import WearLaw
 from solver.settings import Automatic
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
@@ -22,6 +22,7 @@ from studyrunner.study.values import (
     Positive,
     Samples,
     Scheme,
+    Section,
     Sweep,
     Switch,
     Text,
@@ -29,6 +30,7 @@ from studyrunner.study.values import (
     read,
     whole,
 )
+from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
 from studyrunner.variables import ASKED, KEPT, SCENE
 
@@ -80,12 +82,6 @@ def _read_loops(value: object) -> tuple[int, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of contact indices")
     return tuple(sorted(once(read(_PAIR, item) for item in value)))
-
-
-class Section(BaseModel):
-    """A table of the study file: frozen, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class StudySection(Section):
@@ -183,6 +179,7 @@ class Study(Section):
     study: StudySection
     scene: SceneSection
     axes: AxesSection
+    wear: WearSection = WearSection()
     slow_time: SlowTimeSection = SlowTimeSection()
     solver: SolverSection = SolverSection()
     outputs: OutputsSection = OutputsSection()
@@ -259,7 +256,7 @@ class Study(Section):
     @property
     def wear_law(self) -> WearLaw:
         """What is to be known of the wear law."""
-        return ARCHARD
+        return self.wear.wear_law
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:

@@ -29,6 +29,7 @@ Table = dict[str, object]
 
 _OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _SECTIONS = tuple(name for name in Study.model_fields if name not in ("source", "folder", "archived"))
 
 
@@ -298,9 +299,14 @@ def _nearest(name: str, known: Mapping[str, object] | Sequence[str]) -> str:
     return near[0] if near else "one of " + ", ".join(known)
 
 
+def _toml_key(key: str) -> str:
+    """A key, in quotes where it is no bare one: labels of surfaces are any text."""
+    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
+
+
 def _toml_value(value: object) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_toml_key(key)} = {_toml_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_toml_value(item) for item in value) + "]"
     return json.dumps(value, ensure_ascii=False)

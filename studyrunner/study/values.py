@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError, WrapValidator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    WrapValidator,
+)
 
 from solver.settings import Automatic
 from studyrunner.user_error import WrongValueError
@@ -14,6 +23,12 @@ T = TypeVar("T", bound=Hashable)
 
 LONGEST_AXIS = 100_000
 """Values of an axis: the effective study, which lists them, is to be read again."""
+
+
+class Section(BaseModel):
+    """A table of the study file: frozen, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 def told(remedy: str) -> WrapValidator:

@@ -32,7 +32,7 @@ def main() -> None:
     study = read_study("dovetail", STUDY)
     model = build_study_scene(study)
     plan = build_tasks(study, describe_scene(model).n_displacements)
-    evaluate = build_evaluator(model, study.friction_coefficient)
+    evaluate = build_evaluator(model, study.friction_coefficient, study.wear_law)
     next(iter(evaluate(plan.branches[0])))  # compiles
     print("frequency,wear_coefficient,seconds,n_unknowns,moves")
     (branch,) = plan.branches

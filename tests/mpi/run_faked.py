@@ -48,7 +48,7 @@ PATIENCE = 200.0
 """Seconds: less than the tests have."""
 
 
-def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
     facts = describe_scene(model)
     seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
     failing = int(os.environ.get("FAKE_FAILURE", "-1"))

@@ -32,7 +32,7 @@ class Solver:
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
 
-        def build_fake(model: object, _: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+        def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
             return lambda task, keep: self.evaluate(model, task, keep)
 
         monkeypatch.setattr(run, "build_evaluator", build_fake)

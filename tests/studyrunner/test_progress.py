@@ -120,7 +120,7 @@ def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, caps
     assert 90 <= len(looks) <= 101
 
 
-def build_slow(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+def build_slow(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
     """The stand-in for the solver; each start state and each march takes a while."""
     facts = describe_scene(model)
 

@@ -40,7 +40,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, MarchResult], MarchResult]) -> None:
     """Puts the stand-in in place of the solver; `change` has the last word on every history."""
 
-    def build_fake(model: object, friction_coefficient: float) -> Callable[..., Iterator[StartResult | MarchResult]]:
+    def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
         facts = describe_scene(model)
 
         def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.archard import WearLaw
+from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import pack
 from solver.results.history import StartState, WearHistory
@@ -297,7 +297,12 @@ def marched(
     calls = []
 
     def fake(
-        *arguments: object, largest_depth: float | None, loops: tuple[int, ...], keep: object, resume: object
+        *arguments: object,
+        largest_depth: float | None,
+        loops: tuple[int, ...],
+        keep: object,
+        resume: object,
+        law: object,
     ) -> WearHistory:
         wear, cycles = arguments[3], arguments[6]
         assert isinstance(wear, float)

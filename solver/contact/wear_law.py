@@ -1,0 +1,250 @@
+"""Wear laws: how much of the slip work of a pair wears. Every other law is Archard's with another work.
+
+The depth of a pair grows in a cycle by `k_w / alpha` times the *wearing work* X, J, of Eqs. (7), (21) (`archard`):
+
+    X = c f(p, W) max(S - q alpha, 0)
+
+with S the slip work, J, p the mean pressure over the period, Pa, W the depth, m, and alpha the area of the pair, m2:
+
+- `archard`: X = S.
+- `energy`: c = mu, so that X = mu S is what friction dissipates (`alternating_frequency_time.friction_work`) and the
+  coefficient is the energy wear coefficient, volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger,
+  Wear 255 (2003) 287).
+- `threshold`: q, J/m2, is a slip work density of a cycle below which nothing wears; only what is above wears.
+- `table`: f is given at pressures and depths, bilinear between them and constant beyond, so that `k_w f` is a wear
+  coefficient that depends on both.
+
+With each of them c may differ between surfaces. All are proportional to the coefficient. An implicit step solves
+`W = W_k + gain X(S, p, W)` at each pair by itself, as Archard's does: W is eliminated there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.model import ContactInterface, FloatArray
+
+LAWS = ("archard", "energy", "threshold", "table")
+
+
+@dataclass(frozen=True)
+class WearTable:
+    """Factors of the wear coefficient, 1: a row for each of the ascending pressures, Pa, a column for each depth, m."""
+
+    pressure: tuple[float, ...]
+    depth: tuple[float, ...]
+    factor: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class WearLaw:
+    """A wear law as a study names it.
+
+    name: one of `LAWS`. threshold: q, J/m2 in a cycle. table: of the law of that name. surfaces: factors of the wear
+    coefficient by the label of a surface; a pair whose label names both of its sides, as "flat/cylinder", has the sum
+    of both. Empty: 1 on each pair. proportional: whether the rate is proportional to the wear coefficient,
+    `dW/dt = k_w f(W)`: then a history depends on wear coefficient and cycles through `k_w` times cycles only, and
+    nothing wears at 0.
+    """
+
+    name: str = "archard"
+    threshold: float = 0.0
+    table: WearTable | None = None
+    surfaces: tuple[tuple[str, float], ...] = ()
+    proportional: bool = True
+
+
+ARCHARD = WearLaw()
+
+
+def surface_factors(labels: tuple[str, ...], surfaces: tuple[tuple[str, float], ...]) -> FloatArray:
+    """Factor (n_contact,) of each pair from those of the surfaces that its label names.
+
+    Raises ValueError where a label names a surface without a factor, or a factor is of no surface that there is.
+    """
+    given = dict(surfaces)
+    sides = [label.split("/") for label in labels]
+    known = dict.fromkeys(side for each in sides for side in each)
+    for name in (*given, *known):
+        if name not in known or name not in given:
+            raise ValueError(f'"{name}": give a factor to each of the surfaces {", ".join(known)}, and to no other')
+    return np.array([sum(given[side] for side in each) for each in sides])
+
+
+@dataclass(frozen=True)
+class WearingWork:
+    """The work that wears the pairs of one joint. What is None is not in the law.
+
+    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. pressure (n_p,), Pa, depth (n_d,), m, and table
+    (n_p, n_d): f. area (n_contact,): alpha, m2, used by the table alone. depth_held: whether derivatives leave out what
+    the depth itself does.
+    """
+
+    factor: FloatArray | None = None
+    least: FloatArray | None = None
+    pressure: FloatArray | None = None
+    depth: FloatArray | None = None
+    table: FloatArray | None = None
+    area: FloatArray | None = None
+    depth_held: bool = False
+
+    @property
+    def largest_factor(self) -> float:
+        """Wearing work over slip work, at most, 1."""
+        largest = 1.0 if self.factor is None else float(self.factor.max(initial=0.0))
+        return largest if self.table is None else largest * float(self.table.max())
+
+    def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
+        """X (n_contact,), J.
+
+        Parameters
+        ----------
+        slip_work
+            S (n_contact,), J.
+        normal_force
+            Mean over the period (n_contact,), N.
+        depth
+            W (n_contact,), m.
+        """
+        work = self._without_table(slip_work)
+        if self.table is None:
+            return work
+        by_depth, _ = self._at_pressure(normal_force)
+        return work * self._at_depth(by_depth, depth)[0]
+
+    def slopes(
+        self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives (n_contact,) of `work` with respect to slip work, 1, normal force, m, and depth, N."""
+        by_work = np.ones_like(slip_work) if self.factor is None else self.factor
+        if self.least is not None:
+            by_work = np.where(slip_work > self.least, by_work, 0.0)
+        if self.table is None:
+            return by_work, np.zeros_like(slip_work), np.zeros_like(slip_work)
+        work = self._without_table(slip_work)
+        by_depth, by_depth_slope = self._at_pressure(normal_force)
+        value, slope = self._at_depth(by_depth, depth)
+        by_force, _ = self._at_depth(by_depth_slope, depth)
+        return by_work * value, work * by_force, np.zeros_like(work) if self.depth_held else work * slope
+
+    def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
+        """Relative error of the wearing work of all pairs over that of their slip work, 1; more near a threshold."""
+        if self.least is None:
+            return 1.0
+        worn = float(self.work(slip_work, normal_force, depth).sum())
+        by_work, _, _ = self.slopes(slip_work, normal_force, depth)
+        return float(by_work @ slip_work) / worn if worn > 0.0 else 1.0
+
+    def growth(
+        self, gain: FloatArray, slip_work: FloatArray, normal_force: FloatArray, before: FloatArray
+    ) -> FloatArray:
+        """Growth of the depth (n_contact,), m, in a step: the least root y of `y = gain X(S, p, before + y)`.
+
+        gain (n_contact,): `archard.wear_gain` of the step, m/J. before (n_contact,): depth that the step adds to, m.
+        Between two depths of the table both sides are straight lines, so that the root is exact.
+        """
+        work = self._without_table(slip_work)
+        if self.table is None or self.depth is None:
+            return gain * work
+        by_depth, _ = self._at_pressure(normal_force)
+        # at growths y_0 = 0 and those that reach the depths of the table: y - gain X
+        grown = np.maximum(self.depth[None, :] - before[:, None], 0.0)
+        there = np.where(grown > 0.0, by_depth, self._at_depth(by_depth, before)[0][:, None])
+        steep = gain * work
+        grown = np.concatenate([np.zeros((before.size, 1)), grown], axis=1)
+        excess = grown - steep[:, None] * np.concatenate([self._at_depth(by_depth, before)[0][:, None], there], axis=1)
+        passed = excess[:, 1:] >= 0.0
+        pairs = np.arange(before.size)
+        place = np.argmax(passed, axis=1)
+        low, high = (excess[pairs, place], grown[pairs, place]), (excess[pairs, place + 1], grown[pairs, place + 1])
+        rise = high[0] - low[0]
+        fraction = np.divide(-low[0], rise, out=np.zeros_like(rise), where=rise > 0.0)
+        inside = low[1] + fraction * (high[1] - low[1])
+        return np.where(passed.any(axis=1), inside, steep * by_depth[:, -1])
+
+    def growth_tangent(
+        self,
+        gain: FloatArray,
+        at: tuple[FloatArray, FloatArray, FloatArray],
+        slip_work_tangent: FloatArray,
+        normal_force_tangent: FloatArray,
+    ) -> FloatArray:
+        """Derivative (n_contact, k) of the growth from those of slip work and mean normal force, (n_contact, k).
+
+        at: slip work, J, normal force, N, and depth, m, at the end of the step, (n_contact,) each.
+        """
+        if self.table is None:
+            return (gain * self.slopes(*at)[0])[:, None] * slip_work_tangent
+        by_work, by_force, by_depth = self.slopes(*at)
+        follows = gain / (1.0 - gain * by_depth)
+        grown: FloatArray = (follows * by_work)[:, None] * slip_work_tangent
+        return grown + (follows * by_force)[:, None] * normal_force_tangent
+
+    def _without_table(self, slip_work: FloatArray) -> FloatArray:
+        work = slip_work if self.least is None else np.maximum(slip_work - self.least, 0.0)
+        return work if self.factor is None else self.factor * work
+
+    def _at_pressure(self, normal_force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The table at the pressures of the pairs (n_contact, n_d), and its derivative to the normal force, 1/N."""
+        assert self.pressure is not None
+        assert self.table is not None
+        assert self.area is not None
+        place, fraction, width = _between(self.pressure, normal_force / self.area)
+        low, high = self.table[place], self.table[np.minimum(place + 1, len(self.pressure) - 1)]
+        slope = np.divide(1.0, width * self.area, out=np.zeros_like(width), where=width > 0.0)
+        return low + fraction[:, None] * (high - low), slope[:, None] * (high - low)
+
+    def _at_depth(self, by_depth: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values of rows (n_contact, n_d) at the depths of the pairs, m, and their derivatives, 1/m."""
+        assert self.depth is not None
+        place, fraction, width = _between(self.depth, depth)
+        pairs = np.arange(depth.size)
+        low, high = by_depth[pairs, place], by_depth[pairs, np.minimum(place + 1, len(self.depth) - 1)]
+        slope = np.divide(high - low, width, out=np.zeros_like(width), where=width > 0.0)
+        return low + fraction * (high - low), slope
+
+
+ARCHARDS_WORK = WearingWork()
+"""All slip work wears."""
+
+
+def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+    """Place of the knot before each value, fraction of the way to the next one, and that way; 0 beyond the ends."""
+    place = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 1)
+    width = np.append(np.diff(knots), 0.0)[place]
+    width = np.where(at < knots[0], 0.0, width)
+    fraction = np.divide(at - knots[place], width, out=np.zeros_like(width), where=width > 0.0)
+    return place, fraction, width
+
+
+def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
+    """The work that wears the pairs of a joint by a law.
+
+    Parameters
+    ----------
+    law
+        As a study names it.
+    contact
+        The pairs: areas, and the labels of their surfaces.
+    friction_coefficient
+        (n_contact,), of each pair.
+
+    Raises
+    ------
+    ValueError
+        Where the law is none of `LAWS`, or the surfaces that it names are not those of the pairs.
+    """
+    if law.name not in LAWS:
+        raise ValueError(f'wear law "{law.name}": give one of {", ".join(LAWS)}')
+    factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else None
+    if law.name == "energy":
+        factor = friction_coefficient if factor is None else factor * friction_coefficient
+    least = law.threshold * contact.area if law.name == "threshold" else None
+    if law.name != "table" or law.table is None:
+        return WearingWork(factor, least)
+    table = law.table
+    return WearingWork(
+        factor, least, np.array(table.pressure), np.array(table.depth), np.array(table.factor), contact.area
+    )

@@ -1,0 +1,241 @@
+"""Wear laws: rate and gain, the work that wears, its derivatives, and histories against differential equations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline, RegularGridInterpolator
+from scipy.optimize import brentq
+
+from solver import march_wear as march_model
+from solver.contact.archard import slip_work_rate, slip_work_slopes, volume_rate, wear_gain, wear_rate
+from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
+from solver.results.history import WearHistory
+from solver.settings import Scheme, SolverSettings
+from solver.wear.march import march_wear
+from tests.solver.models import random_balance, random_model
+from tests.solver.test_balance import jacobian_by_differences
+from tests.solver.test_march import AREA as PAIR_AREA
+from tests.solver.test_march import COARSE, END, FRICTION, march, slider_start
+from tests.solver.test_march import WEAR as COEFFICIENT
+
+WEAR, AREA, WORK = 1.1e-11, np.array([1e-6, 2e-6, 4e-6]), np.array([0.1, 0.0, 0.3])
+SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
+CYCLES = np.linspace(0.0, END, 9)
+# of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
+TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
+THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
+
+
+def test_the_rate_is_the_wear_coefficient_times_work_over_the_area() -> None:
+    assert wear_rate(WEAR, AREA, WORK) == pytest.approx(WEAR * WORK / AREA, rel=1e-15)
+    assert volume_rate(WEAR, WORK.sum()) == pytest.approx(wear_rate(WEAR, AREA, WORK) @ AREA, rel=1e-15)
+
+
+def test_the_slopes_are_the_derivatives_of_the_slip_work() -> None:
+    normal, speed, step = 12.0, 0.3, 1e-4
+    by_normal = (slip_work_rate(normal + step, speed) - slip_work_rate(normal - step, speed)) / (2 * step)
+    by_speed = (slip_work_rate(normal, speed + step) - slip_work_rate(normal, speed - step)) / (2 * step)
+    assert slip_work_slopes(normal, speed) == pytest.approx((by_normal, by_speed), rel=1e-9)
+
+
+def test_slip_work_times_friction_is_what_friction_dissipates() -> None:
+    # the trapezoidal rule takes the normal force of both ends of an increment, the return map that of its end
+    balance, predicted = random_balance(random_model(1), SolverSettings(3, 2048), 1, wear=False)
+    at = balance.evaluate(predicted)
+    slip = np.diff(at.state_t, axis=2) / balance.joint.penalty.tangential[:, None, None]
+    dissipated = (at.force_t[:, 1:] * slip).sum(axis=(1, 2))
+    assert dissipated.max() > 0.0
+    energy = wearing_work(WearLaw("energy"), balance.joint.contact, balance.joint.friction_coefficient)
+    assert dissipated == pytest.approx(energy.work(at.slip_work, at.slip_work, at.wear_depth), rel=5e-3)
+
+
+def test_archards_law_takes_the_slip_work_as_it_is() -> None:
+    gain = wear_gain(WEAR, AREA, 250.0)
+    assert ARCHARDS_WORK.work(WORK, WORK, WORK) is WORK
+    assert np.array_equal(ARCHARDS_WORK.growth(gain, WORK, WORK, WORK), 250.0 * WEAR / AREA * WORK)
+    tangent = np.random.default_rng(0).normal(size=(3, 5))
+    assert np.array_equal(
+        ARCHARDS_WORK.growth_tangent(gain, (WORK, WORK, WORK), tangent, tangent), gain[:, None] * tangent
+    )
+    assert ARCHARDS_WORK.largest_factor == ARCHARDS_WORK.amplification(WORK, WORK, WORK) == 1.0
+
+
+def random_work(seed: int, n_contact: int, n_pressures: int = 4, n_depths: int = 5) -> WearingWork:
+    """All that a law can have, for forces of about 100 N on 1e-4 m2 and depths of micrometres."""
+    random = np.random.default_rng(seed)
+    return WearingWork(
+        factor=random.uniform(0.5, 2.0, n_contact),
+        least=random.uniform(0.0, 1e-4, n_contact),
+        pressure=np.sort(random.uniform(0.1e6, 2e6, n_pressures)),
+        depth=np.sort(random.uniform(0.0, 5e-6, n_depths)),
+        table=random.uniform(0.0, 2.0, (n_pressures, n_depths)),
+        area=random.uniform(0.5e-4, 2e-4, n_contact),
+    )
+
+
+def test_a_table_is_bilinear_and_constant_beyond_its_ends() -> None:
+    law, random = replace(random_work(0, 200), factor=None, least=None), np.random.default_rng(1)
+    force, depth = random.uniform(0.0, 400.0, 200), random.uniform(-1e-6, 6e-6, 200)
+    assert law.pressure is not None
+    assert law.depth is not None
+    assert law.area is not None
+    reference = RegularGridInterpolator((law.pressure, law.depth), law.table)
+    inside = np.clip(force / law.area, law.pressure[0], law.pressure[-1]), np.clip(depth, law.depth[0], law.depth[-1])
+    assert law.work(np.ones(200), force, depth) == pytest.approx(reference(np.stack(inside, axis=1)), rel=1e-12)
+    assert law.largest_factor == np.max(law.table)
+    single = replace(law, pressure=law.pressure[:1], depth=law.depth[:1], table=np.array([[0.3]]))
+    assert np.array_equal(single.work(np.ones(200), force, depth), np.full(200, 0.3))
+    assert not np.any(single.slopes(np.ones(200), force, depth)[1:])
+
+
+def test_the_slopes_of_the_work_are_its_derivatives() -> None:
+    law, random = random_work(2, 300), np.random.default_rng(3)
+    given = random.uniform(0.0, 3e-4, 300), random.uniform(0.0, 300.0, 300), random.uniform(0.0, 6e-6, 300)
+    for place, step in enumerate((1e-9, 1e-3, 1e-12)):
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = [value + sign * step * (place == other) for other, value in enumerate(given)]
+            sides.append(law.work(moved[0], moved[1], moved[2]))
+        slope = law.slopes(*given)[place]
+        size = np.abs(slope).max()
+        away = np.abs((sides[0] - sides[1]) / (2 * step) - slope) < 1e-6 * size
+        # but for those within a step of a corner
+        assert np.count_nonzero(~away) <= 2
+        assert np.count_nonzero(slope) > 50
+    assert not replace(law, depth_held=True).slopes(*given)[2].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_grows_by_the_least_root_of_its_own_equation(seed: int) -> None:
+    law, random = random_work(seed, 60), np.random.default_rng(seed + 10)
+    work, force = random.uniform(0.0, 3e-4, 60), random.uniform(0.0, 300.0, 60)
+    before, gain = random.uniform(0.0, 6e-6, 60), 10.0 ** random.uniform(-5.0, -1.0, 60)
+    grown = law.growth(gain, work, force, before)
+    scan = np.concatenate([[0.0], np.geomspace(1e-13, 1e-2, 4000)])
+    excess = np.array([y - gain * law.work(work, force, before + y) for y in scan])
+    for pair in range(60):
+        last = int(np.argmax(excess[:, pair] >= 0.0))
+
+        def left(y: float, pair: int = pair) -> float:
+            return y - float((gain * law.work(work, force, before + y))[pair])
+
+        expected = brentq(left, scan[last - 1], scan[last], xtol=1e-20) if last else 0.0
+        assert grown[pair] == pytest.approx(expected, rel=1e-9, abs=1e-18)
+    assert (grown == 0.0).any()
+    assert np.count_nonzero(grown) > 20
+
+
+LAWS = {
+    "energy": WearLaw("energy", surfaces=(("plane", 1.7),)),
+    "threshold": WearLaw("threshold"),
+    "table": WearLaw("table", table=WearTable((2e5, 1e6, 3e6), (0.0, 1e-6, 2e-6), ((1, 2, 1), (0.5, 1, 2), (2, 1, 3)))),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name: str) -> None:
+    model = random_model(2, ("3d", "constant_load", "one_tangent"))
+    balance, predicted = random_balance(model, SolverSettings(3, 24), 102, wear=True)
+    joint = balance.joint
+    # the table bends with the depth at growths of about a micrometre
+    gain = balance.wear_gain if name != "table" else 1e-2 * balance.wear_gain
+    density = balance.evaluate(predicted).slip_work / joint.contact.area
+    # one pair above it, one below
+    chosen = replace(LAWS[name], threshold=float(density[[0, 2]].mean()))
+    law = wearing_work(chosen, joint.contact, joint.friction_coefficient)
+    balance = replace(balance, wearing=law, wear_gain=gain)
+    at = balance.evaluate(predicted)
+    by_work, by_force, by_depth = law.slopes(at.slip_work, at.force_h[:, 0, 0], at.wear_depth)
+    assert by_work.any()
+    assert name != "table" or (by_force.any() and np.abs(gain * by_depth).max() > 0.01)
+    differences = jacobian_by_differences(balance, predicted, 1e-4)
+    dense = balance.linearise(at).dense(np.arange(joint.contact.n_contact))
+    assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
+    plain = replace(balance, wearing=ARCHARDS_WORK).linearise(at).dense(np.arange(joint.contact.n_contact))
+    assert np.abs(plain - differences).max() > 1e-4 * np.abs(differences).max()
+
+
+def march_by(law: WearLaw, scheme: Scheme, wear: float = COEFFICIENT, step: float = 1000.0) -> WearHistory:
+    model, start = slider_start(COARSE)
+    settings = replace(COARSE, rtol=1e-3)
+    return march_wear(model, FRICTION, start, wear, step, scheme, CYCLES, settings, law=law)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coefficient(scheme: Scheme) -> None:
+    energy, archard = march_by(WearLaw("energy"), scheme), march_by(ARCHARD, scheme, FRICTION * COEFFICIENT)
+    for name in ("wear_depth", "wear_rate", "worn_volume", "step_limit", "mean_pressure"):
+        assert getattr(energy, name) == pytest.approx(getattr(archard, name), rel=1e-12, abs=0.0)
+    assert energy.newton_iterations == archard.newton_iterations
+    assert energy.error_estimate == pytest.approx(archard.error_estimate, rel=1e-9)
+
+
+def depth_by_equation(law: WearLaw) -> float:
+    """Depth of the slider at the end: slip work and pressure are functions of the depth alone, whatever wore it."""
+    fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401))
+    depth = fine.wear_depth[:, 0]
+    work = CubicSpline(depth, fine.wear_rate / COEFFICIENT)
+    pressure = CubicSpline(depth, fine.mean_pressure[:, 0])
+
+    def rate(_: float, depth: list[float]) -> float:
+        (w,) = depth
+        worn, factor = float(work(w)), 1.0
+        if law.name == "threshold":
+            worn = max(worn - law.threshold * PAIR_AREA, 0.0)
+        if law.table is not None:
+            table = law.table
+            look = RegularGridInterpolator((table.pressure, table.depth), np.array(table.factor))
+            factor = float(
+                look((np.clip(pressure(w), *np.array(table.pressure)[[0, -1]]), np.clip(w, 0.0, table.depth[-1])))
+            )
+        return COEFFICIENT * factor * worn / PAIR_AREA
+
+    found = solve_ivp(rate, (0.0, END), [0.0], "DOP853", rtol=1e-9, atol=1e-16, max_step=500.0)
+    return float(found.y[0, -1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [WearLaw("threshold", THRESHOLD), WearLaw("table", table=TABLE)], ids=lambda x: x.name)
+def test_histories_are_those_of_the_differential_equation(law: WearLaw) -> None:
+    exact = depth_by_equation(law)
+    assert exact < 0.9 * depth_by_equation(ARCHARD) or exact > 1.1 * depth_by_equation(ARCHARD)
+    adaptive = march_by(law, "adaptive")
+    assert adaptive.wear_depth[-1, 0] == pytest.approx(exact, rel=1e-3)
+    errors = [
+        [march_by(law, scheme, step=step).wear_depth[-1, 0] - exact for step in (2000.0, 1000.0)]
+        for scheme in ("explicit", "implicit")
+    ]
+    for coarse, fine in errors:
+        assert coarse / fine == pytest.approx(2.0, rel=0.1)
+        assert abs(fine) < 0.02 * exact
+    # their leading errors are opposite
+    assert errors[0][1] / errors[1][1] == pytest.approx(-1.0, rel=0.15)
+
+
+def test_below_the_threshold_nothing_wears() -> None:
+    history = march_by(WearLaw("threshold", 5.0 * THRESHOLD), "adaptive")
+    assert not history.wear_depth.any()
+    assert history.last_cycle == END
+
+
+def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor() -> None:
+    model = random_model(1)
+    sides = replace(model.contact, surface=("flat/cylinder", "flat/cylinder", "flat"))
+    law = WearLaw(surfaces=(("flat", 1.0), ("cylinder", 0.5)))
+    found = wearing_work(law, sides, np.zeros(3)).work(np.ones(3), np.ones(3), np.ones(3))
+    assert found.tolist() == [1.5, 1.5, 1.0]
+    for wrong in ((("flat", 1.0),), (("flat", 1.0), ("cylinder", 0.5), ("disk", 1.0))):
+        with pytest.raises(
+            ValueError, match=r'"(cylinder|disk)": give a factor to each of the surfaces flat, cylinder'
+        ):
+            wearing_work(WearLaw(surfaces=wrong), sides, np.zeros(3))
+
+
+def test_a_law_that_does_not_exist_names_those_that_do() -> None:
+    model, _ = slider_start(COARSE)
+    with pytest.raises(ValueError, match='"reye": give one of archard, energy, threshold, table'):
+        march_model(model, 160.0, 10.0, FRICTION, COEFFICIENT, [10.0], law=WearLaw("reye"))

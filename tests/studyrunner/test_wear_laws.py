@@ -1,0 +1,77 @@
+"""[wear] of a study: from the file to the result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
+from studyrunner import run_study
+from studyrunner.plan.identity import Identities
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import format_study, read_study
+from tests.studyrunner.fakes import FACTS
+
+SHORT = ("axes.frequency=160", "axes.scheme=adaptive", "slow_time.cycles=20000", "slow_time.outputs=3")
+TABLE = (
+    "wear.law=table",
+    "wear.pressure=[1e4, 1e5]",
+    "wear.depth=[0, 1e-5]",
+    "wear.factor=[[1, 2], [0.5, 1]]",
+)
+
+
+def study_with(*overrides: str) -> Study:
+    return read_study("sdof_slider", (*SHORT, *overrides))
+
+
+def test_without_a_wear_table_the_law_is_archards() -> None:
+    assert study_with().wear_law == ARCHARD
+
+
+@pytest.mark.parametrize(
+    ("overrides", "law"),
+    [
+        (("wear.law=energy",), WearLaw("energy")),
+        (("wear.law=threshold", "wear.threshold=0.5"), WearLaw("threshold", 0.5)),
+        (TABLE, WearLaw("table", table=WearTable((1e4, 1e5), (0.0, 1e-5), ((1.0, 2.0), (0.5, 1.0))))),
+        (('wear.surfaces={"the support, 1" = 2, a_b-1 = 0}',), WearLaw(surfaces=(("the support, 1", 2), ("a_b-1", 0)))),
+    ],
+    ids=["energy", "threshold", "table", "surfaces"],
+)
+def test_the_effective_study_has_the_same_law(overrides: tuple[str, ...], law: WearLaw, tmp_path: Path) -> None:
+    study = study_with(*overrides)
+    assert study.wear_law == law
+    (tmp_path / "again.toml").write_text(format_study(study))
+    assert read_study(tmp_path / "again.toml").wear_law == law
+
+
+def test_a_history_is_known_by_its_law_and_a_start_state_is_not() -> None:
+    found = []
+    for overrides in ((), ("wear.law=energy",), ("wear.surfaces={support = 2.0}",)):
+        study = study_with(*overrides)
+        plan, of = build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
+        found.append((of.of_starts(plan.branches[0]), of.of_histories(plan.branches[0], plan.marches[0][0])))
+    assert len({starts for starts, _ in found}) == 1
+    assert len({histories for _, histories in found}) == 3
+
+
+@pytest.mark.slow
+def test_the_law_of_a_study_is_the_one_that_wears(tmp_path: Path) -> None:
+    def final(*overrides: str) -> np.ndarray:
+        result = run_study(study_with(*overrides), tmp_path / "out.nc")
+        return np.asarray(result.worn_volume.isel(cycle=-1).values.ravel())
+
+    archard = final()
+    assert final("wear.law=energy", "axes.wear_coefficient=2.2e-11") == pytest.approx(archard, rel=1e-12)
+    assert final("wear.surfaces={support = 0.5}", "axes.wear_coefficient=2.2e-11") == pytest.approx(archard, rel=1e-12)
+    assert 0.0 < final("wear.law=threshold", "wear.threshold=10") < 0.9 * archard
+    assert not final("wear.law=threshold", "wear.threshold=1e4").any()
+    # one march for all wear coefficients: worn volumes are those of products of coefficient and cycles
+    shared = final(*TABLE, "axes.wear_coefficient=[1.1e-11, 5.5e-12]", "slow_time.cycles=20000")
+    half = final(*TABLE, "axes.wear_coefficient=1.1e-11", "slow_time.cycles=10000")
+    assert shared[1] == pytest.approx(half[0], rel=1e-3)
+    assert abs(shared[0] / archard[0] - 1.0) > 0.01
