@@ -21,7 +21,7 @@ from solver import FrequencyResponse, Outcome, SolverSettings, build_model, freq
 from studies import SceneError, build_scene, read_scene
 from studies.scene_file import write_scene
 from studies.scenes import sdof_slider
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studyrunner import Study, UserError, open_result, read_study, run, run_study
 from studyrunner.cli import main
 from studyrunner.evaluate import build_evaluator

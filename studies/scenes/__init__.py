@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from solver.model import FloatArray, ReducedModel
     from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh
 
-BUNDLED = ("dovetail_sector", "sdof_slider", "two_masses", "vibro_impact")
+BUNDLED = ("cylinder_on_flat", "dovetail_sector", "sdof_slider", "sphere_on_flat", "two_masses", "vibro_impact")
 
 AUTOMATIC_HARMONICS_OF_A_WAVE = 13
 """Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from studies.scene_answers import ExactAnswer
-from studies.scenes.den_hartog import DenHartogSlider, worn_normal_force
+from studies.scenes.closed_forms.den_hartog import DenHartogSlider, worn_normal_force
 
 
 class Parameters(BaseModel):

@@ -12,7 +12,7 @@ from solver.model import ReducedModel
 from studies.scene_answers import N_MODES, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from studies.scenes.finite_element.surface import outer_faces
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth

@@ -13,6 +13,8 @@ from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies
 
 SMALL = {
+    "cylinder_on_flat": ["scene.strips=24", "solver.harmonics=3", "solver.samples=64"],
+    "sphere_on_flat": ["scene.patches=5", "solver.harmonics=3", "solver.samples=64"],
     "dovetail": [
         "scene.mesh=1",
         "axes.frequency=[207.0, 212.5]",

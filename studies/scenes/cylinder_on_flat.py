@@ -1,0 +1,106 @@
+"""A cylinder on a flat, the classic fretting test: plane strain, one material, without mass.
+
+Strips of half of the contact carry uniform tractions on two elastic half-planes; each stands for its mirror image, too
+(`half_space.influence`). A constant force presses; an oscillating tangential force Q, or a prescribed stroke, moves the
+cylinder. `excitation_amplitude` multiplies Q or the stroke, and the frequency has no influence. Unworn, the pressure is
+Hertz's and the stick zone Cattaneo's, and partial slip wears to a profile that is known (`closed_forms.hertz`). The
+depth of a pair is that of flat and cylinder together; areas, forces and volumes are of both halves. The strips stay
+where they are: a stroke is small beside the contact.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from solver.model import ReducedModel
+from studies.scene_error import SceneError
+from studies.scenes.closed_forms.hertz import line_half_width, line_stick_width
+from studies.scenes.half_space.influence import composite_modulus, strip_compliance
+from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
+
+_WIDER = 1.0 / 6.0
+"""Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
+Measured: with 0.16 to 0.18 the depth worn in the end is within 0.2 % on 200 strips, with 0 it is 1 to 4 % off."""
+
+
+class Parameters(BaseModel):
+    """Bodies, loads and strips.
+
+    The defaults are steel under 120 N/mm with half of the force that would slide: the half-width is 0.0913 mm, the
+    largest pressure 836 MPa, and half of the contact area sticks.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu, 1")
+    R: float = Field(6e-3, gt=0, description="radius of the cylinder, m")
+    P: float = Field(1.2e5, gt=0, description="normal force per length, N/m")
+    Q: float | None = Field(
+        None, gt=0, description="amplitude of the tangential force per length, N/m; mu P / 2 where no stroke is given"
+    )
+    stroke: float | None = Field(
+        None, gt=0, description="amplitude of the prescribed tangential motion in place of Q, m"
+    )
+    E: float = Field(200e9, gt=0, description="Young's modulus of both bodies, Pa")
+    nu: float = Field(0.3, ge=0, lt=0.5, description="Poisson's ratio of both bodies, 1")
+    length: float = Field(0.01, gt=0, description="length of the cylinder, m")
+    strips: int = Field(100, ge=4, le=800, multiple_of=2, description="number of strips, of both halves")
+    half_width: float | None = Field(
+        None,
+        gt=0,
+        description="half of the width of all strips, m; if not given about 1.5 times that of the unworn contact, so"
+        " that an edge of strips is at that of the stick zone",
+    )
+    depth: float | None = Field(
+        None,
+        gt=0,
+        description="depth that displacements refer to, m, above the width of all strips; R if not given",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Parameters:
+        if self.Q is not None and self.stroke is not None:
+            raise SceneError("stroke", str(self.stroke), "give Q or stroke, not both")
+        width, reference = 2.0 * strips_half_width(self), reference_depth(self)
+        if reference <= width:
+            raise SceneError("depth", f"{reference:g}", f"give more than the width of all strips, {width:g} m")
+        return self
+
+
+def strips_half_width(parameters: Parameters) -> float:
+    """Half of the width of all strips, m."""
+    p = parameters
+    if p.half_width is not None:
+        return p.half_width
+    contact = line_half_width(p.P, p.R, composite_modulus(p.E, p.nu))
+    share = 1.0 if p.stroke is not None else tangential_force(p) / max(p.friction_coefficient * p.P, 1e-300)
+    if share >= 1.0:
+        return 1.5 * contact
+    stick = line_stick_width(contact, share)
+    within = max(round(0.5 * p.strips * stick / (1.5 * contact)), 1)
+    return 0.5 * p.strips * stick / (within - _WIDER)
+
+
+def tangential_force(parameters: Parameters) -> float:
+    """Amplitude of the tangential force per length, N/m, where no stroke is given."""
+    p = parameters
+    return 0.5 * p.friction_coefficient * p.P if p.Q is None else p.Q
+
+
+def reference_depth(parameters: Parameters) -> float:
+    """Depth that displacements refer to, m."""
+    return parameters.R if parameters.depth is None else parameters.depth
+
+
+def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
+    """Reduced model; `n_harmonics` has no influence: all harmonics see the same structure."""
+    del n_harmonics
+    p = parameters
+    edges = np.linspace(0.0, strips_half_width(p), p.strips // 2 + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    compliance = strip_compliance(edges, composite_modulus(p.E, p.nu), p.length, reference_depth(p))
+    position = np.stack([middle, np.zeros_like(middle), np.zeros_like(middle)], axis=1)
+    contact = pairs_of_patches(position, 2.0 * np.diff(edges) * p.length, middle**2 / (2.0 * p.R), "flat/cylinder")
+    force = tangential_force(p) * p.length if p.stroke is None else None
+    return press_body((compliance, compliance), contact, p.P * p.length, force, p.stroke, "cylinder")
