@@ -4,13 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from solver.packing import packable
 
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
 """Of the steps on the slow time scale."""
+
+
+Quantity = Literal["wear_depth", "worn_volume"]
+TARGETS: tuple[Quantity, ...] = get_args(Quantity)
+"""What a target may be of."""
+
+
+@dataclass(frozen=True)
+class WearTarget:
+    """Wear at which a march ends.
+
+    quantity: "wear_depth", of the deepest pair, m, or "worn_volume", of all pairs, m3. value: above 0.
+    """
+
+    quantity: Quantity
+    value: float
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
-from solver.settings import Scheme, SolverSettings
+from solver.settings import TARGETS, Scheme, SolverSettings, WearTarget
 from solver.structure.joint import friction_of_pairs
 from solver.wear.march import march_wear as march_from_start
 
@@ -32,6 +32,7 @@ def march_wear(
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
     law: WearLaw = ARCHARD,
+    until: WearTarget | None = None,
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state on.
 
@@ -61,6 +62,8 @@ def march_wear(
         The defaults of `SolverSettings` if not given.
     law
         What of the slip work wears, Archard's law if not given: `solver.contact.wear_law`.
+    until
+        Wear at which the march ends before the last of `cycles`; `cycles_to_target` of the history is that count.
 
     Raises
     ------
@@ -81,7 +84,12 @@ def march_wear(
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
     counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
+    if until is not None:
+        check_word("until.quantity", until.quantity, TARGETS)
+        check_number("until.value", until.value, above=0.0)
     # that the law is none of these pairs is the fault of the caller, not of the march
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
-    return march_from_start(model, friction, start, per_pressure, length, scheme, counts, settings, law=law)
+    return march_from_start(
+        model, friction, start, per_pressure, length, scheme, counts, settings, law=law, until=until
+    )

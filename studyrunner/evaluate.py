@@ -144,6 +144,7 @@ def _solve(
         keep=keep,
         resume=task.resume,
         law=law,
+        until=task.until,
     )
     _raise_fault(history)
     return history
@@ -170,6 +171,10 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     jump = history.jump_cycle
     if place:
         jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
+    target = history.cycles_to_target / slower
+    if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
+        # another history of the march goes farther
+        target = math.nan
     outcome = scaled_outcome(task, history, known, place, whole=bool(reached.all()))
     last = task.cycles[-1]
     if not reached.all():
@@ -177,14 +182,16 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
     errors, depths = history.worn_volume_error[known], history.wear_depth[known]
+    message = _message(task, history, outcome, place, slower, known, last)
     of_its_own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,
+        "cycles_to_target": target,
         "error_estimate": float(errors[-1]) if known.size else math.nan,
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
-        "message": _message(task, history, outcome, place, slower, known, last),
+        "message": message or _missed(task, history, known, target),
     }
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
@@ -253,6 +260,15 @@ def _message(
     cycle = float(history.cycles[behind[0]]) / slower
     begin = f"from cycle {show_count(cycle)} on " if cycle > 0.0 else ""
     return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
+
+
+def _missed(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float) -> str:
+    """That the target of a history was not reached; empty where it was, or where there is none."""
+    if task.until is None or not known.size or not math.isnan(target):
+        return ""
+    deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
+    value, unit = (deepest, "m") if task.until.quantity == "wear_depth" else (volume, "m3")
+    return f"{task.until.quantity} stays below {task.until.value:g} {unit}: it is {value:.3g} {unit} at the last count"
 
 
 def _variable(

@@ -228,6 +228,13 @@ KEPT = {
         comment="The attribute sentences holds a line for each of the flags.",
     ),
     "jump_cycle": Variable((), "1", "first cycle count at which the branch was lost", comment="NaN if never."),
+    "cycles_to_target": Variable(
+        (),
+        "1",
+        "cycle count at which slow_time.until was reached",
+        comment="The point ends with the step that reaches it. NaN where there is no target, or where it is never"
+        " reached: message says how far the wear came.",
+    ),
     "newton_iterations": Variable(
         (),
         "1",

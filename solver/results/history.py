@@ -71,7 +71,8 @@ class WearHistory:
     last_cycle: count up to which the point was computed, whatever ended it; NaN where there is no state at all.
     loop_displacement, m, loop_force, N (n_output, n_loops, n_phase, 3): fretting loops of the pairs asked for, as
         `solver.results.loops.contact_loops` has them.
-    jump_cycle: first cycle count at which the branch was lost, NaN if never.
+    jump_cycle: first cycle count at which the branch was lost, NaN if never. cycles_to_target: count at which the wear
+        asked for was reached, NaN if never or if none was asked for; the march ends with the step that reached it.
     worn_volume_error (n_output,): estimated relative error of the worn volume: steps with their propagation, harmonics,
         samples and start state; 0 where nothing has worn. wear_depth_error (n_output, n_contact): the same of the
         depths, m. error_estimate: `worn_volume_error` at the last count that was reached.
@@ -116,6 +117,7 @@ class WearHistory:
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
     last_cycle: float = math.nan
+    cycles_to_target: float = math.nan
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf

@@ -37,6 +37,9 @@ class ResultOptions:
     calming: float = 0.98
     """Increment over the one before, below which an oscillation calms."""
 
+    target_resolution: float = 1e-12
+    """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""
+
     def companion_safety(self, scheme: Scheme) -> float:
         """Error of a history over its difference to the companion."""
         factors = {"implicit": self.implicit_safety, "explicit": self.explicit_safety, "adaptive": self.adaptive_safety}

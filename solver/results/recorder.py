@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypedDict
@@ -17,7 +18,7 @@ from solver.results.history import WearHistory
 from solver.results.loops import LOOP_PHASES
 from solver.results.options import RESULTS
 from solver.results.state_report import StateReport
-from solver.settings import Scheme
+from solver.settings import Scheme, WearTarget
 
 REPORTED = (
     "wear_depth",
@@ -58,6 +59,8 @@ class Recorder:
     instead, and all else by the fraction of the step's worn volume, of which the state is a function: long steps of
     higher order are worth that. Fretting loops (n_loops of them) are interpolated phase by phase like all else, so that
     they close, stay within the friction cone and have the mean pressure that is reported at the same count.
+
+    target: wear whose count is looked for between the steps in the same way; reached: that count, NaN until then.
     """
 
     model: ReducedModel
@@ -66,6 +69,8 @@ class Recorder:
     start_time: float
     scheme: Scheme
     n_loops: int = 0
+    target: WearTarget | None = None
+    reached: float = field(init=False, default=math.nan)
     kept: dict[str, Any] = field(init=False, repr=False)
     last: tuple[float, StateReport, float] | None = field(init=False, default=None, repr=False)
     local: float = field(init=False, default=0.0, repr=False)
@@ -133,6 +138,7 @@ class Recorder:
                 self.pair_truncation = self.pair_truncation + half * gain * of.wearing_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.wearing_work)) for of in (before_report, report)]
+        self._look_for_target(before, cycle, ends[0], ends[1])
         depth = depth_within(fraction, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
             fraction = self._worn_fraction(depth, before_report.wear_depth, report.wear_depth, fraction)
@@ -153,6 +159,27 @@ class Recorder:
         self.kept["truncation"][wanted] = self.truncation
         self.kept["pair_truncation"][wanted] = self.pair_truncation
         self.last = (cycle, report, rate)
+
+    def _look_for_target(
+        self, before: float, cycle: float, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray]
+    ) -> None:
+        """Note the count at which a step reaches the target; start, end: depth and wear rate, as `depth_within` has."""
+        if self.target is None or self._worn(end[0]) < self.target.value or not math.isnan(self.reached):
+            return
+        low, high = 0.0, 1.0
+        # depths never fall within a step
+        while high - low > RESULTS.target_resolution:
+            middle = 0.5 * (low + high)
+            depth = depth_within(np.array([middle]), cycle - before, start, end, self.scheme == "adaptive")[0]
+            low, high = (low, middle) if self._worn(depth) >= self.target.value else (middle, high)
+        self.reached = before + high * (cycle - before)
+
+    def _worn(self, depth: FloatArray) -> float:
+        """What the target is compared with: the largest depth, m, or the volume, m3, of depths (n_contact,), m."""
+        assert self.target is not None
+        if self.target.quantity == "wear_depth":
+            return float(depth.max(initial=0.0))
+        return float(depth @ self.model.contact.area)
 
     def _worn_fraction(
         self, depth: FloatArray, before: FloatArray, after: FloatArray, otherwise: FloatArray
@@ -220,6 +247,8 @@ class Recorder:
             newton_iterations=self.start_iterations + iterations,
             run_time=self.start_time + run_time,
             last_cycle=float("nan") if self.last is None else min(self.last[0], float(self.cycles[-1])),
+            # adaptive steps go beyond the end
+            cycles_to_target=self.reached if self.reached <= self.cycles[-1] else math.nan,
             **kept,
         )
 

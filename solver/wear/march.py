@@ -15,7 +15,7 @@ from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
-from solver.settings import Scheme, SolverSettings
+from solver.settings import Scheme, SolverSettings, WearTarget
 from solver.structure.joint import build_case
 from solver.wear.bdf2 import AdaptiveSteps
 from solver.wear.companion import Companion
@@ -38,6 +38,7 @@ def march_wear(
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
     law: WearLaw = ARCHARD,
+    until: WearTarget | None = None,
 ) -> WearHistory:
     """Wear history of one point of a study, Eqs. (20) to (26).
 
@@ -67,6 +68,8 @@ def march_wear(
         last bit, but for `run_time`.
     law
         Of the wear.
+    until
+        Wear at which the march ends before its last count, with the step that reaches it.
 
     Returns
     -------
@@ -74,7 +77,7 @@ def march_wear(
         As far as it was computed; its outcome says how it ended. No error is raised for a march that fails.
     """
     started = computing_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops))
+    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops), until)
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
@@ -102,7 +105,7 @@ def march_wear(
         if resume is not None:
             steps.load_state(states[2])
         refreshed = march.effort.iterations
-        while outcome is Outcome.CONVERGED and march.cycle < end:
+        while outcome is Outcome.CONVERGED and march.cycle < end and np.isnan(recorder.reached):
             if not march.wears():
                 recorder.add(end, march.report(), wear_coefficient)
                 break
@@ -126,8 +129,8 @@ def march_wear(
             outcome = march.check()
             if outcome is not Outcome.CONVERGED:
                 break
-            companion.follow(at_once=march.cycle >= end)
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
+            companion.follow(at_once=march.cycle >= end or not np.isnan(recorder.reached))
             if march.effort.iterations >= refreshed + WEAR.iterations_per_save:
                 spent = spent_before + computing_time() - started
                 parts = (march, recorder, steps, companion)
@@ -173,8 +176,9 @@ def march_wear(
 def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tuple[Outcome, str]:
     """Outcome of a history that has come to its end, and what it does not say by itself."""
     if history.error_estimate > SENSITIVE_ERROR:
-        area = march.joint.contact.area
-        volume, other = (1e9 * float(depth @ area) for depth in (history.wear_depth[-1], companion.kept[-1]))
+        # one that has reached its target has no last count
+        area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.worn_volume))[-1])
+        volume, other = (1e9 * float(depth[last] @ area) for depth in (history.wear_depth, companion.kept))
         known = "not known" if history.error_estimate >= 1.0 else f"known to {100 * history.error_estimate:.2g} % only"
         coarser = "steps twice as long from the start state of a coarser sweep"
         if not np.isfinite(other):

@@ -11,7 +11,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from functools import cache
 from importlib import metadata
 from importlib.util import find_spec
@@ -52,7 +52,7 @@ class Identities:
         """Of the histories of a march, one after the other."""
         start = self.of_starts(branch)[march.position]
         own = (*self._wear(march, march.histories[0]), march.scheme if not march.held else "", march.held)
-        kept = march.cycles, march.loops
+        kept = march.cycles, march.loops, None if march.until is None else astuple(march.until)
         if kept not in self._kept:
             self._kept[kept] = _digest(self._kind, kept)
         base = ("history", start, self._kept[kept], own, march.largest_depth, self._law)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from solver.packing import Packed
-from solver.settings import Automatic, SolverSettings
+from solver.settings import Automatic, SolverSettings, WearTarget
 from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
@@ -98,7 +98,8 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. histories: the one that goes
     farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
-    cycles: output counts of every history. variables: what is handed back. loops: pairs whose fretting loops are in it.
+    cycles: output counts of every history. until: wear at which it ends before the last of them. variables: what is
+        handed back. loops: pairs whose fretting loops are in it.
     cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
         those planned for and something moves.
     start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
@@ -119,6 +120,7 @@ class MarchTask:
     cost: float
     n_unknowns: int
     moves: bool = True
+    until: WearTarget | None = None
     start: Packed | None = field(default=None, compare=False, repr=False)
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
@@ -315,6 +317,7 @@ def _marches(
             loops=study.outputs.loops,
             cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, histories[0].step),
             n_unknowns=n_unknowns,
+            until=study.until,
         )
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdapter, model_validator
 
 from solver.contact.wear_law import WearLaw
-from solver.settings import Automatic
+from solver.settings import TARGETS, Automatic, WearTarget
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
     Axis,
@@ -43,6 +43,7 @@ AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme
 _MOST_POINTS = 1_000_000
 _N_OUTPUTS = TypeAdapter(Annotated[int, whole(1, 1_000_000)])
 _COUNT = TypeAdapter(NotNegative)
+_TARGET = TypeAdapter(Positive)
 _PAIR = TypeAdapter(Annotated[int, whole(0, 1_000_000)])
 
 DEFAULT: Final = "default"
@@ -84,6 +85,12 @@ def _read_loops(value: object) -> tuple[int, ...]:
     return tuple(sorted(once(read(_PAIR, item) for item in value)))
 
 
+def _read_target(value: object) -> dict[str, float]:
+    if not isinstance(value, dict) or len(value) != 1 or next(iter(value)) not in TARGETS:
+        raise WrongValueError(value, "give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
+    return {name: read(_TARGET, item) for name, item in value.items()}
+
+
 class StudySection(Section):
     """[study]: how the study is called."""
 
@@ -116,6 +123,9 @@ class SlowTimeSection(Section):
     cycles: NotNegative = Field(100_000.0, description="cycles; 0 for the unworn states only")
     outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
         101, description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts"
+    )
+    until: Annotated[dict[str, float] | None, BeforeValidator(_read_target)] = Field(
+        None, description="wear at which a point ends, {wear_depth = m of the deepest pair} or {worn_volume = m3}"
     )
     largest_depth: Positive | None = Field(
         None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
@@ -257,6 +267,14 @@ class Study(Section):
     def wear_law(self) -> WearLaw:
         """What is to be known of the wear law."""
         return self.wear.wear_law
+
+    @property
+    def until(self) -> WearTarget | None:
+        """Wear at which a point ends."""
+        for quantity in TARGETS:
+            if self.slow_time.until is not None and quantity in self.slow_time.until:
+                return WearTarget(quantity, self.slow_time.until[quantity])
+        return None
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:

@@ -84,6 +84,7 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
     totals = {
         "outcome": 0,
         "jump_cycle": np.nan,
+        "cycles_to_target": np.nan,
         "error_estimate": 0.01,
         "newton_iterations": round(fingerprint),
         "run_time": pause,

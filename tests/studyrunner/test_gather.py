@@ -80,6 +80,7 @@ CONTRACT = {
     "open_fraction": (("cycle", "contact"), "1"),
     "outcome": ((), "1"),
     "jump_cycle": ((), "1"),
+    "cycles_to_target": ((), "1"),
     "newton_iterations": ((), "1"),
     "run_time": ((), "s"),
     "error_estimate": ((), "1"),

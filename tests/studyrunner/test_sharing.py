@@ -303,6 +303,7 @@ def marched(
         keep: object,
         resume: object,
         law: object,
+        until: object,
     ) -> WearHistory:
         wear, cycles = arguments[3], arguments[6]
         assert isinstance(wear, float)

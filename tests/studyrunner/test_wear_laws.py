@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
+from solver.settings import WearTarget
 from studyrunner import run_study
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.tasks import build_tasks
@@ -51,12 +52,17 @@ def test_the_effective_study_has_the_same_law(overrides: tuple[str, ...], law: W
 
 def test_a_history_is_known_by_its_law_and_a_start_state_is_not() -> None:
     found = []
-    for overrides in ((), ("wear.law=energy",), ("wear.surfaces={support = 2.0}",)):
+    for overrides in (
+        (),
+        ("wear.law=energy",),
+        ("wear.surfaces={support = 2.0}",),
+        ("slow_time.until={wear_depth = 1}",),
+    ):
         study = study_with(*overrides)
         plan, of = build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
         found.append((of.of_starts(plan.branches[0]), of.of_histories(plan.branches[0], plan.marches[0][0])))
     assert len({starts for starts, _ in found}) == 1
-    assert len({histories for _, histories in found}) == 3
+    assert len({histories for _, histories in found}) == 4
 
 
 @pytest.mark.slow
@@ -75,3 +81,32 @@ def test_the_law_of_a_study_is_the_one_that_wears(tmp_path: Path) -> None:
     half = final(*TABLE, "axes.wear_coefficient=1.1e-11", "slow_time.cycles=10000")
     assert shared[1] == pytest.approx(half[0], rel=1e-3)
     assert abs(shared[0] / archard[0] - 1.0) > 0.01
+
+
+@pytest.mark.slow
+def test_points_end_at_their_target_each_at_its_own_count(tmp_path: Path) -> None:
+    shared = ("axes.wear_coefficient=[1e-11, 5e-12, 1e-12]", "slow_time.cycles=40000", "slow_time.outputs=41")
+    study = study_with(*shared, "slow_time.until={wear_depth = 1e-5}")
+    assert read_study(_written(study, tmp_path)).until == study.until == WearTarget("wear_depth", 1e-5)
+    whole = run_study(study, tmp_path / "out.nc")
+    result = whole.squeeze([name for name in whole.outcome.dims if name != "wear_coefficient"], drop=True)
+    counts = result.cycles_to_target.values
+    assert counts[1] == pytest.approx(2.0 * counts[0], rel=1e-9)
+    assert np.isnan(counts[2])
+    assert result.outcome.values.tolist() == [0, 0, 0]
+    assert result.message.values.tolist()[:2] == ["", ""]
+    assert result.message.values[2].startswith("wear_depth stays below 1e-05 m: it is ")
+    assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]
+    depth = result.wear_depth.isel(contact=0)
+    assert float(depth.isel(wear_coefficient=0).interp(cycle=counts[0])) == pytest.approx(1e-5, rel=1e-3)
+    assert (result.last_cycle[:2] >= result.cycles_to_target[:2]).all()
+    # nothing wears, nothing is reached
+    still = run_study(study_with("axes.wear_coefficient=0", "slow_time.until={worn_volume = 1e-12}"), tmp_path / "o.nc")
+    assert np.isnan(still.cycles_to_target.item())
+    assert still.message.item() == "worn_volume stays below 1e-12 m3: it is 0 m3 at the last count"
+
+
+def _written(study: Study, folder: Path) -> Path:
+    path = folder / "effective.toml"
+    path.write_text(format_study(study))
+    return path

@@ -41,6 +41,7 @@ LOOPS = ("loop_displacement", "loop_force")
 
 POINT_NUMBERS = (
     "jump_cycle",
+    "cycles_to_target",
     "error_estimate",
     "last_cycle",
     "largest_wear_depth",

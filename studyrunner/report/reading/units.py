@@ -84,7 +84,7 @@ def show_cycles(value: float) -> str:
 
 def units_of(name: str) -> str:
     """Unit of a variable or a coordinate of a result file; `cycles` where it counts them, empty where there is none."""
-    if name in ("step", "step_limit", "cycle", "jump_cycle"):
+    if name in ("step", "step_limit", "cycle", "jump_cycle", "cycles_to_target"):
         return "cycles"
     for table in (ASKED, KEPT, COORDINATES):
         if name in table:
