@@ -15,13 +15,14 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from solver.model import ReducedModel
 from studies.scene_error import SceneError
-from studies.scenes.closed_forms.hertz import line_half_width, line_stick_width
+from studies.scenes.closed_forms.hertz import line_half_width, line_stick_width, line_worn_edge
 from studies.scenes.half_space.influence import composite_modulus, strip_compliance
 from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
-Measured: with 0.16 to 0.18 the depth worn in the end is within 0.2 % on 200 strips, with 0 it is 1 to 4 % off."""
+Measured: the area worn in the end is then within 0.2 % with 8 to 128 strips in half of the stick zone, with 0 it is 13
+to 0.9 % off, of first order."""
 
 
 class Parameters(BaseModel):
@@ -49,7 +50,7 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="half of the width of all strips, m; if not given about 1.5 times that of the unworn contact, so"
+        description="half of the width of all strips, m; if not given somewhat more than wear makes of the contact, so"
         " that an edge of strips is at that of the stick zone",
     )
     depth: float | None = Field(
@@ -78,7 +79,7 @@ def strips_half_width(parameters: Parameters) -> float:
     if share >= 1.0:
         return 1.5 * contact
     stick = line_stick_width(contact, share)
-    within = max(round(0.5 * p.strips * stick / (1.5 * contact)), 1)
+    within = max(round(0.5 * p.strips * stick / (1.2 * line_worn_edge(contact, stick))), 1)
     return 0.5 * p.strips * stick / (within - _WIDER)
 
 

@@ -11,6 +11,9 @@ import numpy as np
 
 from solver.model import FloatArray
 
+_FARTHEST = 20.0
+"""Of the contact: beyond what slip up to 0.9999 of sliding wears."""
+
 
 def line_half_width(load: float, radius: float, modulus: float) -> float:
     """Half-width a, m, of a line contact: `a^2 = 4 P R / (pi E*)`. load: N/m. radius: m. modulus: E*, Pa."""
@@ -54,3 +57,15 @@ def point_worn_depth(r: FloatArray, radius: float, contact_radius: float, stick_
     profile = (away**2 * np.arcsin(c / away) - c * np.sqrt(away**2 - c**2)) / (np.pi * radius)
     overlap = profile + 2.0 * approach / np.pi * np.arccos(c / away) - away**2 / (2.0 * radius)
     return np.asarray(np.where(np.abs(r) > c, np.maximum(overlap, 0.0), 0.0))
+
+
+def line_worn_edge(half_width: float, stick_width: float) -> float:
+    """Half-width b, m, over which the bodies lie on each other where all has worn that can: the last depth above 0."""
+    x = np.linspace(half_width, _FARTHEST * half_width, 10001)
+    return float(x[line_worn_depth(x, 1.0, half_width, stick_width) > 0.0][-1])
+
+
+def point_worn_edge(contact_radius: float, stick_radius: float) -> float:
+    """Radius b, m, of the same of a sphere."""
+    r = np.linspace(contact_radius, _FARTHEST * contact_radius, 10001)
+    return float(r[point_worn_depth(r, 1.0, contact_radius, stick_radius) > 0.0][-1])
