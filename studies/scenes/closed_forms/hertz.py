@@ -1,8 +1,8 @@
 """Contact of a cylinder or a sphere with a flat: pressure, stick zone, and what partial slip wears in the end.
 
 Half-spaces of one material with the composite modulus E* (Johnson, Contact Mechanics, 1985, sections 4.2, 7.2). Worn to
-the end (Ciavarella and Hills, J. Tribology 121 (1999) 231; Popov, Wear 299 (2014)), the stick zone, which never moves,
-carries all, and the overlap of the bodies beside it has gone.
+the end (Ciavarella and Hills 1999 for the line contact, Popov 2014 for the point contact), the stick zone, which never
+moves, carries all, and the overlap of the bodies beside it has gone.
 """
 
 from __future__ import annotations
