@@ -177,7 +177,7 @@ def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tup
     """Outcome of a history that has come to its end, and what it does not say by itself."""
     if history.error_estimate > SENSITIVE_ERROR:
         # one that has reached its target has no last count
-        area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.worn_volume))[-1])
+        area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.wear_depth).all(axis=1))[-1])
         volume, other = (1e9 * float(depth[last] @ area) for depth in (history.wear_depth, companion.kept))
         known = "not known" if history.error_estimate >= 1.0 else f"known to {100 * history.error_estimate:.2g} % only"
         coarser = "steps twice as long from the start state of a coarser sweep"
