@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
-ITERATIONS_AT_FIRST = 100
-"""For the first state of a branch, found from nothing: nearly 300 iterations, most of them without harmonics."""
+ITERATIONS_AT_FIRST = 400
+"""For the walk to the first state of a branch: 1000 to 1400 iterations to a resonance, half of them with few harmonics
+(48, 160 and 336 pairs: 375 to 650 of the usual ones)."""
 
 ITERATIONS_A_STATE = 20
 """For each frequency of a branch (measured: 3 where nothing slips, 12 to 20 where the sweep shortens its steps)."""
@@ -20,8 +21,9 @@ ITERATIONS_A_STEP = 3
 ADAPTIVE_STEPS = 40
 """Of a march by the adaptive scheme, whatever `step` says."""
 
-ITERATIONS_AN_ADAPTIVE_STEP = 4
-"""For one of them, steps that are refused included."""
+ITERATIONS_AN_ADAPTIVE_STEP = 8
+"""For one of them, steps that are refused and the coarser history included (48 pairs: 11, 336 pairs: 23 beside the
+resonance, 3 away from it)."""
 
 AUTOMATIC_HARMONICS = 5
 """That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -36,9 +38,9 @@ _MATRICES_A_RANK = 6
 def seconds_an_iteration(n_unknowns: int) -> float:
     """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
 
-    Fits 2, 9, 23, 45 and 108 ms measured at 336, 1008, 1584, 2016 and 3024 unknowns within 20 %.
+    Fits 2, 9, 10 to 23, 100 and 210 ms measured at 336, 1008, 1584, 5280 and 7056 unknowns within a factor of 1.4.
     """
-    return 7e-4 + 5e-6 * n_unknowns + 3.3e-12 * float(n_unknowns) ** 3
+    return 7e-4 + 5e-6 * n_unknowns + 4e-9 * float(n_unknowns) ** 2
 
 
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
