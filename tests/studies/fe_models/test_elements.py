@@ -1,0 +1,251 @@
+"""Element matrices against scikit-fem, CalculiX and closed forms."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+import skfem
+from scipy.sparse.linalg import spsolve
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+from studies.fe_models.elements.assembly import (
+    assemble_mass,
+    assemble_stiffness,
+    assemble_tangent_stiffness,
+    centrifugal_load,
+    check_elements,
+    spin_softening,
+)
+from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.fe_models.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.scene_error import SceneError
+from tests.studies.fe_models.solid_meshes import (
+    EXPORT,
+    STEEL,
+    block,
+    centrifugal,
+    deck_lines,
+    node_set,
+    read_export,
+    run_ccx,
+)
+
+KINDS = tuple(ELEMENT_KINDS)
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+
+# How scikit-fem names the element, and the degree that makes it take the same integration points.
+SCIKIT_FEM = {
+    "C3D4": (skfem.MeshTet1, skfem.ElementTetP1(), 1),
+    "C3D8": (skfem.MeshHex1, skfem.ElementHex1(), 3),
+    "C3D10": (skfem.MeshTet1, skfem.ElementTetP2(), 2),
+    "C3D20": (skfem.MeshHex1, skfem.ElementHexS2(), 5),
+    "C3D20R": (skfem.MeshHex1, skfem.ElementHexS2(), 3),
+}
+
+
+def skewed(points):
+    """A block whose elements are parallelepipeds of several sizes."""
+    return points @ np.array([[0.10, 0.01, 0.0], [0.02, 0.07, 0.0], [0.0, 0.01, 0.05]])
+
+
+def distorted(points):
+    """A block with curved faces."""
+    x, y, z = skewed(points).T
+    return np.stack([x + 2.0 * y * z, y + 0.5 * x * x - z * x, z + 0.8 * x * y], axis=1)
+
+
+def warped(seed):
+    """A skewed block whose inner nodes are moved off their places, by a tenth of an element of a 2 x 2 x 2 grid."""
+
+    def shape(points):
+        moved = 0.03 * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
+        moved[((points == 0.0) | (points == 1.0)).any(axis=1)] = 0.0
+        return skewed(points + moved)
+
+    return shape
+
+
+@pytest.mark.parametrize("kind", SCIKIT_FEM)
+def test_agrees_with_scikit_fem(kind):
+    mesh, _ = block(kind, (2, 1, 1), skewed)
+    make, element, degree = SCIKIT_FEM[kind]
+    n_corners = len(ELEMENT_KINDS[kind].reference.corners)
+    elements = mesh.groups[0].nodes
+    corners, renumbered = np.unique(elements[:, :n_corners], return_inverse=True)
+    order = range(4)
+    if n_corners == 8:
+        own = ELEMENT_KINDS[kind].reference.corners
+        order = [int(np.flatnonzero((2.0 * p - 1.0 == own).all(axis=1))[0]) for p in skfem.refdom.RefHex.p.T]
+    cells = renumbered.reshape(-1, n_corners)[:, order]
+    theirs = make(mesh.coordinates[corners].T.copy(), np.ascontiguousarray(cells.T))
+    basis = skfem.Basis(theirs, skfem.ElementVector(element), intorder=degree)
+    stiffness = linear_elasticity(*lame_parameters(STEEL.young_modulus, STEEL.poisson_ratio)).assemble(basis)
+
+    @skfem.BilinearForm
+    def inertia(u, v, _):
+        return STEEL.density * skfem.helpers.dot(u, v)
+
+    mass = inertia.assemble(basis)
+    # their dofs by place and direction
+    place = np.argmin(np.linalg.norm(basis.doflocs.T[:, None] - mesh.coordinates, axis=2), axis=1)
+    direction = np.empty(basis.N, dtype=int)
+    for dofs in (basis.nodal_dofs, basis.edge_dofs):
+        for row, members in enumerate(dofs):
+            direction[members] = row % 3
+    number = 3 * place + direction
+    assert len(np.unique(number)) == basis.N
+    for own, reference in ((assemble_stiffness(mesh), stiffness), (assemble_mass(mesh), mass)):
+        reference = reference.toarray()
+        assert np.abs(own.toarray()[np.ix_(number, number)] - reference).max() < 1e-12 * np.abs(reference).max()
+
+
+@needs_ccx
+@pytest.mark.parametrize("kind", KINDS)
+def test_agrees_with_calculix(kind, tmp_path):
+    mesh, _ = block(kind, (2, 2, 1), distorted)
+    run_ccx(tmp_path, [*deck_lines(mesh), "*STEP", *EXPORT[1:]])
+    stiffness, mass = read_export(tmp_path)
+    n = 3 * mesh.n_nodes
+    own = assemble_mass(mesh)
+    assert np.abs(own - mass[:n, :n]).max() < 1e-12 * np.abs(own).max()
+    own = assemble_stiffness(mesh)
+    if kind == "C3D8I":
+        # CalculiX keeps the incompatible modes as nodes of their own, and has another variant of them
+        inner = stiffness[n:, n:].toarray()
+        condensed = stiffness[:n, :n] - stiffness[:n, n:] @ np.linalg.solve(inner, stiffness[n:, :n].toarray())
+        assert 1e-6 < np.abs(own - condensed).max() / np.abs(own).max() < 2e-2
+    else:
+        assert np.abs(own - stiffness[:n, :n]).max() < 1e-12 * np.abs(own).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_patch_test(kind):
+    mesh, reference = block(kind, (2, 2, 2), warped(3), straight=True)
+    stiffness = assemble_stiffness(mesh)
+    gradient = 1e-3 * np.array([[1.0, 0.3, -0.2], [0.5, -0.7, 0.4], [0.1, -0.6, 0.9]])
+    exact = (mesh.coordinates @ gradient.T).ravel()
+    inner = np.repeat(((reference > 0.0) & (reference < 1.0)).all(axis=1), 3)
+    solved = spsolve(stiffness[inner][:, inner].tocsc(), -stiffness[inner][:, ~inner] @ exact[~inner])
+    assert np.abs(solved - exact[inner]).max() < 1e-11 * np.abs(exact).max()
+
+
+# Those with too few integration points have more than the rigid body modes, each element by itself.
+@pytest.mark.parametrize(("kind", "n_zero"), [(kind, {"C3D6": 7, "C3D20R": 12}.get(kind, 6)) for kind in KINDS])
+def test_rigid_body_modes_of_an_element(kind, n_zero):
+    reference = ELEMENT_KINDS[kind].reference
+    nodes = distorted(0.5 * (1.0 + reference.nodes))
+    group = ElementGroup(kind, np.arange(len(nodes))[None], np.array([1]), STEEL)
+    mesh = SolidMesh(nodes, np.arange(len(nodes)) + 1, (group,))
+    values = np.linalg.eigvalsh(assemble_stiffness(mesh).toarray())
+    assert np.abs(values[:n_zero]).max() < 1e-11 * values[-1]
+    assert values[n_zero] > 1e-5 * values[-1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mass_and_centrifugal_load_of_a_skewed_box(kind):
+    mesh, _ = block(kind, (2, 1, 2), lambda points: skewed(points) + np.array([0.3, -0.1, 0.2]))
+    expected = STEEL.density * np.linalg.det(skewed(np.eye(3)))
+    mass = assemble_mass(mesh)
+    assert mass.sum() / 3.0 == pytest.approx(expected, rel=1e-12)
+    axis = np.array([0.0, 0.6, 0.8])
+    rotation = Rotation(2.5e5, np.array([0.1, 0.0, 0.0]), axis)
+    centre = skewed(np.full((1, 3), 0.5))[0] + np.array([0.3, -0.1, 0.2])
+    arm = centre - rotation.point
+    arm = arm - axis * (axis @ arm)
+    total = centrifugal_load(mass, mesh.coordinates, rotation).reshape(-1, 3).sum(axis=0)
+    assert np.allclose(total, 2.5e5 * expected * arm, rtol=1e-11, atol=1e-9 * expected)
+    # As a derivative: the load of a body moved by t differs by what spin softening makes of t.
+    moved = np.tile([0.3, -0.2, 0.1], mesh.n_nodes)
+    change = centrifugal_load(mass, mesh.coordinates + moved.reshape(-1, 3), rotation)
+    change = change - centrifugal_load(mass, mesh.coordinates, rotation)
+    assert np.abs(spin_softening(mass, rotation) @ moved + change).max() < 1e-10 * np.abs(change).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_stress_stiffening_of_a_stretched_bar(kind):
+    size, strain = np.array([0.8, 0.03, 0.05]), 1e-3
+    mesh, _ = block(kind, (2, 1, 1), lambda points: points * size)
+    x, y, z = mesh.coordinates.T
+    stretched = strain * np.stack([x, -STEEL.poisson_ratio * y, -STEEL.poisson_ratio * z], axis=1)
+    tangent = assemble_tangent_stiffness(mesh, stretched.ravel())
+    # A rotation of angle 1 stores force times length, a translation nothing.
+    turn = np.stack([-y, x, 0.0 * x], axis=1).ravel()
+    work = STEEL.young_modulus * strain * size.prod()
+    tilt = turn @ tangent @ turn
+    # in Green's strain the elastic stiffness turns with the bar, up to the square of the strain
+    assert tilt == pytest.approx(work, rel=1e-10 if kind == "C3D8I" else 5.0 * strain)
+    shift = np.tile([0.2, 1.0, -0.4], mesh.n_nodes)
+    assert np.abs(tangent @ shift).max() < 1e-12 * abs(tangent).max()
+
+
+@needs_ccx
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "C3D8I"])
+def test_prestress_agrees_with_calculix(kind, tmp_path):
+    """Stress stiffening, large-displacement terms and spin softening that PERTURBATION puts into the stiffness."""
+    mesh, reference = block(kind, (2, 2, 1), lambda points: distorted(points) + [0.2, 0.0, 0.0], straight=True)
+    held = np.flatnonzero(reference[:, 0] == 0.0)
+    static = ["*BOUNDARY", "F, 1, 3", "*STEP", "*STATIC", *centrifugal(mesh, 5e5), "*END STEP"]
+    export = ["*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT]
+    run_ccx(tmp_path, [*deck_lines(mesh), *node_set("F", mesh.numbers[held]), *static, *export])
+    expected, _ = read_export(tmp_path)
+
+    stiffness, mass = assemble_stiffness(mesh), assemble_mass(mesh)
+    rotation = Rotation(5e5, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    load = centrifugal_load(mass, mesh.coordinates, rotation)
+    free = np.repeat(reference[:, 0] > 0.0, 3)
+    displacements = np.zeros_like(load)
+    displacements[free] = spsolve(stiffness[free][:, free].tocsc(), load[free])
+    own = assemble_tangent_stiffness(mesh, displacements) + spin_softening(mass, rotation)
+    assert np.abs(own - expected).max() < 1e-12 * np.abs(own).max()
+    assert np.abs(stiffness - expected).max() > 1e-5 * np.abs(own).max()
+
+
+@pytest.mark.parametrize(("kind", "order"), [("C3D6", 2), ("C3D15", 4), ("C3D10", 4), ("C3D20R", 4)])
+def test_energy_of_a_smooth_field_converges(kind, order):
+    """Strain energy of a cubic field against its integral: twice the order of the interpolated strain."""
+    material = Material(1.0, 0.25, 1.0)
+
+    def energy(n):
+        mesh, points = block(kind, (n, n, n), material=material)
+        x, y, z = points.T
+        field = np.stack([x**3 + y * z * z, x * y * z, y**3 - x * x * z], axis=1).ravel()
+        return field @ assemble_stiffness(mesh) @ field
+
+    # By Gauss points of the exact field, of which 4 in each direction are enough.
+    points, weights = np.polynomial.legendre.leggauss(4)
+    grid = np.stack(np.meshgrid(*[0.5 + 0.5 * points] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    volumes = np.einsum("i,j,k->ijk", *[0.5 * weights] * 3).ravel()
+    x, y, z = grid.T
+    slopes = np.array([[3 * x * x, z * z, 2 * y * z], [y * z, x * z, x * y], [-2 * x * z, 3 * y * y, -x * x]])
+    strain = 0.5 * (slopes + np.swapaxes(slopes, 0, 1))
+    lame = shear = 0.4
+    density = lame * np.trace(strain) ** 2 + 2.0 * shear * (strain**2).sum(axis=(0, 1))
+    exact = volumes @ density
+    errors = np.abs([energy(n) - exact for n in (2, 4)])
+    assert np.log2(errors[0] / errors[1]) > order - 0.35
+
+
+def test_inverted_element_is_named():
+    mesh, _ = block("C3D10", (1, 1, 1))
+    group = mesh.groups[0]
+    nodes = group.nodes.copy()
+    nodes[3] = nodes[3, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
+    wrong = SolidMesh(mesh.coordinates, mesh.numbers, (ElementGroup("C3D10", nodes, group.numbers, STEEL),))
+    check_elements(mesh)
+    with pytest.raises(SceneError, match=r"element 4 \(C3D10\) is turned inside out"):
+        check_elements(wrong)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_faces_point_outwards_and_hold_their_mid_side_nodes(kind):
+    reference = ELEMENT_KINDS[kind].reference
+    nodes, centre = reference.nodes, reference.corners.mean(axis=0)
+    for loop in ELEMENT_KINDS[kind].faces:
+        n = {3: 3, 6: 3, 4: 4, 8: 4}[len(loop)]
+        corners = nodes[list(loop[:n])]
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
+        assert normal @ (corners.mean(axis=0) - centre) > 0.0
+        for place, middle in enumerate(loop[n:]):
+            assert np.allclose(nodes[middle], 0.5 * (corners[place] + corners[(place + 1) % n]))
