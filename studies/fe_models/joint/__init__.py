@@ -1,0 +1,1 @@
+"""From an unstructured mesh to a reduced model: surfaces, contact pairs, cut faces, reduction."""

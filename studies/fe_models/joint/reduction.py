@@ -1,0 +1,199 @@
+"""Craig-Bampton reduction of a structure to its relative displacements and stuck modes.
+
+Nodes are eliminated front by front, those of the contact pairs last. What is left of the stiffness is the reduced one;
+mass and other forms go along (`condensation`), so that the static shapes are never formed. Fronts that no cut face
+touches are real and the same for all nodal diameters: they are eliminated once. A mass is multiplied with only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import FloatArray, Matrix
+from studies.fe_models.joint.ordering import KeptCoordinates, OrderedStructure
+from studies.scenes.finite_element.condensation.factor import (
+    Factor,
+    FrontFactor,
+    NotPositiveDefiniteError,
+    eliminate,
+    factorise,
+    mirrored,
+    solve_lower,
+)
+from studies.scenes.finite_element.condensation.modes import lowest_modes
+from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
+from studies.scenes.finite_element.condensation.projection import Projection
+
+_BLOCK = 8  # modes are looked for with so many vectors at a time
+_COLUMNS = 64  # vectors that are condensed at a time
+
+
+class GluedStructureError(ValueError):
+    """The glued structure is not held, or unstable from spin softening. `unstable` says which."""
+
+    def __init__(self, *, unstable: bool) -> None:
+        super().__init__(
+            "the glued structure is unstable: spin softening exceeds its stiffness"
+            if unstable
+            else "nothing holds the glued structure: its stiffness is singular"
+        )
+        self.unstable = unstable
+
+
+@dataclass(frozen=True)
+class ReducedStructure:
+    """A structure in the coordinates [relative displacements | stuck modes], `n` of them, at one nodal diameter.
+
+    frequencies (n_modes,): natural frequencies of the glued structure, rad/s, ascending; its modes have unit modal
+    mass. forms: Hermitian matrices (n, n) by their names, "stiffness" and "mass" among them. vectors (n, n_vectors):
+    generalised forces.
+    """
+
+    frequencies: FloatArray
+    forms: Mapping[str, Matrix]
+    vectors: Matrix
+
+
+@dataclass(frozen=True)
+class GluedStructure:
+    """A structure whose stiffness is factorised with its pairs glued, at one nodal diameter.
+
+    Displacements and forces (3 n_places, n_vectors) stand in the order of elimination, the nodes of the pairs last.
+    factor: of all other nodes. last: of the coordinates `kept.glued`. stiffness (n_relative, n_relative): what is
+    left for the relative displacements.
+    """
+
+    factor: Factor
+    last: FrontFactor
+    kept: KeptCoordinates
+    stiffness: Matrix
+
+    @property
+    def _first(self) -> int:
+        return 3 * self.factor.dissection.n_eliminated
+
+    def solve(self, forces: Matrix) -> Matrix:
+        """Displacements under forces with all relative displacements 0."""
+        result, glued = self.factor.condense(forces), self.kept.glued
+        inner = solve_lower(self.last.lower, glued.conj().T @ result[self._first :], transposed=False)
+        result = result.conj()
+        result[self._first :] = glued.conj() @ solve_lower(self.last.lower, inner.conj(), transposed=True)
+        return self.factor.expand(result).conj()
+
+    def equivalent(self, forces: Matrix) -> Matrix:
+        """Forces (n_relative, n_vectors) on the relative displacements that are statically equivalent."""
+        kept = self.factor.condense(forces)[self._first :]
+        inner = solve_lower(self.last.lower, self.kept.glued.conj().T @ kept, transposed=False)
+        return np.asarray(self.kept.relative.conj().T @ kept - self.last.below @ inner)
+
+    def driven(self) -> Matrix:
+        """Displacements (3 n_kept, n_relative) of the nodes of the pairs under unit relative displacements."""
+        inner = solve_lower(self.last.lower, self.last.below.T, transposed=True).conj()
+        return np.asarray(self.kept.relative.toarray() - self.kept.glued @ inner)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Forms of a structure, to be reduced at any nodal diameter.
+
+    ordered: the structure. forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by their names;
+    "stiffness" and "mass" must be among them, the others go along.
+    """
+
+    ordered: OrderedStructure
+    forms: Mapping[str, sparse.csr_matrix]
+    _ordered_forms: dict[str, OrderedForm] = field(default_factory=dict)
+    _unphased: dict[int, tuple[FrontFactor, Matrix | None]] = field(default_factory=dict)
+
+    def solve_static(self, load: FloatArray) -> FloatArray:
+        """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N.
+
+        Raises GluedStructureError where the glued structure is not held, or unstable.
+        """
+        followers = self.ordered.followers(0)
+        return np.asarray(followers @ self._glue(0).solve((followers.T @ load)[:, None])[:, 0])
+
+    def frequencies(self, nodal_diameter: int, n_modes: int) -> FloatArray:
+        """Lowest natural frequencies (n_modes,) of the glued structure, rad/s, ascending.
+
+        Raises GluedStructureError where the glued structure is not held, or unstable.
+        """
+        return self._modes(self._glue(nodal_diameter), self.ordered.followers(nodal_diameter), n_modes)[0]
+
+    def reduce(self, nodal_diameter: int, n_modes: int, vectors: FloatArray) -> ReducedStructure:
+        """The structure at a nodal diameter in 0..n_sectors // 2.
+
+        n_modes: stuck modes, at least 1; there are fewer where the structure has fewer. vectors (3 n_nodes, n_vectors):
+        nodal forces.
+
+        Raises GluedStructureError where the glued structure is not held, or unstable.
+        """
+        glued, followers = self._glue(nodal_diameter), self.ordered.followers(nodal_diameter)
+        others = [name for name in self.forms if name != "stiffness"]
+        projection = Projection(
+            glued.factor, [self._form(name) for name in others], self.ordered.supports.phase(nodal_diameter)
+        )
+        condensed = projection.project(glued.driven())
+        frequencies, modes = self._modes(glued, followers, n_modes)
+        moved = followers @ modes
+        inertia = {name: self.forms[name] @ moved for name in others}
+        # forces in all columns, few at a time
+        back = followers.conj().T.tocsr()
+        forces = np.concatenate([vectors, *inertia.values()], axis=1)
+        parts = range(0, forces.shape[1], _COLUMNS)
+        equivalent = np.concatenate([glued.equivalent(back @ forces[:, n : n + _COLUMNS]) for n in parts], axis=1)
+        n_vectors, n_found = vectors.shape[1], len(frequencies)
+        # The shapes are those of the stiffness: it couples no mode with them.
+        nothing = np.zeros((len(glued.stiffness), n_found))
+        forms = {"stiffness": _joined(glued.stiffness, nothing, np.diag(frequencies**2))}
+        for place, (name, part) in enumerate(zip(others, condensed, strict=True)):
+            first = n_vectors + place * n_found
+            own = np.eye(n_found) if name == "mass" else moved.conj().T @ inertia[name]
+            forms[name] = _joined(part, equivalent[:, first : first + n_found], own)
+        return ReducedStructure(
+            frequencies=frequencies,
+            forms=forms,
+            vectors=np.concatenate([equivalent[:, :n_vectors], moved.conj().T @ vectors]),
+        )
+
+    def _form(self, name: str) -> OrderedForm:
+        if name not in self._ordered_forms:
+            self._ordered_forms[name] = self.ordered.order(self.forms[name], stiffness=name == "stiffness")
+        return self._ordered_forms[name]
+
+    def _glue(self, nodal_diameter: int) -> GluedStructure:
+        ordered, kept = self.ordered, self.ordered.kept(nodal_diameter)
+        phase = ordered.supports.phase(nodal_diameter)
+        try:
+            factor = factorise(self._form("stiffness"), ordered.dissection, phase, self._unphased)
+            left = factor.left
+            glued, relative = left @ kept.glued, left @ kept.relative
+            update = np.asfortranarray(kept.relative.conj().T @ relative)
+            own, below = (
+                np.asfortranarray(kept.glued.conj().T @ glued),
+                np.asfortranarray(relative.conj().T @ kept.glued),
+            )
+            last = eliminate(own, below, update)
+        except NotPositiveDefiniteError as error:
+            raise GluedStructureError(unstable=error.unstable) from error
+        return GluedStructure(factor, last, kept, mirrored(update))
+
+    def _modes(self, glued: GluedStructure, followers: sparse.csr_matrix, n_modes: int) -> tuple[FloatArray, Matrix]:
+        """Frequencies and modes in the order of elimination, their phase fixed by what a random vector sees of them."""
+        mass = (followers.conj().T @ self.forms["mass"] @ followers).tocsr()
+        rng = np.random.default_rng(0)
+        # A singular mass leaves nothing of some vectors: those that inertia drives all have mass.
+        random = mass @ rng.standard_normal((mass.shape[0], _BLOCK)).astype(mass.dtype)
+        squares, modes = lowest_modes(glued.solve, lambda vectors: mass @ vectors, glued.solve(random), n_modes)
+        sees = rng.standard_normal(self.ordered.supports.n_nodes * 3).reshape(-1, 3)[self.ordered.free].ravel()
+        seen = sees @ modes
+        return np.sqrt(squares), modes * (seen.conj() / np.abs(seen))
+
+
+def _joined(relative: Matrix, coupling: Matrix, modal: Matrix) -> Matrix:
+    whole = np.block([[relative, coupling], [coupling.conj().T, modal]])
+    return np.asarray(0.5 * (whole + whole.conj().T))

@@ -1,0 +1,98 @@
+"""A small bladed sector and a lap joint in any kind of element, meshes matching or not. A helper of the tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.fe_models.elements.solid_mesh import Rotation, SolidMesh
+from studies.fe_models.fe_model import JointDefinition, MeshModel, SetMotion
+from studies.fe_models.joint.cut_faces import CyclicAxis, match_cut_faces
+from studies.fe_models.joint.pairing import ContactSurfaces
+from studies.fe_models.joint.surfaces import surface_of_faces
+from tests.studies.fe_models.solid_meshes import block, joined
+
+N_SECTORS = 12
+OMEGA_SQUARED = 2.5e5
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def disk_shape(points):
+    """A wedge of a disk from x = 0.1 to 0.2 m whose outer face is flat."""
+    x = 0.1 + 0.1 * points[:, 0]
+    half = np.tan(np.pi / N_SECTORS)
+    # skewed along z, so that waves of positive and negative direction differ
+    return np.stack([x, x * half * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
+
+
+def blade_shape(points):
+    """A twisted blade on the middle of that face."""
+    x, y, z = points.T
+    angle = 0.6 * x
+    across, along = 0.036 * (y - 0.5), 0.03 * (z - 0.5)
+    turned = across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)
+    return np.stack([0.2 + 0.1 * x, turned[0], 0.02 + turned[1]], axis=1)
+
+
+def wedge_shape(points):
+    """The disk goes on to x = 0.3 m: a ring in place of blades, whose joint runs through the cut faces."""
+    x = 0.2 + 0.1 * points[:, 0]
+    half = np.tan(np.pi / N_SECTORS)
+    return np.stack([x, x * half * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
+
+
+def faces_where(mesh: SolidMesh, inside):
+    """Element numbers and faces (from 1) of the faces all of whose nodes are inside (n_nodes,)."""
+    elements, faces = [], []
+    for group in mesh.groups:
+        for number, face in enumerate(ELEMENT_KINDS[group.kind].faces, start=1):
+            chosen = inside[group.nodes[:, list(face)]].all(axis=1)
+            elements += group.numbers[chosen].tolist()
+            faces += [number] * int(chosen.sum())
+    return np.array(elements, dtype=np.int64), np.array(faces, dtype=np.int64)
+
+
+class Sector:
+    """Mesh, sets and faces of the sector; `joint` gives what is done with it."""
+
+    def __init__(self, disk_kind, blade_kind, disk=(2, 4, 2), blade=(3, 2, 2), blade_shape=blade_shape):
+        """Cut faces are where the angle is that of a sector, on the blade as well."""
+        first, _ = block(disk_kind, disk, disk_shape, part="disk", straight=True)
+        second, _ = block(blade_kind, blade, blade_shape, part="blade", straight=True)
+        self.mesh = joined(first, second)
+        x, y, _ = self.mesh.coordinates.T
+        of_blade = np.arange(self.mesh.n_nodes) >= first.n_nodes
+        half = np.tan(np.pi / N_SECTORS)
+        self.left = np.flatnonzero(np.abs(y + half * x) < 1e-9)
+        self.right = np.flatnonzero(np.abs(y - half * x) < 1e-9)
+        self.bore = np.flatnonzero(~of_blade & (np.abs(x - 0.1) < 1e-9))
+        self.tip = np.flatnonzero(of_blade & (np.abs(x - 0.3) < 1e-9))
+        self.disk_faces = faces_where(self.mesh, ~of_blade & (np.abs(x - 0.2) < 1e-9))
+        self.blade_faces = faces_where(self.mesh, of_blade & (np.abs(x - 0.2) < 1e-9))
+
+    @property
+    def places(self):
+        return self.mesh.coordinates, self.mesh.numbers, self.mesh.bodies
+
+    @property
+    def surfaces(self):
+        blade = surface_of_faces(self.mesh, "BLADES", *self.blade_faces)
+        return blade, surface_of_faces(self.mesh, "DISKS", *self.disk_faces)
+
+    def joint(self, **changes):
+        held = np.zeros((self.mesh.n_nodes, 3), dtype=bool)
+        held[self.bore] = True
+        axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
+        tip = SetMotion(self.tip, np.array([0.0, 2.0, 0.0]))
+        given = {
+            "contacts": (ContactSurfaces(*self.surfaces, tolerance=1e-6),),
+            "held": held,
+            "load": tip,
+            "responses": {"tip": tip},
+            "cut": match_cut_faces(*self.places, axis, self.left, self.right),
+        }
+        return JointDefinition(**(given | changes))
+
+    def model(self, prestress=True):
+        rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
+        return MeshModel(self.mesh, rotation if prestress else None)

@@ -1,0 +1,369 @@
+"""Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import linalg, sparse
+
+from studies.fe_models.elements.assembly import (
+    assemble_mass,
+    assemble_stiffness,
+    assemble_tangent_stiffness,
+    centrifugal_load,
+    spin_softening,
+)
+from studies.fe_models.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.fe_models.fe_model import (
+    JointDefinition,
+    MatrixModel,
+    MeshModel,
+    ReductionOptions,
+    Retainer,
+    SetMotion,
+)
+from studies.fe_models.fe_scene import build_fe_scene, prepare_model
+from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces
+from studies.fe_models.joint.pairing import ContactSurfaces
+from studies.fe_models.joint.surfaces import surface_of_faces, surface_of_nodes
+from studies.model_check import check_model
+from studies.scene_error import SceneError
+from studies.scenes import dovetail_sector
+from studies.scenes.dovetail_mesh import build_dovetail_mesh, chord_directions
+from studies.scenes.dovetail_sector import Parameters
+from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z, faces_where, wedge_shape
+from tests.studies.fe_models.solid_meshes import block, joined
+
+
+def node_blocks(n_nodes, rows):
+    """Equations (3 n, 3 n_nodes) from lists of (node, 3 x 3 block), one list each three equations."""
+    matrix = np.zeros((3 * len(rows), 3 * n_nodes), dtype=complex)
+    for row, terms in enumerate(rows):
+        for node, part in terms:
+            matrix[3 * row : 3 * row + 3, 3 * node : 3 * node + 3] += part
+    return matrix
+
+
+def dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes):
+    """Relative stiffness and mass, frequencies and shapes of the static load by constraints and null spaces alone."""
+    n_nodes = sector.mesh.n_nodes
+    rows = []
+    for moving, weights in zip(pairs.moving, pairs.opposite.toarray(), strict=True):
+        rows.append([(moving, np.eye(3)), *((node, -weights[node] * np.eye(3)) for node in np.flatnonzero(weights))])
+    follow = node_blocks(n_nodes, rows)
+    phase = np.exp(2j * np.pi * nodal_diameter / N_SECTORS)
+    rows = [
+        [(right, np.eye(3)), (left, -phase * joint.cut.rotation)]
+        for left, right in zip(joint.cut.left, joint.cut.right, strict=True)
+    ]
+    held = np.eye(3 * n_nodes)[joint.held.ravel()]
+    fixed = np.concatenate([node_blocks(n_nodes, rows), held])
+    constraints = np.concatenate([follow, fixed])
+    free = linalg.null_space(constraints)
+    driven = np.zeros((len(constraints), len(follow)))
+    driven[: len(follow)] = linalg.block_diag(*np.swapaxes(pairs.frames, 1, 2))
+    driven = driven[:, pairs.present.ravel()]
+    stiffness, mass = (forms[name].toarray() for name in ("stiffness", "mass"))
+    particular = linalg.lstsq(constraints, driven)[0]
+    assert np.allclose(constraints @ particular, driven, atol=1e-9)
+    inner = free.conj().T @ stiffness @ free
+    shapes = particular - free @ np.linalg.solve(inner, free.conj().T @ stiffness @ particular)
+    # the mass may be singular
+    inverse = linalg.eigh(free.conj().T @ mass @ free, inner, eigvals_only=True)[::-1][:n_modes]
+    return shapes, shapes.conj().T @ stiffness @ shapes, shapes.conj().T @ mass @ shapes, 1.0 / np.sqrt(inverse)
+
+
+def plane_of_symmetry(sector):
+    held = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)
+    held[sector.bore] = True
+    held[np.abs(sector.mesh.coordinates[:, 2]) < 1e-9, 2] = True
+    return held
+
+
+CASES = {
+    "not matching": lambda: (Sector("C3D8", "C3D20R", (1, 3, 2), (1, 2, 2)), {}),
+    "through the cut faces": lambda: (Sector("C3D8", "C3D8", (1, 3, 2), (1, 3, 2), blade_shape=wedge_shape), {}),
+    "through the cut faces, not matching": lambda: (
+        Sector("C3D10", "C3D8", (1, 2, 1), (1, 5, 2), blade_shape=wedge_shape),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", [*CASES, "plane of symmetry"])
+@pytest.mark.parametrize("nodal_diameter", [0, 2, N_SECTORS // 2])
+def test_reduction_against_dense_constraints(name, nodal_diameter):
+    if name == "plane of symmetry":
+        sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
+        joint = sector.joint(held=plane_of_symmetry(sector))
+    else:
+        sector, changes = CASES[name]()
+        joint = sector.joint(**changes)
+    prepared = prepare_model(sector.model(), joint)
+    pairs, forms = prepared.pairs, prepared.reduction.forms
+    load = np.stack([prepared.static_load, joint.load.row(sector.mesh.n_nodes)], axis=1)
+    n_modes = 5
+    own = prepared.reduction.reduce(nodal_diameter, n_modes, load)
+    shapes, stiffness, mass, frequencies = dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes)
+    n = len(stiffness)
+    assert own.forms["stiffness"].shape == (n + n_modes, n + n_modes)
+    assert np.iscomplexobj(own.forms["mass"]) == (nodal_diameter == 2)
+    for ours, reference in ((own.forms["stiffness"], stiffness), (own.forms["mass"], mass)):
+        assert np.abs(ours[:n, :n] - reference).max() < 1e-8 * np.abs(reference).max()
+    assert np.allclose(own.frequencies, frequencies, rtol=1e-8)
+    assert np.allclose(np.diag(own.forms["stiffness"])[n:], frequencies**2, rtol=1e-8)
+    assert np.abs(own.vectors[:n] - shapes.conj().T @ load).max() < 1e-8 * np.abs(own.vectors).max()
+    # elastic stiffness, which is not the one of the shapes
+    elastic = shapes.conj().T @ forms["elastic"].toarray() @ shapes
+    assert np.abs(own.forms["elastic"][:n, :n] - elastic).max() < 1e-7 * np.abs(elastic).max()
+
+
+def test_pairs_on_cut_faces_and_planes_of_symmetry():
+    sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
+    joint = sector.joint(held=plane_of_symmetry(sector))
+    scene = build_fe_scene(sector.model(prestress=False), joint, ReductionOptions(n_modes=4), 1)
+    contact, pairs = scene.model.contact, scene.pairs
+    face = 0.04 * 2.0 * 0.2 * np.tan(np.pi / N_SECTORS)
+    assert contact.area.sum() == pytest.approx(face, rel=1e-10)
+    assert contact.n_contact == 4 * 3
+    assert not np.isin(pairs.moving, sector.right).any()
+    in_plane = np.abs(pairs.position[:, 2]) < 1e-9
+    assert np.array_equal(contact.dofs[:, 2] < 0, in_plane)
+    assert np.allclose(np.abs(pairs.frames[in_plane, 2] @ Z), 1.0)
+    assert np.allclose(np.linalg.det(pairs.frames), 1.0)
+    present = contact.dofs[contact.dofs >= 0]
+    assert np.array_equal(present, np.arange(len(present)))
+    assert (contact.dofs[:, 0] >= 0).all()
+    check_model(scene.model)
+
+
+def test_prestress_is_that_of_the_glued_sector():
+    sector = Sector("C3D10", "C3D10", (1, 2, 2), (1, 2, 1))
+    joint = sector.joint()
+    prepared = prepare_model(sector.model(), joint)
+    stiffness, mass = assemble_stiffness(sector.mesh), assemble_mass(sector.mesh)
+    rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
+    load = centrifugal_load(mass, sector.mesh.coordinates, rotation)
+    forms = {"stiffness": stiffness, "mass": mass}
+    n_nodes = sector.mesh.n_nodes
+    pairs = prepared.pairs
+    rows = [
+        [(moving, np.eye(3)), *((node, -weights[node] * np.eye(3)) for node in np.flatnonzero(weights))]
+        for moving, weights in zip(pairs.moving, pairs.opposite.toarray(), strict=True)
+    ]
+    images = zip(joint.cut.left, joint.cut.right, strict=True)
+    cut = [[(right, np.eye(3)), (left, -joint.cut.rotation)] for left, right in images]
+    held = np.eye(3 * n_nodes)[joint.held.ravel()]
+    free = linalg.null_space(np.concatenate([node_blocks(n_nodes, rows + cut).real, held]))
+    glued = free @ np.linalg.solve(free.T @ (stiffness @ free), free.T @ load)
+    expected = assemble_tangent_stiffness(sector.mesh, glued) + spin_softening(mass, rotation)
+    own = prepared.reduction.forms["stiffness"]
+    assert np.abs(own - expected).max() < 1e-10 * np.abs(expected).max()
+    assert prepared.at_rest is not None
+    assert np.allclose(prepared.at_rest.solve_static(load), glued, rtol=0.0, atol=1e-9 * np.abs(glued).max())
+    assert forms.keys() <= prepared.reduction.forms.keys()
+
+
+def dovetail(parameters):
+    """The bundled sector as a foreign model: an unstructured mesh, and sets of nodes."""
+    mesh = build_dovetail_mesh(parameters)
+    material = Material(parameters.young_modulus, parameters.poisson_ratio, parameters.density)
+    elements, numbers = mesh.mesh.elements, np.arange(len(mesh.mesh.elements)) + 1
+    parts = (("blade", mesh.blade_elements), ("disk", ~mesh.blade_elements))
+    groups = tuple(ElementGroup("C3D8I", elements[own], numbers[own], material, part) for part, own in parts)
+    solid = SolidMesh(mesh.mesh.nodes, np.arange(len(mesh.mesh.nodes)) + 1, groups)
+    n_across, n_axial = mesh.tip_nodes.shape
+    middle = mesh.tip_nodes[n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
+    tip = SetMotion(middle, 3.0 * chord_directions(parameters.tip_stagger)[1])
+    held = np.zeros((solid.n_nodes, 3), dtype=bool)
+    held[mesh.bore_nodes] = True
+    surfaces = [
+        (surface_of_nodes(solid, f"{name}-root", blade.ravel()), surface_of_nodes(solid, f"{name}-slot", disk.ravel()))
+        for name, blade, disk in zip(("intrados", "extrados"), mesh.blade_flanks, mesh.disk_flanks, strict=True)
+    ]
+    joint = JointDefinition(
+        contacts=tuple(ContactSurfaces(*each, tolerance=1e-6) for each in surfaces),
+        held=held,
+        load=tip,
+        responses={"tip": tip},
+        cut=find_cut_faces(
+            solid.coordinates, solid.numbers, solid.bodies, CyclicAxis(parameters.n_sectors, np.zeros(3), Z)
+        ),
+        retainer=Retainer(parameters.retainer, Z),
+    )
+    return MeshModel(solid, Rotation(parameters.angular_speed**2, np.zeros(3), Z)), joint
+
+
+@pytest.mark.parametrize("nodal_diameter", [0, 3])
+def test_bundled_dovetail_through_the_unstructured_core(nodal_diameter):
+    parameters = Parameters(mesh=1, nodal_diameter=nodal_diameter)
+    expected = dovetail_sector.build(parameters, 2)
+    options = ReductionOptions(nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
+    model = build_fe_scene(*dovetail(parameters), options, 2).model
+    check_model(model, 2)
+    assert model.linear.keys() == expected.linear.keys()
+    # pairs by their places, relative displacements by their frames
+    theirs, ours = expected.contact, model.contact
+    apart = np.linalg.norm(theirs.position[:, None] - ours.position, axis=2)
+    place = apart.argmin(axis=1)
+    assert apart.min(axis=1).max() < 1e-9
+    assert np.allclose(ours.area[place], theirs.area, rtol=1e-10)
+    frames = dovetail_sector.build_pairs(build_dovetail_mesh(parameters)).frames
+    own_frames = build_fe_scene(*dovetail(parameters), options, 0).pairs.frames
+    n = 3 * theirs.n_contact
+    size = n + parameters.stuck_modes
+    turn = np.zeros((size, size))
+    for row, column in enumerate(place):
+        part = frames[row] @ own_frames[column].T
+        assert np.allclose(np.abs(part), np.eye(3), atol=1e-9)
+        turn[3 * row : 3 * row + 3, 3 * column : 3 * column + 3] = part
+    for k, linear in model.linear.items():
+        reference = expected.linear[k]
+        for name in ("stiffness", "mass", "damping"):
+            matrix, other = getattr(linear, name), getattr(reference, name)
+            relative = turn[:n, :n] @ matrix[:n, :n] @ turn[:n, :n].T
+            assert np.abs(relative - other[:n, :n]).max() < 1e-8 * np.abs(other[:n, :n]).max()
+        modal = np.diag(linear.stiffness)[n:].real
+        assert np.allclose(modal, np.diag(reference.stiffness)[n:].real, rtol=1e-8)
+        static = (turn[:n, :n] @ linear.load_static[:n], reference.load_static[:n])
+        assert np.abs(static[0] - static[1]).max() <= 1e-8 * np.abs(static[1]).max()
+        # modes may differ by a phase
+        for name in ("load_harmonic", "response"):
+            sizes = [np.abs(np.ravel(getattr(each, name))[n:]) for each in (linear, reference)]
+            assert np.abs(sizes[0] - sizes[1]).max() <= 1e-6 * sizes[1].max()
+
+
+def plates(lower="C3D10", upper="C3D8", prestress=False):
+    """Two plates that lap over each other along x, the lower one clamped; no cyclic symmetry."""
+    first, _ = block(lower, (4, 2, 1), lambda points: points * [0.1, 0.03, 0.004])
+    second, _ = block(upper, (6, 3, 1), lambda points: points * [0.05, 0.03, 0.004] + [0.05, 0.0, 0.004])
+    mesh = joined(first, second)
+    x, _, z = mesh.coordinates.T
+    upper_nodes = np.arange(mesh.n_nodes) >= first.n_nodes
+    low = surface_of_faces(mesh, "LOW", *faces_where(mesh, ~upper_nodes & (np.abs(z - 0.004) < 1e-9) & (x > 0.049)))
+    up = surface_of_faces(mesh, "UP", *faces_where(mesh, upper_nodes & (np.abs(z - 0.004) < 1e-9)))
+    held = np.zeros((mesh.n_nodes, 3), dtype=bool)
+    held[x < 1e-9] = True
+    end = SetMotion(np.flatnonzero(upper_nodes & (x > 0.0999)), np.array([0.0, 0.0, 1.0]))
+    joint = JointDefinition((ContactSurfaces(low, up, friction_coefficient=0.3),), held, end, {"end": end})
+    return MeshModel(mesh), joint
+
+
+def test_plain_assembly_without_cyclic_symmetry():
+    model, joint = plates()
+    lines = []
+    scene = build_fe_scene(model, joint, ReductionOptions(n_modes=6), 5, lines.append)
+    assert list(scene.model.linear) == [0]
+    assert scene.model.n_sectors == 0
+    assert len(lines) >= 3
+    check_model(scene.model)
+    assert np.array_equal(scene.model.contact.friction_coefficient, np.full(scene.model.contact.n_contact, 0.3))
+    assert scene.summary.mass == pytest.approx(7800.0 * 0.03 * 0.004 * 0.15, rel=1e-10)
+    assert np.allclose(scene.summary.extent, [0.1, 0.03, 0.008])
+    # the upper plate as a whole: a rigid relative motion that nothing resists, and that moves its mass
+    pairs, linear = scene.pairs, scene.model.linear[0]
+    shift = np.zeros(len(linear.mass))
+    motion = np.array([0.3, -0.2, 0.5])
+    shift[: 3 * pairs.n_contact] = (pairs.frames @ motion).ravel()
+    assert np.abs(linear.stiffness @ shift).max() < 1e-7 * np.abs(linear.stiffness).max() * 0.5
+    mass = 7800.0 * 0.03 * 0.004 * 0.05
+    # the quasi-static shape of that motion is the motion itself, of the body that is not held
+    sign = 1.0 if pairs.moving_name == ("UP",) else -1.0
+    assert shift @ linear.mass @ shift == pytest.approx(mass * motion @ motion, rel=1e-8)
+    assert linear.response @ shift == pytest.approx([sign * motion[2]], abs=1e-8)
+
+
+def test_ties_are_glued_for_good():
+    model, joint = plates()
+    first, second = joint.contacts[0].first, joint.contacts[0].second
+    third, c = block("C3D8", (2, 3, 1), lambda points: points * [0.05, 0.03, 0.004] + [0.05, 0.0, 0.008])
+    mesh = joined(model.mesh, third)
+    z = mesh.coordinates[:, 2]
+    top = np.arange(mesh.n_nodes) >= model.mesh.n_nodes
+    above = surface_of_faces(mesh, "ABOVE", *faces_where(mesh, top & (np.abs(z - 0.008) < 1e-9)))
+    below = surface_of_faces(mesh, "BELOW", *faces_where(mesh, ~top & (np.abs(z - 0.008) < 1e-9)))
+    held = np.concatenate([joint.held, np.zeros((len(c), 3), dtype=bool)])
+    tied = JointDefinition(
+        (ContactSurfaces(first, second),), held, joint.load, joint.responses, ties=(ContactSurfaces(above, below),)
+    )
+    scene = build_fe_scene(MeshModel(mesh), tied, ReductionOptions(n_modes=6), 1)
+    both = JointDefinition(
+        (ContactSurfaces(first, second), ContactSurfaces(above, below)), held, joint.load, joint.responses
+    )
+    other = build_fe_scene(MeshModel(mesh), both, ReductionOptions(n_modes=6), 1)
+    assert scene.model.contact.n_contact < other.model.contact.n_contact
+    # glued all alike; the other has the tie as contact pairs
+    assert np.allclose(scene.summary.glued_frequencies[0], other.summary.glued_frequencies[0], rtol=1e-9)
+
+
+def test_matrices_with_nodes_that_have_no_place():
+    """Inner nodes of elements: condensed or not, the reduced model is the same but for their inertia."""
+    model, joint = plates("C3D8", "C3D8")
+    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
+    n = model.mesh.n_nodes
+    plain = MatrixModel(model.coordinates, model.numbers, stiffness, mass)
+    # a node on springs to two others, without mass
+    spring = 3e7 * np.eye(3)
+    more = sparse.lil_matrix((3 * n + 3, 3 * n + 3))
+    more[: 3 * n, : 3 * n] = stiffness
+    for sign_a, a in ((1, n), (-1, 5), (-1, 6)):
+        for sign_b, b in ((1, n), (-1, 5), (-1, 6)):
+            more[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign_a * sign_b * spring
+    # the inner node follows the sum of both without force: nothing is left of the springs
+    inner = MatrixModel(
+        np.vstack([model.coordinates, np.full((1, 3), np.nan)]),
+        np.append(model.numbers, 10**6),
+        more.tocsr(),
+        sparse.block_diag([mass, sparse.csr_matrix((3, 3))], format="csr"),
+        Rotation(1e4, np.zeros(3), Z),
+    )
+    held = np.vstack([joint.held, np.zeros((1, 3), dtype=bool)])
+    wider = JointDefinition(joint.contacts, held, joint.load, joint.responses)
+    options = ReductionOptions(n_modes=5)
+    ours = build_fe_scene(inner, wider, options, 1)
+    reference = build_fe_scene(plain, joint, options, 1)
+    assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
+    assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
+    assert np.isfinite(ours.model.linear[0].load_static).all()
+
+
+def test_retainer_acts_on_the_mean_relative_displacement():
+    model, joint = plates()
+    direction = np.array([2.0, 0.0, 0.0])
+    retained = JointDefinition(
+        joint.contacts, joint.held, joint.load, joint.responses, retainer=Retainer(5e6, direction)
+    )
+    options = ReductionOptions(n_modes=3)
+    with_it, without = (build_fe_scene(model, each, options, 1) for each in (retained, joint))
+    added = with_it.model.linear[0].stiffness - without.model.linear[0].stiffness
+    shift = np.zeros(len(added))
+    shift[: 3 * without.pairs.n_contact] = (without.pairs.frames @ np.array([0.25, 0.1, -3.0])).ravel()
+    assert shift @ added @ shift == pytest.approx(5e6 * 0.25**2, rel=1e-10)
+    assert np.linalg.matrix_rank(added, tol=1.0) == 1
+
+
+def test_what_cannot_be_is_said():
+    model, joint = plates()
+    loose = JointDefinition(joint.contacts, np.zeros_like(joint.held), joint.load, joint.responses)
+    with pytest.raises(SceneError, match="nothing holds the glued structure"):
+        build_fe_scene(model, loose, ReductionOptions(), 1)
+    with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
+        build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
+    sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))
+    with pytest.raises(SceneError, match="use at most n_sectors // 2 = 6"):
+        build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)
+    mass = assemble_mass(sector.mesh)
+    softened = assemble_stiffness(sector.mesh) + spin_softening(mass, Rotation(1e9, np.zeros(3), Z))
+    fast = MatrixModel(sector.mesh.coordinates, sector.mesh.numbers, softened, mass)
+    with pytest.raises(SceneError, match="unstable: spin softening exceeds its stiffness"):
+        build_fe_scene(fast, sector.joint(), ReductionOptions(), 1)
+    held = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)
+    held[sector.bore] = True
+    held[sector.surfaces[0].nodes[:3]] = True
+    with pytest.raises(SceneError, match="3 nodes of BLADES are clamped, as node"):
+        build_fe_scene(sector.model(), sector.joint(held=held), ReductionOptions(), 1)
+    slanted = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)
+    slanted[sector.bore] = True
+    slanted[sector.left, 0] = True
+    with pytest.raises(SceneError, match="of a cut face is held in some directions"):
+        build_fe_scene(sector.model(), sector.joint(held=slanted), ReductionOptions(), 1)

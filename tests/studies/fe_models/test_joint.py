@@ -1,0 +1,184 @@
+"""Surfaces, pairing, cut faces: each against closed forms, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.fe_models.joint.closest_point import closest_points
+from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
+from studies.fe_models.joint.pairing import ContactSurfaces, build_contact_pairs, local_frames
+from studies.fe_models.joint.surfaces import outer_faces, surface_of_faces, surface_of_nodes
+from studies.scene_error import SceneError
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where
+from tests.studies.fe_models.solid_meshes import block, joined
+
+KINDS = tuple(ELEMENT_KINDS)
+
+
+def tube(points):
+    """A quarter of a tube of radii 1 and 2, 0.5 long."""
+    radius, angle = 1.0 + points[:, 0], 0.5 * np.pi * points[:, 1]
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.5 * points[:, 2]], axis=1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_areas_and_normals_of_a_cylinder(kind):
+    mesh, reference = block(kind, (1, 12, 2), tube)
+    surface = surface_of_faces(mesh, "INSIDE", *faces_where(mesh, reference[:, 0] == 0.0))
+    area, normal = surface.areas_and_normals(mesh.coordinates)
+    assert area.min() > 0.0
+    assert area.sum() == pytest.approx(0.25 * np.pi, rel=2e-3)
+    inwards = -mesh.coordinates[surface.nodes] * [1.0, 1.0, 0.0]
+    # but for the ends, where a node has the facets of one side only; unsymmetric triangles tilt it a little
+    inner = (reference[surface.nodes, 1] > 0.0) & (reference[surface.nodes, 1] < 1.0)
+    assert np.abs(normal - inwards)[inner].max() < (0.03 if kind in ("C3D4", "C3D10") else 4e-3)
+    assert np.abs(normal - inwards).max() < 0.08
+    nodes = np.flatnonzero(reference[:, 0] == 0.0)
+    again = surface_of_nodes(mesh, "INSIDE", nodes)
+    assert np.array_equal(again.nodes, nodes)
+    assert np.allclose(again.areas_and_normals(mesh.coordinates)[0], area, rtol=1e-12)
+
+
+def test_outer_faces_of_a_block():
+    mesh, reference = block("C3D15", (2, 3, 2))
+    loops = outer_faces(mesh).loops
+    assert len(loops) == 2 * (2 * 3 * 2 + 3 * 2 + 2 * 2)
+    on_rim = ((reference == 0.0) | (reference == 1.0)).any(axis=1)
+    assert np.array_equal(np.unique(np.concatenate(loops)), np.flatnonzero(on_rim))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_closest_points_against_a_search(kind):
+    mesh, reference = block(kind, (1, 3, 2), tube)
+    surface = surface_of_faces(mesh, "OUTSIDE", *faces_where(mesh, reference[:, 0] == 1.0))
+    rng = np.random.default_rng(1)
+    points = tube(np.column_stack([1.1 + 0.0 * rng.random(12), rng.uniform(-0.1, 1.1, 12), rng.uniform(-0.1, 1.1, 12)]))
+    found = closest_points(points, surface, mesh.coordinates)
+
+    def on_quad(place, corners):
+        (a, b, c, d), (x, y) = corners, place
+        return (1 - x) * (1 - y) * a + x * (1 - y) * b + x * y * c + (1 - x) * y * d
+
+    for point, distance in zip(points, found.distance, strict=True):
+        best = np.inf
+        for facet in [*surface.triangles[:, [0, 1, 2, 2]], *surface.quads]:
+            corners = mesh.coordinates[facet]
+
+            def away(place, corners=corners, point=point):
+                return ((on_quad(place, corners) - point) ** 2).sum()
+
+            best = min(best, minimize(away, [0.4, 0.4], bounds=[(0, 1)] * 2, tol=1e-14).fun)
+        assert distance == pytest.approx(np.sqrt(best), abs=1e-6)
+    assert np.allclose(found.weights.sum(axis=1), 1.0)
+    known = found.nodes >= 0
+    assert (found.weights[~known] == 0.0).all()
+    # the point on the curved face is the foot of the perpendicular where that is inside
+    places = np.einsum("pn,pnj->pj", found.weights, mesh.coordinates[np.where(known, found.nodes, 0)])
+    assert (np.linalg.norm(places - points, axis=1) < found.distance + 0.08).all()
+
+
+def blocks_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.0):
+    """Two unit cubes that touch at z = 1, the upper one lifted; surfaces LOW and UP."""
+    first, a = block(lower, lower_divisions)
+    second, b = block(upper, upper_divisions, lambda points: points + [0.0, 0.0, 1.0 + lift])
+    mesh = joined(first, second)
+    low = np.append(a[:, 2] == 1.0, np.zeros(len(b), dtype=bool))
+    up = np.append(np.zeros(len(a), dtype=bool), b[:, 2] == 0.0)
+    return (
+        mesh,
+        surface_of_faces(mesh, "LOW", *faces_where(mesh, low)),
+        surface_of_faces(mesh, "UP", *faces_where(mesh, up)),
+    )
+
+
+@pytest.mark.parametrize(("lower", "upper"), [("C3D8", "C3D10"), ("C3D20R", "C3D15"), ("C3D10", "C3D4")])
+def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
+    mesh, low, up = blocks_on_each_other(lower, upper, (2, 3, 1), (7, 7, 1), lift=0.01)
+    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, 0.02, with_gaps=True)], Z)
+    assert pairs.moving_name == ("UP",)
+    assert np.array_equal(pairs.moving, up.nodes)
+    assert pairs.area.sum() == pytest.approx(1.0, rel=1e-12)
+    assert np.allclose(pairs.frames[:, 0], -Z)
+    assert np.allclose(pairs.distance, 0.01)
+    assert np.array_equal(pairs.gap, pairs.distance)
+    x, y, _ = mesh.coordinates.T
+    field = 1.0 + 2.0 * x - 3.0 * y + (x * y if lower == "C3D8" else 0.0)
+    if lower != "C3D8":
+        field = field + x * x - 0.7 * x * y + 0.4 * y * y
+    assert np.allclose(pairs.opposite @ field, field[pairs.moving], rtol=0.0, atol=1e-10)
+
+
+def test_frames_are_right_handed_and_follow_a_direction():
+    rng = np.random.default_rng(2)
+    normals = rng.standard_normal((40, 3)) * [1.0, 1.0, 0.4]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    frames = local_frames(normals, Z)
+    assert np.allclose(frames @ np.swapaxes(frames, 1, 2), np.eye(3), atol=1e-12)
+    assert np.allclose(np.linalg.det(frames), 1.0)
+    assert (frames[:, 1] @ Z > 0.0).all() == (np.abs(normals @ Z).max() < 0.9)
+    flat = local_frames(np.tile(Z, (3, 1)), Z)
+    assert np.allclose(np.abs(flat[:, 1] @ Z), 0.0)
+
+
+def test_wrong_surfaces_are_named():
+    mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
+    with pytest.raises(SceneError, match=r"16 of 16 nodes of UP are farther than 0\.01 m from LOW"):
+        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, tolerance=0.01)], Z)
+    coordinates = mesh.coordinates.copy()
+    coordinates[up.nodes[:7], 2] += 0.05
+    with pytest.raises(SceneError, match=r"7 of 16 nodes of UP are farther than 0\.04 m from LOW"):
+        build_contact_pairs(coordinates, mesh.numbers, [ContactSurfaces(up, low, tolerance=0.04)], Z)
+    with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):
+        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, low)], Z)
+    twice = [ContactSurfaces(low, up), ContactSurfaces(up, low)]
+    with pytest.raises(SceneError, match=r"16 nodes move in two pairs, in UP and UP, as node"):
+        build_contact_pairs(mesh.coordinates, mesh.numbers, twice, Z)
+    with pytest.raises(SceneError, match=r"face S5 of element 1 \(C3D4\)"):
+        surface_of_faces(block("C3D4", (1, 1, 1))[0], "S", np.array([1]), np.array([5]))
+    with pytest.raises(SceneError, match="names element 99"):
+        surface_of_faces(mesh, "S", np.array([99]), np.array([1]))
+    with pytest.raises(SceneError, match="2 of 10 nodes of S belong to no face"):
+        surface_of_nodes(mesh, "S", np.append(up.nodes[: 10 - 1], mesh.n_nodes - 1))
+
+
+def test_cut_faces_are_matched_and_found():
+    sector = Sector("C3D10", "C3D8")
+    mesh = sector.mesh
+    axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
+    shuffled = np.random.default_rng(0).permutation(sector.left)
+    cut = match_cut_faces(*sector.places, axis, sector.right, shuffled)
+    turned = mesh.coordinates[cut.left] @ cut.rotation.T
+    assert np.allclose(turned, mesh.coordinates[cut.right], atol=1e-10)
+    assert np.array_equal(np.sort(cut.left), sector.left)
+    found = find_cut_faces(*sector.places, axis)
+    assert dict(zip(found.left, found.right, strict=True)) == dict(zip(cut.left, cut.right, strict=True))
+    # about another axis through another point
+    frame = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
+    frame *= np.linalg.det(frame)
+    moved = mesh.coordinates @ frame.T + [1.0, 2.0, 3.0]
+    tilted = CyclicAxis(N_SECTORS, np.array([1.0, 2.0, 3.0]), frame @ Z)
+    again = match_cut_faces(moved, mesh.numbers, mesh.bodies, tilted, sector.left, sector.right)
+    assert np.array_equal(again.left[np.argsort(again.left)], np.sort(cut.left))
+    assert np.allclose(again.rotation @ frame, frame @ cut.rotation, atol=1e-12)
+
+
+def test_wrong_cut_faces_are_named():
+    sector = Sector("C3D8", "C3D8")
+    mesh = sector.mesh
+    axis = CyclicAxis(47, np.zeros(3), Z)
+    with pytest.raises(SceneError, match=r"cut faces are 30 degrees apart, 47 sectors need 7\.66"):
+        match_cut_faces(*sector.places, axis, sector.left, sector.right)
+    with pytest.raises(SceneError, match=r"no node has an image under rotation by 7\.66 degrees"):
+        find_cut_faces(*sector.places, axis)
+    axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
+    coordinates = mesh.coordinates.copy()
+    coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]
+    with pytest.raises(SceneError, match=f"1 nodes of one cut face have no image .*: {mesh.numbers[sector.left[2]]}"):
+        match_cut_faces(coordinates, mesh.numbers, mesh.bodies, axis, sector.left, sector.right)
+    pairs = match_cut_faces(*sector.places, axis, sector.left, sector.right)
+    alone = pairs.right[pairs.left == sector.left[-1]][0]
+    with pytest.raises(SceneError, match=rf"1 nodes of one cut face .* of the other: {mesh.numbers[alone]};"):
+        match_cut_faces(*sector.places, axis, sector.left[:-1], sector.right)

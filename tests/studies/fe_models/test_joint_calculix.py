@@ -1,0 +1,159 @@
+"""Glued frequencies of whole models against CalculiX, which reads the same meshes. Needs its command `ccx`."""
+
+from __future__ import annotations
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from studies.fe_models.elements.assembly import assemble_mass, assemble_stiffness
+from studies.fe_models.elements.solid_mesh import Rotation
+from studies.fe_models.fe_model import MatrixModel, ReductionOptions
+from studies.fe_models.fe_scene import build_fe_scene, glued_frequencies, prepare_model
+from tests.studies.calculix_deck import read_frequencies
+from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
+from tests.studies.fe_models.solid_meshes import (
+    EXPORT,
+    block,
+    centrifugal,
+    deck_lines,
+    node_set,
+    read_export,
+    run_ccx,
+)
+
+pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+
+N_MODES = 4
+
+
+def surface_lines(name, elements, faces):
+    return [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(elements, faces, strict=True))]
+
+
+def sector_lines(sector):
+    """The sector with its root tied, the blade the dependent side, and the bore held."""
+    mesh = sector.mesh
+    cut = sector.joint().cut
+    inner = np.setdiff1d(sector.bore, cut.left)
+    return [
+        *deck_lines(mesh),
+        *node_set("F", mesh.numbers[inner]),
+        *node_set("L", mesh.numbers[cut.left]),
+        *node_set("R", mesh.numbers[cut.right]),
+        *surface_lines("BLADES", *sector.blade_faces),
+        *surface_lines("DISKS", *sector.disk_faces),
+        *["*SURFACE, NAME=LS, TYPE=NODE", "L", "*SURFACE, NAME=RS, TYPE=NODE", "R"],
+        *["*TIE, NAME=GLUE, POSITION TOLERANCE=1.E-5", "BLADES, DISKS"],
+        *["*TIE, CYCLIC SYMMETRY, NAME=CYC, POSITION TOLERANCE=1.E-5", "LS, RS"],
+        f"*CYCLIC SYMMETRY MODEL, N={N_SECTORS}, NGRAPH=1, TIE=CYC",
+        "0., 0., 0., 0., 0., 1.",
+        *["*BOUNDARY", "F, 1, 3"],
+    ]
+
+
+def static_step(sector):
+    return ["*STEP", "*STATIC", *centrifugal(sector.mesh, OMEGA_SQUARED), "*END STEP"]
+
+
+def calculix_frequencies(folder, sector, nodal_diameters, prestress):
+    """Natural frequencies (n, N_MODES), Hz, that CalculiX finds at each nodal diameter."""
+    found = []
+    lines = sector_lines(sector) + (static_step(sector) if prestress else [])
+    for k in nodal_diameters:
+        select = f"*SELECT CYCLIC SYMMETRY MODES, NMIN={k}, NMAX={k}"
+        step = ["*STEP, PERTURBATION" if prestress else "*STEP", "*FREQUENCY", str(3 * N_MODES), select, "*END STEP"]
+        name = f"nd{k}"
+        run_ccx(folder, [*lines, *step], name)
+        found.append(read_frequencies((folder / f"{name}.dat").read_text(), N_MODES))
+    return np.array(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("disk_kind", "blade_kind", "tolerance"),
+    [
+        ("C3D8", "C3D8", 1e-5),
+        ("C3D20", "C3D20", 1e-5),
+        ("C3D10", "C3D10", 1e-5),
+        ("C3D20R", "C3D15", 1e-5),
+        # the incompatible modes are not those of CalculiX: elements as coarse as these differ by so much
+        ("C3D8I", "C3D8I", 2e-2),
+    ],
+)
+def test_matching_sector_at_nodal_diameters(disk_kind, blade_kind, tolerance, tmp_path):
+    sector = matching(disk_kind, blade_kind)
+    prepared = prepare_model(sector.model(), sector.joint())
+    expected = calculix_frequencies(tmp_path, sector, range(4), prestress=True)
+    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in range(4)])
+    assert np.abs(own / expected - 1.0).max() < tolerance
+
+
+def matching(disk_kind, blade_kind):
+    """A sector whose disk has the blade's mesh on its outer face: the blade as wide as the face, untwisted."""
+    half = np.tan(np.pi / N_SECTORS)
+
+    def blade(points):
+        x, y, z = points.T
+        return np.stack([0.2 + 0.1 * x, (0.2 * half) * (y - 0.5), 0.01 + 0.02 * z], axis=1)
+
+    return Sector(disk_kind, blade_kind, (2, 4, 4), (3, 2, 2), blade_shape=blade)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("disk_kind", "blade_kind", "disk", "blade"),
+    [
+        ("C3D8", "C3D8", (3, 6, 3), (4, 5, 4)),
+        ("C3D20R", "C3D20R", (2, 6, 4), (3, 4, 5)),
+        ("C3D10", "C3D10", (3, 6, 4), (3, 5, 4)),
+    ],
+)
+def test_meshes_that_do_not_match(disk_kind, blade_kind, disk, blade, tmp_path):
+    sector = Sector(disk_kind, blade_kind, disk, blade)
+    prepared = prepare_model(sector.model(prestress=False), sector.joint())
+    assert not np.isclose(prepared.pairs.opposite.data, 1.0).all()
+    expected = calculix_frequencies(tmp_path, sector, (0, 2), prestress=False)
+    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in (0, 2)])
+
+    assert np.abs(own / expected - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D20R"])
+def test_matrices_of_calculix(kind, tmp_path):
+    """Prestress and spin softening come in the matrices, and frequencies agree with those that CalculiX finds."""
+    sector = Sector(kind, kind, (1, 4, 2), (2, 2, 2))
+    lines = [*sector_lines(sector), *static_step(sector), "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT]
+    run_ccx(tmp_path, lines)
+    stiffness, mass = read_export(tmp_path)
+    rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
+    model = MatrixModel(sector.mesh.coordinates, sector.mesh.numbers, stiffness, mass, rotation)
+    scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
+    expected = calculix_frequencies(tmp_path, sector, (0, 3, 6), prestress=True)
+    own = np.array([scene.summary.glued_frequencies[k] for k in (0, 3, 6)])
+    assert np.abs(own / expected - 1.0).max() < 2e-5
+    # the mesh says the same
+    other = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
+    for k in (0, 3, 6):
+        for name in ("stiffness", "mass", "load_static", "response"):
+            ours, theirs = (getattr(each.model.linear[k], name) for each in (other, scene))
+            assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize("kind", ["C3D4", "C3D6", "C3D8", "C3D10", "C3D15", "C3D20", "C3D20R"])
+def test_free_block(kind, tmp_path):
+    mesh, _ = block(kind, (3, 2, 2), lambda points: points * [0.2, 0.08, 0.05] + 0.01 * points[:, [1, 2, 0]] ** 2)
+    run_ccx(tmp_path, [*deck_lines(mesh), "*STEP", "*FREQUENCY", "14", "*END STEP"])
+    table = (tmp_path / "job.dat").read_text()
+    number = r"(-?\d\.\d+E[+-]\d+)"
+    rows = re.findall(rf"^ +\d+ +{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
+    expected = np.array([float(row[2]) for row in rows])[6:14]
+    # the mass may be singular: M x = x K / w^2 in the subspace without rigid body motions
+    stiffness, mass = assemble_stiffness(mesh).toarray(), assemble_mass(mesh).toarray()
+    shifted = stiffness + 1e6 * mass
+    squares = 1.0 / eigh(mass, shifted, eigvals_only=True)[::-1][:14] - 1e6
+    own = np.sqrt(np.abs(squares[6:14])) / (2.0 * np.pi)
+    assert np.abs(own / expected - 1.0).max() < 1e-6
