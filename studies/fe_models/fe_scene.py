@@ -43,6 +43,7 @@ from studies.fe_models.joint.ordering import (
 )
 from studies.fe_models.joint.pairing import ContactPairs, build_contact_pairs
 from studies.fe_models.joint.reduction import GluedStructureError, Reduction
+from studies.scene_answers import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
@@ -194,6 +195,20 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
         return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
     except GluedStructureError as error:
         raise _refused(error, nodal_diameter) from error
+
+
+def natural_frequencies(prepared: PreparedModel) -> NaturalFrequencies:
+    """Lowest natural frequencies of the glued structure at all nodal diameters.
+
+    Raises SceneError where the glued structure is not held, or unstable.
+    """
+    cut = prepared.reduction.ordered.supports.cut
+    nodal_diameters = tuple(range(1 if cut is None else cut.axis.n_sectors // 2 + 1))
+    frequencies = np.full((len(nodal_diameters), N_MODES), np.nan)
+    for k in nodal_diameters:
+        found = glued_frequencies(prepared, k, N_MODES)
+        frequencies[k, : len(found)] = found
+    return NaturalFrequencies(nodal_diameters, frequencies)
 
 
 def _order(

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from solver.model import FloatArray, IntArray
 from studies.fe_models.elements.element_matrices import ElementBatch, smallest_jacobians
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.fe_models.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
 from studies.fe_models.elements.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -25,9 +25,15 @@ Blocks = Callable[[ElementBatch, IntArray], FloatArray]
 
 
 def check_elements(mesh: SolidMesh) -> None:
-    """Raise SceneError where an element is turned inside out."""
+    """Raise SceneError where an element has no matrices here, or is turned inside out."""
     for group in mesh.groups:
         kind = ELEMENT_KINDS[group.kind]
+        if not kind.assembled:
+            raise SceneError(
+                "model",
+                f"element {group.numbers[0]} is a {group.kind}, whose matrices depend on the program",
+                f"give matrices, or use one of {', '.join(ASSEMBLED_KINDS)}",
+            )
         for chosen in _batches(group):
             wrong = np.flatnonzero(~(smallest_jacobians(kind, mesh.coordinates[group.nodes[chosen]]) > 0.0))
             if len(wrong):

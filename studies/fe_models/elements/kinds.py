@@ -47,13 +47,14 @@ class ElementKind:
     reference: nodes and shape functions. rule: integration of stiffness and mass alike, as CalculiX does; so the mass
     of an element is singular where there are fewer points than nodes, and that of a mesh may be. corner_faces: corners
     of the faces S1, S2, ... of CalculiX and Abaqus, in either sense. incompatible_modes: whether the element has the
-    incompatible modes of `hex_element`.
+    incompatible modes of `hex_element`. assembled: whether it has matrices here.
     """
 
     reference: ReferenceElement
     rule: Quadrature
     corner_faces: tuple[Loop, ...]
     incompatible_modes: bool = False
+    assembled: bool = True
 
     @cached_property
     def faces(self) -> tuple[Loop, ...]:
@@ -80,9 +81,14 @@ ELEMENT_KINDS: dict[str, ElementKind] = {
     "C3D6": ElementKind(WEDGE_6, WEDGE_2_POINTS, _WEDGE_FACES),
     "C3D8": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES),
     "C3D8I": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES, incompatible_modes=True),
+    # its one point needs an hourglass control, which is each code's own
+    "C3D8R": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES, assembled=False),
     "C3D10": ElementKind(TET_10, TET_4_POINTS, _TET_FACES),
     "C3D15": ElementKind(WEDGE_15, WEDGE_9_POINTS, _WEDGE_FACES),
     "C3D20": ElementKind(HEX_20, HEX_27_POINTS, _HEX_FACES),
     "C3D20R": ElementKind(HEX_20, HEX_8_POINTS, _HEX_FACES),
 }
 """Solid elements by their names in CalculiX and Abaqus."""
+
+ASSEMBLED_KINDS = tuple(name for name, kind in ELEMENT_KINDS.items() if kind.assembled)
+"""Those with matrices."""

@@ -6,6 +6,7 @@ import cmath
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray
@@ -56,6 +57,12 @@ class CutFaces:
     def rotation(self) -> FloatArray:
         """Rotation (3, 3) by one sector."""
         return self.axis.turn(2.0 * np.pi / self.axis.n_sectors)
+
+    def images(self, nodal_diameter: int, n_nodes: int) -> sparse.csr_matrix:
+        """Displacements (3 n, 3 n_nodes) of the right nodes from those of all nodes."""
+        blocks = np.tile(self.phase(nodal_diameter) * self.rotation, (len(self.left), 1, 1))
+        starts = np.arange(len(self.left) + 1)
+        return sparse.bsr_matrix((blocks, self.left, starts), shape=(3 * len(self.left), 3 * n_nodes)).tocsr()
 
     def phase(self, nodal_diameter: int) -> complex | float:
         """`exp(i 2 pi k / N)` of a nodal diameter in 0..n_sectors // 2, real at both ends."""

@@ -20,6 +20,7 @@ from studies.scenes.finite_element.condensation.dissection import Dissection, di
 from studies.scenes.finite_element.condensation.ordered_form import OrderedForm, order_form
 
 _LONGEST_CHAIN = 8  # surfaces on surfaces: nodes that follow nodes that follow
+_LARGEST_KEPT_CUT = 900  # nodes of a cut face; the dense matrix of those that are kept grows with their square
 _SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of symmetry that round-off or facets make
 
 
@@ -36,6 +37,11 @@ class Supports:
     cut: CutFaces | None
 
     @property
+    def keeps_cut(self) -> bool:
+        """Whether the nodes of the cut faces are kept to the last, so that elimination is real and the same for all."""
+        return self.cut is not None and len(self.cut.left) <= _LARGEST_KEPT_CUT
+
+    @property
     def n_nodes(self) -> int:
         """Number of nodes."""
         return len(self.numbers)
@@ -47,9 +53,9 @@ class Supports:
 
     @property
     def turned(self) -> BoolArray:
-        """Nodes (n_nodes,) of the right cut face, which move as `phase * rotation` times their images."""
+        """Nodes (n_nodes,) that are eliminated as `phase * rotation` times their images: the right cut face or none."""
         turned = np.zeros(self.n_nodes, dtype=np.bool_)
-        if self.cut is not None:
+        if self.cut is not None and not self.keeps_cut:
             turned[self.cut.right] = True
         return turned
 
@@ -60,17 +66,17 @@ class Supports:
 
     @property
     def master(self) -> IntArray:
-        """Node (n_nodes,) that each node follows: its image on the left cut face, or itself; -1 where it is held."""
+        """Node (n_nodes,) that each node is eliminated with: its image or itself; -1 where it is held."""
         master = np.arange(self.n_nodes)
-        if self.cut is not None:
+        if self.cut is not None and not self.keeps_cut:
             master[self.cut.right] = self.cut.left
         held = self.wholly_held
         master[held[master] | held] = -1
         return master
 
     def phase(self, nodal_diameter: int) -> complex | float:
-        """`exp(i phi)` of a nodal diameter."""
-        return 1.0 if self.cut is None else self.cut.phase(nodal_diameter)
+        """Phase that elimination sees: `exp(i phi)` of a nodal diameter, or 1.0."""
+        return 1.0 if self.cut is None or self.keeps_cut else self.cut.phase(nodal_diameter)
 
 
 def consistent_supports(supports: Supports) -> Supports:
@@ -154,8 +160,10 @@ def _held_frames(pairs: ContactPairs, supports: Supports) -> ContactPairs:
 
 def ties_of_structure(ties: ContactPairs, supports: Supports, pairs: ContactPairs) -> ContactPairs:
     """Ties without those of nodes that are held, follow their image on a cut face, or move in a contact pair."""
-    bound = supports.wholly_held | supports.turned
+    bound = supports.wholly_held
     bound[pairs.moving] = True
+    if supports.cut is not None:
+        bound[supports.cut.right] = True
     return ties.chosen(~bound[ties.moving])
 
 
@@ -218,16 +226,21 @@ class OrderedStructure:
         """
         pairs, supports, first = self.pairs, self.supports, self.dissection.n_eliminated
         n_kept, n_contact = len(self.free) - first, pairs.n_contact
-        follower = [pairs.moving] if self.ties is None else [pairs.moving, self.ties.moving]
-        moving = np.concatenate(follower)
-        n_moving = 3 * len(moving)
         all_nodes = self.followers(nodal_diameter)[:, 3 * first :]
-        # Points opposite, in all three directions, from the displacements of the nodes that are kept.
-        weights = pairs.opposite if self.ties is None else sparse.vstack([pairs.opposite, self.ties.opposite])
-        opposite = (sparse.kron(weights, np.eye(3), format="csr") @ all_nodes).tocsr()
-        dofs = (3 * (self.place[moving] - first)[:, None] + np.arange(3)).ravel()
-        loose = (~supports.held[moving]).ravel().astype(float)
-        scatter = sparse.csr_matrix((loose, (dofs, np.arange(n_moving))), shape=(3 * n_kept, n_moving))
+        moving, follow = [pairs.moving], [sparse.kron(pairs.opposite, np.eye(3), format="csr")]
+        if self.ties is not None:
+            moving.append(self.ties.moving)
+            follow.append(sparse.kron(self.ties.opposite, np.eye(3), format="csr"))
+        if supports.cut is not None and supports.keeps_cut:
+            loose_cut = self.place[supports.cut.right] >= 0
+            moving.append(supports.cut.right[loose_cut])
+            follow.append(supports.cut.images(nodal_diameter, supports.n_nodes)[np.repeat(loose_cut, 3)])
+        followers = np.concatenate(moving)
+        # What they follow, in all three directions, from the displacements of the nodes that are kept.
+        opposite = (sparse.vstack(follow, format="csr") @ all_nodes).tocsr()
+        dofs = (3 * (self.place[followers] - first)[:, None] + np.arange(3)).ravel()
+        loose = (~supports.held[followers]).ravel().astype(float)
+        scatter = sparse.csr_matrix((loose, (dofs, np.arange(len(dofs)))), shape=(3 * n_kept, len(dofs)))
         frames = sparse.block_diag(list(np.swapaxes(pairs.frames, 1, 2)), format="csr")[:, pairs.present.ravel()]
         follows, driven = scatter @ opposite, scatter[:, : 3 * n_contact] @ frames
         total = sparse.eye(3 * n_kept, format="csr")
@@ -279,7 +292,10 @@ def order_structure(
     ones = np.ones(np.count_nonzero(both), dtype=np.int8)
     couplings = sparse.csr_matrix((ones, (rows[both], columns[both])), shape=(len(free), len(free)))
     bound = [pairs] if ties is None else [pairs, ties]
-    involved = master[np.concatenate([nodes for each in bound for nodes in (each.moving, each.opposite.indices)])]
+    nodes = [part for each in bound for part in (each.moving, each.opposite.indices)]
+    if supports.cut is not None and supports.keeps_cut:
+        nodes += [supports.cut.left, supports.cut.right]
+    involved = master[np.concatenate(nodes)]
     kept = np.isin(free, involved)
     if kept.all():
         raise SceneError("contact", "all nodes that move are in contact pairs", "refine the mesh")

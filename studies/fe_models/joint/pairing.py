@@ -20,10 +20,10 @@ _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a 
 class ContactSurfaces:
     """Two surfaces that touch.
 
-    first, second: the finer one moves, the first where they are alike. tolerance: largest distance of a node that is
-    paired, m; a share of the size of a facet if None. friction_coefficient: of these surfaces, None where one is given
-    for all. with_gaps: distances in the mesh are gaps of the joint; else they are the error of facets on curved
-    surfaces, and the pairs touch.
+    first, second: the finer one moves, the first where they are alike, the other one where it alone is covered.
+    tolerance: largest distance of a node that is paired, m; a share of the size of a facet if None.
+    friction_coefficient: of these surfaces, None where one is given for all. with_gaps: distances in the mesh are gaps
+    of the joint; else they are the error of facets on curved surfaces, and the pairs touch.
     """
 
     first: Surface
@@ -155,22 +155,30 @@ def _pair(coordinates: FloatArray, contact: ContactSurfaces, place: int, along: 
     sizes = first.facet_size(coordinates), second.facet_size(coordinates)
     moving, opposite = (second, first) if sizes[1] < (1.0 - 1e-6) * sizes[0] else (first, second)
     tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
-    nodes = moving.nodes
-    found = closest_points(coordinates[nodes], opposite, coordinates)
+    found = closest_points(coordinates[moving.nodes], opposite, coordinates)
     far = found.distance > tolerance
     if far.any():
-        raise SceneError(
-            "contact",
-            f"{np.count_nonzero(far)} of {len(nodes)} nodes of {moving.name} are farther than {tolerance:g} m"
-            f" from {opposite.name}",
-            f"give a larger tolerance (the farthest is at {found.distance.max():.3g} m), or surfaces that cover each"
-            " other",
-        )
+        # a coarse surface may lie inside a finer one that goes on
+        other = closest_points(coordinates[opposite.nodes], moving, coordinates)
+        if (other.distance > tolerance).any():
+            raise SceneError(
+                "contact",
+                f"{np.count_nonzero(far)} of {len(far)} nodes of {moving.name} are farther than {tolerance:g} m"
+                f" from {opposite.name}",
+                f"give a larger tolerance (the farthest is at {found.distance.max():.3g} m), or surfaces of which one"
+                " covers the other",
+            )
+        moving, opposite, found = opposite, moving, other
+    nodes = moving.nodes
     area, normals = moving.areas_and_normals(coordinates)
     n, n_nodes = len(nodes), len(coordinates)
     point, corner = np.nonzero(found.weights)
     entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
     weights = sparse.csr_matrix(entries, shape=(n, n_nodes))
+    facing = np.zeros_like(coordinates)
+    facing[opposite.nodes] = opposite.areas_and_normals(coordinates)[1]
+    if np.einsum("ij,ij->", weights @ facing, normals * area[:, None]) > 0.0:
+        raise SceneError("contact", f"{moving.name} and {opposite.name} face the same way", "give faces that touch")
     offset = weights @ coordinates - coordinates[nodes]
     distance = np.einsum("ij,ij->i", offset, normals)
     return ContactPairs(

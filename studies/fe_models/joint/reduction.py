@@ -23,6 +23,7 @@ from studies.scenes.finite_element.condensation.factor import (
     factorise,
     mirrored,
     solve_lower,
+    times,
 )
 from studies.scenes.finite_element.condensation.modes import lowest_modes
 from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
@@ -80,7 +81,7 @@ class GluedStructure:
         """Displacements under forces with all relative displacements 0."""
         result, glued = self.factor.condense(forces), self.kept.glued
         inner = solve_lower(self.last.lower, glued.conj().T @ result[self._first :], transposed=False)
-        result = result.conj()
+        result = result.conj().astype(np.result_type(result, glued.dtype))
         result[self._first :] = glued.conj() @ solve_lower(self.last.lower, inner.conj(), transposed=True)
         return self.factor.expand(result).conj()
 
@@ -107,6 +108,8 @@ class Reduction:
     ordered: OrderedStructure
     forms: Mapping[str, sparse.csr_matrix]
     _ordered_forms: dict[str, OrderedForm] = field(default_factory=dict)
+    _factors: list[Factor] = field(default_factory=list)
+    _condensed: list[Matrix] = field(default_factory=list)
     _unphased: dict[int, tuple[FrontFactor, Matrix | None]] = field(default_factory=dict)
 
     def solve_static(self, load: FloatArray) -> FloatArray:
@@ -134,10 +137,7 @@ class Reduction:
         """
         glued, followers = self._glue(nodal_diameter), self.ordered.followers(nodal_diameter)
         others = [name for name in self.forms if name != "stiffness"]
-        projection = Projection(
-            glued.factor, [self._form(name) for name in others], self.ordered.supports.phase(nodal_diameter)
-        )
-        condensed = projection.project(glued.driven())
+        condensed = self._project(glued, others, nodal_diameter)
         frequencies, modes = self._modes(glued, followers, n_modes)
         moved = followers @ modes
         inertia = {name: self.forms[name] @ moved for name in others}
@@ -160,6 +160,17 @@ class Reduction:
             vectors=np.concatenate([equivalent[:, :n_vectors], moved.conj().T @ vectors]),
         )
 
+    def _project(self, glued: GluedStructure, names: list[str], nodal_diameter: int) -> list[Matrix]:
+        """Forms (n_relative, n_relative) on the static shapes."""
+        driven = glued.driven()
+        forms = [self._form(name) for name in names]
+        if self.ordered.supports.turned.any():
+            return Projection(glued.factor, forms, self.ordered.supports.phase(nodal_diameter)).project(driven)
+        if not self._condensed:
+            self._condensed.extend(Projection(glued.factor, forms, 1.0).condense())
+        projected = [driven.conj().T @ times(form, driven) for form in self._condensed]
+        return [0.5 * (each + each.conj().T) for each in projected]
+
     def _form(self, name: str) -> OrderedForm:
         if name not in self._ordered_forms:
             self._ordered_forms[name] = self.ordered.order(self.forms[name], stiffness=name == "stiffness")
@@ -169,7 +180,7 @@ class Reduction:
         ordered, kept = self.ordered, self.ordered.kept(nodal_diameter)
         phase = ordered.supports.phase(nodal_diameter)
         try:
-            factor = factorise(self._form("stiffness"), ordered.dissection, phase, self._unphased)
+            factor = self._factor(phase)
             left = factor.left
             glued, relative = left @ kept.glued, left @ kept.relative
             update = np.asfortranarray(kept.relative.conj().T @ relative)
@@ -182,12 +193,20 @@ class Reduction:
             raise GluedStructureError(unstable=error.unstable) from error
         return GluedStructure(factor, last, kept, mirrored(update))
 
+    def _factor(self, phase: complex | float) -> Factor:
+        if self.ordered.supports.turned.any():
+            return factorise(self._form("stiffness"), self.ordered.dissection, phase, self._unphased)
+        # no phase anywhere
+        if not self._factors:
+            self._factors.append(factorise(self._form("stiffness"), self.ordered.dissection, 1.0))
+        return self._factors[0]
+
     def _modes(self, glued: GluedStructure, followers: sparse.csr_matrix, n_modes: int) -> tuple[FloatArray, Matrix]:
         """Frequencies and modes in the order of elimination, their phase fixed by what a random vector sees of them."""
         mass = (followers.conj().T @ self.forms["mass"] @ followers).tocsr()
         rng = np.random.default_rng(0)
         # A singular mass leaves nothing of some vectors: those that inertia drives all have mass.
-        random = mass @ rng.standard_normal((mass.shape[0], _BLOCK)).astype(mass.dtype)
+        random = mass @ rng.standard_normal((mass.shape[0], _BLOCK)).astype(glued.last.lower.dtype)
         squares, modes = lowest_modes(glued.solve, lambda vectors: mass @ vectors, glued.solve(random), n_modes)
         sees = rng.standard_normal(self.ordered.supports.n_nodes * 3).reshape(-1, 3)[self.ordered.free].ravel()
         seen = sees @ modes

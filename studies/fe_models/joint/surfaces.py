@@ -15,6 +15,7 @@ from solver.model import FloatArray, IntArray
 from studies.fe_models.elements.kinds import ELEMENT_KINDS
 from studies.fe_models.elements.reference_element import HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
 from studies.fe_models.elements.solid_mesh import SolidMesh
+from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.finite_element.hex_element import CORNERS
 
@@ -203,6 +204,14 @@ def outer_faces(mesh: SolidMesh) -> OuterFaces:
     _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
     outer = np.sort(first[count == 1])
     return OuterFaces(tuple(loops[place] for place in outer), tuple(parts[place] for place in outer))
+
+
+def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
+    """Outer faces of a mesh by their corners, for pictures; triangles repeat their last corner."""
+    outer = outer_faces(mesh)
+    corners = np.array([loop[[0, 1, 2, 2] if len(loop) in (3, 6) else [0, 1, 2, 3]] for loop in outer.loops])
+    used, quads = np.unique(corners, return_inverse=True)
+    return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=outer.parts)
 
 
 def _surface(name: str, loops: list[IntArray]) -> Surface:

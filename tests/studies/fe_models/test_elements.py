@@ -18,7 +18,7 @@ from studies.fe_models.elements.assembly import (
     check_elements,
     spin_softening,
 )
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.fe_models.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
 from studies.fe_models.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 from tests.studies.fe_models.solid_meshes import (
@@ -32,7 +32,7 @@ from tests.studies.fe_models.solid_meshes import (
     run_ccx,
 )
 
-KINDS = tuple(ELEMENT_KINDS)
+KINDS = ASSEMBLED_KINDS
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
 # How scikit-fem names the element, and the degree that makes it take the same integration points.
@@ -238,7 +238,13 @@ def test_inverted_element_is_named():
         check_elements(wrong)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+def test_elements_without_matrices_are_named():
+    mesh, _ = block("C3D8R", (1, 1, 1))
+    with pytest.raises(SceneError, match=r"element 1 is a C3D8R, .*; give matrices, or use one of C3D4, "):
+        check_elements(mesh)
+
+
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
 def test_faces_point_outwards_and_hold_their_mid_side_nodes(kind):
     reference = ELEMENT_KINDS[kind].reference
     nodes, centre = reference.nodes, reference.corners.mean(axis=0)

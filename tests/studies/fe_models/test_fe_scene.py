@@ -22,10 +22,12 @@ from studies.fe_models.fe_model import (
     Retainer,
     SetMotion,
 )
-from studies.fe_models.fe_scene import build_fe_scene, prepare_model
+from studies.fe_models.fe_scene import build_fe_scene, natural_frequencies, prepare_model
+from studies.fe_models.joint import ordering
 from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces
 from studies.fe_models.joint.pairing import ContactSurfaces
 from studies.fe_models.joint.surfaces import surface_of_faces, surface_of_nodes
+from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scenes import dovetail_sector
@@ -92,7 +94,10 @@ CASES = {
 
 @pytest.mark.parametrize("name", [*CASES, "plane of symmetry"])
 @pytest.mark.parametrize("nodal_diameter", [0, 2, N_SECTORS // 2])
-def test_reduction_against_dense_constraints(name, nodal_diameter):
+@pytest.mark.parametrize("largest_kept_cut", [0, 900])
+def test_reduction_against_dense_constraints(name, nodal_diameter, largest_kept_cut, monkeypatch):
+    # cut faces are kept to the last, or eliminated with their images at each nodal diameter
+    monkeypatch.setattr(ordering, "_LARGEST_KEPT_CUT", largest_kept_cut)
     if name == "plane of symmetry":
         sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
         joint = sector.joint(held=plane_of_symmetry(sector))
@@ -160,6 +165,10 @@ def test_prestress_is_that_of_the_glued_sector():
     own = prepared.reduction.forms["stiffness"]
     assert np.abs(own - expected).max() < 1e-10 * np.abs(expected).max()
     assert prepared.at_rest is not None
+    told = natural_frequencies(prepared)
+    assert told.nodal_diameters == tuple(range(N_SECTORS // 2 + 1))
+    own_first = prepared.reduction.reduce(2, 3, load[:, None]).frequencies / (2.0 * np.pi)
+    assert np.allclose(told.frequencies[2, :3], own_first, rtol=1e-9)
     assert np.allclose(prepared.at_rest.solve_static(load), glued, rtol=0.0, atol=1e-9 * np.abs(glued).max())
     assert forms.keys() <= prepared.reduction.forms.keys()
 
@@ -325,6 +334,29 @@ def test_matrices_with_nodes_that_have_no_place():
     assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
     assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
     assert np.isfinite(ours.model.linear[0].load_static).all()
+
+
+def test_matrices_are_put_in_the_order_of_the_nodes():
+    model, _ = plates()
+    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
+    n = model.mesh.n_nodes
+    rows = np.random.default_rng(5).permutation(3 * n)
+    left_out = rows == 17
+    rows = rows[~left_out]
+    # and a node that the mesh does not have
+    more = sparse.block_diag([stiffness[rows][:, rows], sparse.eye(3)], format="csr")
+    node = np.append(model.numbers[rows // 3], [-4, -4, -4])
+    direction = np.append(rows % 3, [2, 0, 1])
+    heavy = sparse.block_diag([mass[rows][:, rows], sparse.diags([1.0, 2.0, 3.0])], format="csr")
+    ordered = order_by_nodes(more, heavy, node, direction, model.numbers, model.coordinates)
+    assert np.array_equal(np.argwhere(ordered.missing), [[17 // 3, 17 % 3]])
+    assert ordered.numbers[-1] == -4
+    assert np.isnan(ordered.coordinates[-1]).all()
+    kept = np.setdiff1d(np.arange(3 * n), [17])
+    assert np.abs(ordered.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
+    assert np.array_equal(ordered.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
+    with pytest.raises(SceneError, match=r"displacement 2 of node -4 has more than one row"):
+        order_by_nodes(more, heavy, node, np.append(rows % 3, [1, 1, 0]), model.numbers, model.coordinates)
 
 
 def test_retainer_acts_on_the_mean_relative_displacement():

@@ -10,7 +10,7 @@ from studies.fe_models.elements.kinds import ELEMENT_KINDS
 from studies.fe_models.joint.closest_point import closest_points
 from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.fe_models.joint.pairing import ContactSurfaces, build_contact_pairs, local_frames
-from studies.fe_models.joint.surfaces import outer_faces, surface_of_faces, surface_of_nodes
+from studies.fe_models.joint.surfaces import describe_mesh, outer_faces, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -48,6 +48,19 @@ def test_outer_faces_of_a_block():
     assert len(loops) == 2 * (2 * 3 * 2 + 3 * 2 + 2 * 2)
     on_rim = ((reference == 0.0) | (reference == 1.0)).any(axis=1)
     assert np.array_equal(np.unique(np.concatenate(loops)), np.flatnonzero(on_rim))
+
+
+def test_pictured_faces_close_the_body():
+    for kind in ("C3D10", "C3D15", "C3D20"):
+        mesh, _ = block(kind, (2, 1, 2), lambda points: points * [2.0, 1.0, 3.0], part="disk")
+        picture = describe_mesh(mesh)
+        corners = picture.nodes[picture.quads]
+        vectors = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        # volume by the divergence theorem, positive as the faces look outwards
+        assert np.einsum("ij,ij->", corners.mean(axis=1), vectors) / 3.0 == pytest.approx(6.0, rel=1e-12)
+        assert np.abs(vectors.sum(axis=0)).max() < 1e-12
+        assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(22.0)
+        assert set(picture.parts) == {"disk"}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -111,6 +124,17 @@ def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
     assert np.allclose(pairs.opposite @ field, field[pairs.moving], rtol=0.0, atol=1e-10)
 
 
+def test_a_coarse_surface_inside_a_finer_one_moves():
+    first, a = block("C3D8", (8, 8, 1))
+    second, b = block("C3D8", (2, 2, 1), lambda points: 0.5 * points + [0.3, 0.2, 1.0])
+    mesh = joined(first, second)
+    low = surface_of_nodes(mesh, "LOW", np.flatnonzero(a[:, 2] == 1.0))
+    up = surface_of_nodes(mesh, "UP", first.n_nodes + np.flatnonzero(b[:, 2] == 0.0))
+    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up)], Z)
+    assert pairs.moving_name == ("UP",)
+    assert pairs.area.sum() == pytest.approx(0.25)
+
+
 def test_frames_are_right_handed_and_follow_a_direction():
     rng = np.random.default_rng(2)
     normals = rng.standard_normal((40, 3)) * [1.0, 1.0, 0.4]
@@ -131,6 +155,10 @@ def test_wrong_surfaces_are_named():
     coordinates[up.nodes[:7], 2] += 0.05
     with pytest.raises(SceneError, match=r"7 of 16 nodes of UP are farther than 0\.04 m from LOW"):
         build_contact_pairs(coordinates, mesh.numbers, [ContactSurfaces(up, low, tolerance=0.04)], Z)
+    top = faces_where(mesh, np.abs(mesh.coordinates[:, 2] - 2.02) < 1e-9)
+    above = surface_of_faces(mesh, "ABOVE", *top)
+    with pytest.raises(SceneError, match="ABOVE and LOW face the same way"):
+        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(above, low, tolerance=2.0)], Z)
     with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):
         build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, low)], Z)
     twice = [ContactSurfaces(low, up), ContactSurfaces(up, low)]

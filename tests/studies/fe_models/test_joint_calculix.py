@@ -11,8 +11,9 @@ from scipy.linalg import eigh
 
 from studies.fe_models.elements.assembly import assemble_mass, assemble_stiffness
 from studies.fe_models.elements.solid_mesh import Rotation
-from studies.fe_models.fe_model import MatrixModel, ReductionOptions
+from studies.fe_models.fe_model import ReductionOptions
 from studies.fe_models.fe_scene import build_fe_scene, glued_frequencies, prepare_model
+from studies.fe_models.nodal_matrices import order_by_nodes
 from tests.studies.calculix_deck import read_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import (
@@ -130,7 +131,11 @@ def test_matrices_of_calculix(kind, tmp_path):
     run_ccx(tmp_path, lines)
     stiffness, mass = read_export(tmp_path)
     rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
-    model = MatrixModel(sector.mesh.coordinates, sector.mesh.numbers, stiffness, mass, rotation)
+    rows = [row.split(".") for row in (tmp_path / "job.dof").read_text().split()]
+    node, direction = np.array(rows, dtype=int).T
+    ordered = order_by_nodes(stiffness, mass, node, direction - 1, sector.mesh.numbers, sector.mesh.coordinates)
+    assert not ordered.missing.any()
+    model = ordered.model(rotation)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
     expected = calculix_frequencies(tmp_path, sector, (0, 3, 6), prestress=True)
     own = np.array([scene.summary.glued_frequencies[k] for k in (0, 3, 6)])

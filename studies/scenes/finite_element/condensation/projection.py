@@ -63,6 +63,16 @@ class Projection:
             self._add_child(root, driven[dofs_of(places)], totals)
         return [np.asarray(0.5 * (total + total.conj().T)).conj() for total in totals]
 
+    def condense(self) -> list[Dense]:
+        """Each form (n_kept, n_kept) condensed to the nodes that are never eliminated."""
+        dissection = self.factor.dissection
+        totals = [form.kept(dissection, self.phase) for form in self.forms]
+        for root in dissection.roots:
+            places = dofs_of(dissection.fronts[root].boundary - dissection.n_eliminated)
+            for total, part in zip(totals, self._condensed(root), strict=True):
+                total[np.ix_(places, places)] += mirrored(part)
+        return totals
+
     def _add_child(self, number: int, boundary: Dense, totals: list[Dense]) -> None:
         """Adds what a front and those below it have on shapes with displacements `boundary` (n, n_shapes)."""
         if self._largest[number] <= _LARGE:
