@@ -30,6 +30,8 @@ from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
 from studies.scenes.finite_element.condensation.projection import Projection
 
 _BLOCK = 8  # modes are looked for with so many vectors at a time
+_SMALL = 900  # displacements of a structure whose modes are found by dense matrices
+_ROUND_OFF = 1e-11  # of the largest eigenvalue of a mass or a flexibility
 _COLUMNS = 64  # vectors that are condensed at a time
 
 
@@ -207,10 +209,28 @@ class Reduction:
         rng = np.random.default_rng(0)
         # A singular mass leaves nothing of some vectors: those that inertia drives all have mass.
         random = mass @ rng.standard_normal((mass.shape[0], _BLOCK)).astype(glued.last.lower.dtype)
-        squares, modes = lowest_modes(glued.solve, lambda vectors: mass @ vectors, glued.solve(random), n_modes)
+        if mass.shape[0] <= _SMALL:
+            squares, modes = _all_modes(glued, mass.toarray().astype(random.dtype), n_modes)
+        else:
+            squares, modes = lowest_modes(glued.solve, lambda vectors: mass @ vectors, glued.solve(random), n_modes)
         sees = rng.standard_normal(self.ordered.supports.n_nodes * 3).reshape(-1, 3)[self.ordered.free].ravel()
         seen = sees @ modes
         return np.sqrt(squares), modes * (seen.conj() / np.abs(seen))
+
+
+def _all_modes(glued: GluedStructure, mass: Matrix, n_modes: int) -> tuple[FloatArray, Matrix]:
+    """Lowest modes as `lowest_modes` gives them, by dense matrices; as many as a singular mass (n, n) lets there be.
+
+    With M = L L^H and the flexibility H = L^H K^-1 L the mode of an eigenvector y, H y = y / omega^2, is K^-1 L y.
+    """
+    values, vectors = np.linalg.eigh(mass)
+    moved = values > _ROUND_OFF * values[-1]
+    root = vectors[:, moved] * np.sqrt(values[moved])
+    solved = glued.solve(root)
+    flexibility = root.conj().T @ solved
+    values, vectors = np.linalg.eigh(0.5 * (flexibility + flexibility.conj().T))
+    found = np.flatnonzero(values > _ROUND_OFF * values[-1])[::-1][:n_modes]
+    return 1.0 / values[found], solved @ (vectors[:, found] / values[found])
 
 
 def _joined(relative: Matrix, coupling: Matrix, modal: Matrix) -> Matrix:

@@ -23,7 +23,7 @@ from studies.fe_models.fe_model import (
     SetMotion,
 )
 from studies.fe_models.fe_scene import build_fe_scene, natural_frequencies, prepare_model
-from studies.fe_models.joint import ordering
+from studies.fe_models.joint import ordering, reduction
 from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces
 from studies.fe_models.joint.pairing import ContactSurfaces
 from studies.fe_models.joint.surfaces import surface_of_faces, surface_of_nodes
@@ -357,6 +357,32 @@ def test_matrices_are_put_in_the_order_of_the_nodes():
     assert np.array_equal(ordered.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
     with pytest.raises(SceneError, match=r"displacement 2 of node -4 has more than one row"):
         order_by_nodes(more, heavy, node, np.append(rows % 3, [1, 1, 0]), model.numbers, model.coordinates)
+
+
+@pytest.mark.parametrize("kind", ["C3D4", "C3D20R"])
+def test_more_modes_than_a_singular_mass_has(kind):
+    sector = Sector(kind, kind, (1, 2, 1), (1, 1, 1))
+    options = ReductionOptions(nodal_diameter=2, n_modes=100)
+    scene = build_fe_scene(sector.model(), sector.joint(), options, 1)
+    frequencies = scene.summary.glued_frequencies[2]
+    assert 5 < len(frequencies) < 100
+    assert np.isfinite(frequencies).all()
+    mass = scene.model.linear[2].mass
+    n = len(mass) - len(frequencies)
+    assert n == 3 * scene.pairs.n_contact
+    assert np.linalg.eigvalsh(mass)[0] > -1e-9
+    # modes found among few are those found among many
+    fewer = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=2, n_modes=3), 1)
+    assert np.allclose(fewer.summary.glued_frequencies[2], frequencies[:3], rtol=1e-10)
+
+
+@pytest.mark.parametrize("small", [0, 900])
+def test_modes_by_dense_matrices_and_by_iteration(small, monkeypatch):
+    monkeypatch.setattr(reduction, "_SMALL", small)
+    sector = Sector("C3D20R", "C3D8", (1, 3, 2), (1, 2, 2))
+    prepared = prepare_model(sector.model(), sector.joint())
+    _, _, _, expected = dense_twin(sector, sector.joint(), prepared.pairs, prepared.reduction.forms, 2, 6)
+    assert np.allclose(prepared.reduction.frequencies(2, 6), expected, rtol=1e-8)
 
 
 def test_retainer_acts_on_the_mean_relative_displacement():
