@@ -1,0 +1,1 @@
+"""Meshes with their sets, surfaces and steps: decks of CalculiX and Abaqus, and meshes of other programs."""

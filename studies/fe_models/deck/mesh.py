@@ -1,0 +1,231 @@
+"""What a deck holds: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
+
+Node and element numbers are those of the file, not places in an array. Names of sets, surfaces, materials and
+interactions are in capitals, as the codes do not tell them from small letters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+NODES_OF_KIND: Mapping[str, int] = {
+    "C3D4": 4,
+    "C3D6": 6,
+    "C3D8": 8,
+    "C3D8I": 8,
+    "C3D8R": 8,
+    "C3D10": 10,
+    "C3D15": 15,
+    "C3D20": 20,
+    "C3D20R": 20,
+}
+"""Kinds of elements that a mesh may hold, by their names in CalculiX and Abaqus, and their numbers of nodes.
+
+Nodes stand in the order of these codes. C3D8R is read for its geometry: its matrices come from the code itself.
+"""
+
+
+@dataclass(frozen=True)
+class ElementBlock:
+    """Elements of one kind.
+
+    kind: a key of NODES_OF_KIND. numbers (m,): element numbers. nodes (m, k): node numbers, in the order of the codes.
+    """
+
+    kind: str
+    numbers: IntArray
+    nodes: IntArray
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Faces of elements, or nodes; the other of the two is empty.
+
+    elements (f,): element numbers. faces (f,): 1 to 6, the codes' S1 to S6. nodes (p,): node numbers, ascending.
+    """
+
+    elements: IntArray
+    faces: IntArray
+    nodes: IntArray
+
+    @property
+    def of_nodes(self) -> bool:
+        """Whether the surface is one of nodes."""
+        return self.nodes.size > 0
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two surfaces that are glued, or the cut faces of a sector.
+
+    dependent, independent: names of surfaces (the slave comes first, as in the deck). tolerance: largest distance of a
+    node that is tied, in units of length of the file; None where the deck does not say. cyclic: whether these are the
+    cut faces of a sector.
+    """
+
+    name: str
+    dependent: str
+    independent: str
+    tolerance: float | None
+    cyclic: bool
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two surfaces in contact.
+
+    dependent, independent: names of surfaces (the slave comes first, as in the deck). interaction: the name of what is
+    between them. friction_coefficient: of that interaction, None where the deck does not say.
+    """
+
+    dependent: str
+    independent: str
+    interaction: str
+    friction_coefficient: float | None
+
+
+@dataclass(frozen=True)
+class CyclicSymmetry:
+    """A sector of a whole.
+
+    n_sectors: in the whole. tie: name of the tie of the cut faces, "" where the deck does not say. axis (2, 3): two
+    points on the axis.
+    """
+
+    n_sectors: int
+    tie: str
+    axis: FloatArray
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Displacements that are prescribed.
+
+    name: the set, or the node number as a text. nodes (p,): node numbers. first_dof, last_dof: 1 to 3 are displacements
+    along x, y and z; a boundary condition may reach beyond. value: displacement, 0 where it is held.
+    """
+
+    name: str
+    nodes: IntArray
+    first_dof: int
+    last_dof: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic linear elastic material, in units of the file. None where the deck gives no such value.
+
+    Of values at several temperatures the first ones are taken.
+    """
+
+    young: float | None
+    poisson: float | None
+    density: float | None
+
+
+@dataclass(frozen=True)
+class SolidSection:
+    """Elements of one material. element_set: name of a set of elements. material: name of a material."""
+
+    element_set: str
+    material: str
+
+
+@dataclass(frozen=True)
+class CentrifugalLoad:
+    """The load of a rotation.
+
+    name: the set, or the element number as a text. elements (m,): element numbers. omega_squared: square of the speed,
+    rad2/s2. point (3,): on the axis. axis (3,): its direction, of unit length.
+    """
+
+    name: str
+    elements: IntArray
+    omega_squared: float
+    point: FloatArray
+    axis: FloatArray
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a deck.
+
+    kind: "static", "frequency", or another keyword in small letters; "" where there is none. perturbation: about the
+    state of the step before. nlgeom: with large displacements. line: where it begins, as "sector.inp, line 7".
+    boundaries: those the step adds. boundaries_replaced: whether it takes away all others first. centrifugal: loads.
+    equations_removed: `*EQUATION,REMOVE ALL`. contact_removed: pairs of surfaces (dependent, independent) that
+    `*MODEL CHANGE` takes away. parameters: those of the keyword that gives the kind, by name in capitals.
+    """
+
+    kind: str
+    perturbation: bool
+    nlgeom: bool
+    line: str
+    boundaries: tuple[Boundary, ...] = ()
+    boundaries_replaced: bool = False
+    centrifugal: tuple[CentrifugalLoad, ...] = ()
+    equations_removed: bool = False
+    contact_removed: tuple[tuple[str, str], ...] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Deck:
+    """All that is read of a model's mesh file.
+
+    Attributes
+    ----------
+    path
+        Name of the file, for messages.
+    node_numbers
+        (n,), ascending.
+    coordinates
+        (n, 3), units of the file.
+    blocks
+        Elements, one block a kind; no element number is in two of them.
+    node_sets, element_sets
+        Ascending numbers by the name of the set; all of them exist.
+    surfaces, materials
+        By name.
+    ties, contact_pairs, sections, steps
+        In the order of the file.
+    cyclic
+        None where the deck is none of a sector.
+    boundaries
+        Those given before the first step.
+    skipped
+        Keywords that were not read, each as "sector.inp, line 7: *KEYWORD", the first of every kind.
+    notes
+        What was read but left out in part, a sentence each.
+    """
+
+    path: str
+    node_numbers: IntArray
+    coordinates: FloatArray
+    blocks: tuple[ElementBlock, ...]
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    element_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    ties: tuple[Tie, ...] = ()
+    contact_pairs: tuple[ContactPair, ...] = ()
+    cyclic: CyclicSymmetry | None = None
+    boundaries: tuple[Boundary, ...] = ()
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    sections: tuple[SolidSection, ...] = ()
+    steps: tuple[Step, ...] = ()
+    skipped: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def rows_of_nodes(self, numbers: IntArray) -> IntArray:
+        """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""
+        rows = np.searchsorted(self.node_numbers, numbers)
+        assert np.array_equal(self.node_numbers[np.minimum(rows, self.node_numbers.size - 1)], numbers)
+        return rows.astype(np.int64)
