@@ -1,0 +1,108 @@
+"""Has a library read a foreign file in a process of its own, with limits of time and memory.
+
+Such a library may crash, end its process, or take what memory a damaged file asks for. The process hands back arrays
+in a file of NumPy's, without pickles; its end is the answer where it comes to a bad one.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from studies.fe_models.text.places import check_file
+from studies.guards.search_path import search_path
+from studies.scene_error import SceneError
+
+Arrays = dict[str, np.ndarray]
+
+_READERS: Mapping[str, tuple[str, str]] = {
+    "gmsh": ("meshio", "meshio"),
+    "cdb": ("ansys.mapdl.reader", "ansys"),
+    "full": ("ansys.mapdl.reader", "ansys"),
+}
+"""Library and the project's extra that brings it, of every kind of file."""
+
+REFUSED = 3
+"""Exit status of the process where a reader says in a sentence what is wrong."""
+
+_LARGEST_FILE = 2**31
+_LEAST_SECONDS = 60
+_BYTES_A_SECOND = 2**20
+_START = """\
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from studies.fe_models.libraries.child import main
+main(sys.argv[2:])"""
+
+
+def read_by_library(kind: str, path: Path, key: str) -> Arrays:
+    """Arrays of a file, as the reader of its kind gives them.
+
+    Parameters
+    ----------
+    kind
+        "gmsh", "cdb" or "full".
+    path
+        The file.
+    key
+        What errors are about: "model" or "matrices".
+
+    Raises
+    ------
+    SceneError
+        Where the library is not installed, refuses the file, crashes, or takes too long or too much memory.
+    """
+    size = check_file(path, _LARGEST_FILE, key)
+    library, extra = _READERS[kind]
+    if not _is_installed(library):
+        found = f"{path.name} needs the library {library}, which is not installed"
+        raise SceneError(key, found, f"install the project with its extra: pip install 'fretwear[{extra}]'")
+    with tempfile.TemporaryDirectory(prefix="fretwear-") as folder:
+        answer = Path(folder) / "arrays.npz"
+        status, said = _run([kind, str(path.absolute()), str(answer)], size)
+        if status == REFUSED:
+            raise SceneError(key, *json.loads(said))
+        if status != 0 or not answer.is_file():
+            found = f"{path.name} is damaged: {library} cannot read it in a reasonable time and memory"
+            raise SceneError(key, found, "write it again")
+        with np.load(answer, allow_pickle=False) as arrays:
+            return dict(arrays)
+
+
+def _is_installed(library: str) -> bool:
+    try:
+        return importlib.util.find_spec(library) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def _run(arguments: list[str], size: int) -> tuple[int, str]:
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    path = [str(Path(__file__).parents[3]), *search_path()]
+    command = [sys.executable, "-I", "-c", _START, json.dumps(path), *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=4.0 * seconds_for(size),
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return -1, ""
+    return done.returncode, done.stdout.decode(errors="replace").rpartition("\n")[2]
+
+
+def seconds_for(size: int) -> int:
+    """CPU seconds that a file of so many bytes may take."""
+    return _LEAST_SECONDS + size // _BYTES_A_SECOND
