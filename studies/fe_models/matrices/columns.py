@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
-from typing import NoReturn
+from typing import IO, NoReturn
 
 import numpy as np
 import pandas as pd
 
 from studies.fe_models.matrices.matrices import LARGEST_ENTRIES, LARGEST_FILE, wrong
 from studies.fe_models.text.places import check_file, shown
+from studies.scene_error import SceneError
 
 _ROWS_AT_ONCE = 1_000_000
 _LONGEST_LINE = 1000
@@ -41,12 +42,18 @@ def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: s
     parts: list[list[np.ndarray]] = [[] for _ in kinds]
     n_rows = 0
     try:
-        for frame in _frames(path, separator, kinds, comment):
-            n_rows += len(frame)
-            if n_rows > LARGEST_ENTRIES:
-                wrong(path.name, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
-            for place, column in enumerate(frame):
-                parts[place].append(frame[column].to_numpy())
+        with warnings.catch_warnings(), path.open("rb") as file:
+            # a row that is longer than the others, and a number that is none of the type
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            warnings.simplefilter("ignore", RuntimeWarning)
+            for frame in _frames(file, separator, kinds, comment):
+                n_rows += len(frame)
+                if n_rows > LARGEST_ENTRIES:
+                    wrong(path.name, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
+                for place, column in enumerate(frame):
+                    parts[place].append(frame[column].to_numpy())
+    except SceneError:  # which is a ValueError, too
+        raise
     except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning, csv.Error):
         _find_wrong_line(path, separator, kinds, comment)
     if not n_rows:
@@ -57,26 +64,24 @@ def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: s
     return columns
 
 
-def _frames(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None) -> Iterator[pd.DataFrame]:
+def _frames(file: IO[bytes], separator: str, kinds: tuple[type, ...], comment: str | None) -> Iterable[pd.DataFrame]:
     names = [f"c{place}" for place in range(len(kinds))]
-    with warnings.catch_warnings(), path.open("rb") as file:
-        # a row that is longer than the others
-        warnings.simplefilter("error", pd.errors.ParserWarning)
-        yield from pd.read_csv(
-            file,
-            sep=r"\s+" if separator == " " else separator,
-            header=None,
-            names=names,
-            index_col=False,
-            dtype=dict(zip(names, ("int64" if kind is int else "float64" for kind in kinds), strict=True)),
-            comment=comment,
-            chunksize=_ROWS_AT_ONCE,
-            encoding="latin-1",
-            quoting=csv.QUOTE_NONE,
-            na_values=[],
-            keep_default_na=False,
-            engine="c",
-        )
+    frames: Iterable[pd.DataFrame] = pd.read_csv(
+        file,
+        sep=r"\s+" if separator == " " else separator,
+        header=None,
+        names=names,
+        index_col=False,
+        dtype=dict(zip(names, ("int64" if kind is int else "float64" for kind in kinds), strict=True)),
+        comment=comment,
+        chunksize=_ROWS_AT_ONCE,
+        encoding="latin-1",
+        quoting=csv.QUOTE_NONE,
+        na_values=[],
+        keep_default_na=False,
+        engine="c",
+    )
+    return frames
 
 
 def _find_wrong_line(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None) -> NoReturn:

@@ -69,7 +69,9 @@ def wrong(file: str, found: str, remedy: str) -> NoReturn:
 
 
 def symmetric(triplets: Triplets, n_dof: int, file: str) -> sp.csr_array:
-    """The matrix (n_dof, n_dof) of one triangle, or of both where both are there.
+    """The matrix (n_dof, n_dof) of entries that stand for both triangles, or of both where any is there twice.
+
+    A triangle in the order of the code need not be one in the order of the rows.
 
     Raises
     ------
@@ -79,17 +81,22 @@ def symmetric(triplets: Triplets, n_dof: int, file: str) -> sp.csr_array:
     rows, columns, values = triplets.rows, triplets.columns, triplets.values
     if not np.isfinite(values).all():
         wrong(file, "an entry is not a finite number", "export it again")
-    above, below = bool(np.any(columns > rows)), bool(np.any(columns < rows))
     matrix = sp.csr_array((values, (rows, columns)), shape=(n_dof, n_dof))
     if matrix.nnz < values.size:
         wrong(file, f"{values.size - matrix.nnz} entries are given twice", "export it again")
-    if above and below:
-        twin = matrix.T.tocsr()
+    twin = matrix.T.tocsr()
+    if _have_entry_in_common(sp.triu(matrix, 1, "csr"), sp.triu(twin, 1, "csr")):
         difference = abs(matrix - twin)
         if difference.nnz and difference.max() > 1e-6 * abs(values).max():
             wrong(file, "the matrix is not symmetric", "export it without damping, gyroscopic terms and friction")
         return sp.csr_array((matrix + twin) / 2)
-    return sp.csr_array(matrix + sp.triu(matrix, 1).T + sp.tril(matrix, -1).T)
+    return sp.csr_array(matrix + twin - sp.diags_array(matrix.diagonal()))
+
+
+def _have_entry_in_common(one: sp.csr_array, other: sp.csr_array) -> bool:
+    """Whether an entry, which may be 0, stands in both matrices."""
+    patterns = [sp.csr_array((np.ones(a.nnz, dtype=bool), a.indices, a.indptr), shape=a.shape) for a in (one, other)]
+    return bool(patterns[0].multiply(patterns[1]).nnz)
 
 
 def check_held(stiffness: sp.csr_array, file: str) -> None:

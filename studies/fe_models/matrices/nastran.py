@@ -209,5 +209,5 @@ class _Reader:
 
 
 def _cut(text: str, width: int) -> list[str]:
-    """Fields of a line behind its first 8 characters, without the field for the continuation."""
-    return [text[at : at + width].strip() for at in range(8, min(len(text), 72), width)]
+    """All fields of a line, empty ones at its end as well, but for the first and the last, of 8 characters."""
+    return [text[at : at + width].strip() for at in range(8, 72, width)]

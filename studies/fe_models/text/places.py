@@ -35,17 +35,19 @@ def shown(text: str) -> str:
 def check_file(path: Path, largest: int, key: str = "model") -> int:
     """Bytes of a file that is there, is a file, and is at most `largest` bytes. Raises SceneError, about `key`."""
     try:
-        if not path.is_file():
-            raise SceneError(key, f"{path.name}: there is no such file", "give a path from the study file")
-        size = path.stat().st_size
-        with path.open("rb"):
-            pass
+        there = path.is_file()
+        size = path.stat().st_size if there else 0
+        if there:
+            with path.open("rb"):
+                pass
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or "no name of a file"
         raise SceneError(key, f"{shown(path.name)}: {said}", "give a file that can be read") from None
+    if not there:
+        raise SceneError(key, f"{shown(path.name)}: there is no such file", "give a path from the study file")
     if size > largest:
-        found = f"{path.name}: {size / 2**20:.0f} MiB are more than {largest / 2**20:.0f} MiB"
+        found = f"{shown(path.name)}: {size / 2**20:.0f} MiB are more than {largest / 2**20:.0f} MiB"
         raise SceneError(key, found, "reduce the model")
     if size == 0:
-        raise SceneError(key, f"{path.name}: the file is empty", "write it again")
+        raise SceneError(key, f"{shown(path.name)}: the file is empty", "write it again")
     return size

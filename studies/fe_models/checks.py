@@ -1,0 +1,243 @@
+"""What users get wrong when they export a model: one function a mistake, from the deck and the matrices alone.
+
+Each raises SceneError with one sentence where the mistake was made, and returns what it has found otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
+from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.units import Units
+from studies.scene_error import SceneError
+
+_EXPORT_FREE = {
+    "calculix": "export with *EQUATION,REMOVE ALL",
+    "abaqus": "export without ties and boundary conditions: remove them in the step of *MATRIX GENERATE",
+    "ansys": "export without constraint equations and displacements: CEDELE and DDELE before the solution",
+    "nastran": "export without SPC and MPC on them",
+}
+_REMOVE_CONTACT = {
+    "calculix": "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
+    "abaqus": "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
+    "ansys": "remove the contact elements between them",
+    "nastran": "remove the contact between them",
+}
+_KEEP_PRESTRESS = {
+    "calculix": "write *STEP,PERTURBATION",
+    "abaqus": "write *STEP,NLGEOM for the static step",
+    "ansys": "write PSTRES,ON for the static solution",
+    "nastran": "name the static subcase with STATSUB",
+}
+
+_COUPLED = 1e-9
+"""Stiffness between two surfaces, of the largest one there is, above which they are coupled."""
+
+_SPEED_AGREES = 1e-3
+"""Relative difference of two speeds that are the same."""
+
+_ROUNDING = 1e-13
+"""Of an entry in a file: 14 digits, and what the code itself rounds."""
+
+_LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
+"""kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """omega_squared: rad2/s2. point (3,): on the axis, units of the file. axis (3,): unit vector."""
+
+    omega_squared: float
+    point: FloatArray
+    axis: FloatArray
+
+    @property
+    def speed(self) -> float:
+        """rad/s"""
+        return math.sqrt(self.omega_squared)
+
+
+def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
+    """Every node of a surface or set has all three dofs in the matrices.
+
+    Parameters
+    ----------
+    matrices
+        In units of the file.
+    nodes
+        (p,) node numbers.
+    name
+        Of the surface or set, for the message.
+    """
+    wanted = np.unique(nodes)
+    found, counts = np.unique(matrices.node, return_counts=True)
+    whole = found[counts == 3]
+    n_missing = int(np.count_nonzero(~np.isin(wanted, whole)))
+    if not n_missing:
+        return
+    where = matrices.files[-1] if matrices.code == "calculix" else matrices.files[0]
+    some = "have no dof" if not np.isin(wanted, found[counts < 3]).any() else "lack dofs"
+    raise SceneError(
+        "matrices",
+        f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)",
+        _EXPORT_FREE[matrices.code],
+    )
+
+
+def check_contact_removed(
+    deck: Deck, matrices: Matrices, nodes: tuple[IntArray, IntArray], names: tuple[str, str], units: Units
+) -> None:
+    """The stiffness does not couple the two surfaces of a contact, other than through elements that have nodes of both.
+
+    Parameters
+    ----------
+    deck, matrices
+        In units of the file.
+    nodes
+        Node numbers (p,) and (q,) of the surfaces.
+    names
+        Of the surfaces, for the message.
+    units
+        Of the file.
+    """
+    first, second = (np.flatnonzero(np.isin(matrices.node, members)) for members in nodes)
+    part = sp.coo_array(matrices.stiffness[first][:, second])
+    large = abs(part.data) > _COUPLED * abs(matrices.stiffness.diagonal()).max(initial=0.0)
+    one, other = matrices.node[first[part.row[large]]], matrices.node[second[part.col[large]]]
+    apart = ~_share_element(deck, one, other)
+    if apart.any():
+        largest = abs(part.data[large][apart]).max() * units.stiffness
+        found = f"the stiffness couples {names[0]} and {names[1]} ({largest:.1e} N/m)"
+        raise SceneError("matrices", found, _REMOVE_CONTACT[matrices.code])
+
+
+def _share_element(deck: Deck, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
+    """Whether the nodes (m,) and (m,) are the same, or nodes of one element."""
+    together = np.array(one == other, dtype=bool)
+    asked = np.union1d(one, other)
+    for block in deck.blocks:
+        elements, places = np.nonzero(np.isin(block.nodes, asked))
+        rows = np.searchsorted(asked, block.nodes[elements, places])
+        belongs = sp.csr_array((np.ones(rows.size), (rows, elements)), shape=(asked.size, block.numbers.size))
+        common = sp.coo_array(belongs @ belongs.T)
+        pairs = np.searchsorted(asked, one) * asked.size + np.searchsorted(asked, other)
+        together |= np.isin(pairs, common.row.astype(np.int64) * asked.size + common.col)
+    return together
+
+
+def translation(deck: Deck, matrices: Matrices, direction: FloatArray) -> FloatArray:
+    """A rigid translation (n_dof,) by the vector (3,), at the nodes of the mesh.
+
+    Rows of other nodes are amplitudes inside of elements (C3D8I), which take no part.
+    """
+    return np.where(np.isin(matrices.node, deck.node_numbers), direction[matrices.direction], 0.0)
+
+
+def mass_of(deck: Deck, matrices: Matrices) -> float:
+    """Mass of the model in units of the file: the mean over the three directions."""
+    motions = [translation(deck, matrices, axis) for axis in np.eye(3)]
+    return float(np.mean([motion @ (matrices.mass @ motion) for motion in motions]))
+
+
+def check_mesh_is_of_matrices(deck: Deck, matrices: Matrices) -> None:
+    """Deck and matrices have nodes in common."""
+    if not np.isin(matrices.node, deck.node_numbers).any():
+        found = f"{matrices.files[0]} and {deck.path} have no node in common"
+        raise SceneError("matrices", found, "give the mesh that the matrices were made of")
+
+
+def rotation_of_deck(deck: Deck) -> Rotation | None:
+    """The rotation that the last step with centrifugal loads has, None where no step has any.
+
+    Raises SceneError where parts of the model turn differently, or not at all.
+    """
+    with_loads = [step for step in deck.steps if step.centrifugal]
+    if not with_loads:
+        return None
+    loads = with_loads[-1].centrifugal
+    for one, other in pairwise(loads):
+        if not math.isclose(one.omega_squared, other.omega_squared, rel_tol=_SPEED_AGREES):
+            speeds = [f"{load.name} at {math.sqrt(load.omega_squared):g} rad/s" for load in (one, other)]
+            raise SceneError("model", f"{deck.path}: {' and '.join(speeds)}", "give all of the model one speed")
+        if abs(one.axis @ other.axis) < 1 - 1e-9:
+            found = f"{deck.path}: {one.name} and {other.name} turn about axes that differ"
+            raise SceneError("model", found, "give all of the model one axis")
+    elements = np.concatenate([block.numbers for block in deck.blocks] or [np.empty(0, dtype=np.int64)])
+    turning = np.unique(np.concatenate([load.elements for load in loads]))
+    if turning.size and turning.size < elements.size:
+        found = f"{deck.path}: {turning.size} of {elements.size} elements have a centrifugal load"
+        raise SceneError("model", found, "give it to all of them")
+    return Rotation(loads[0].omega_squared, loads[0].point, loads[0].axis)
+
+
+def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float | None:
+    """Square of the speed (rad2/s2) that the stiffness was made at: spin softening is all that a translation meets.
+
+    `Omega^2 = - t^T K t / t^T M t` for a rigid translation t across the axis (3,), a unit vector. None where the model
+    is held, so that a translation meets more than that.
+    """
+    across = np.linalg.svd(axis[np.newaxis])[2][1:]
+    found: list[float] = []
+    for direction in across:
+        motion = translation(deck, matrices, direction)
+        mass = float(motion @ (matrices.mass @ motion))
+        if not mass > 0:
+            return None
+        moved = np.flatnonzero(motion)
+        rounding = _ROUNDING * float(abs(matrices.stiffness[moved][:, moved]).sum()) / mass
+        value = -float(motion @ (matrices.stiffness @ motion)) / mass
+        if value < -rounding:
+            return None
+        found.append(value if value > rounding else 0.0)
+    return float(np.mean(found))
+
+
+def check_speed(deck: Deck, matrices: Matrices) -> Rotation | None:
+    """The stiffness was made at the speed of the deck; the rotation, None where there is none.
+
+    Where the model is held in its matrices the speed cannot be read back from them, and the deck's is believed.
+    """
+    rotation = rotation_of_deck(deck)
+    if rotation is None:
+        return None
+    held = omega_squared_of(deck, matrices, rotation.axis)
+    if held is None or math.isclose(held, rotation.omega_squared, rel_tol=_SPEED_AGREES):
+        return rotation
+    found = f"the deck spins at {rotation.speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
+    raise SceneError("matrices", found, _KEEP_PRESTRESS[matrices.code] if held == 0 else "give the files of one run")
+
+
+def check_units(deck: Deck, mass: float | None, units: Units) -> None:
+    """Mass and extent are those of something made of matter.
+
+    Parameters
+    ----------
+    deck
+        In units of the file.
+    mass
+        Of the model, in units of the file; None where only its density is known, from the deck.
+    units
+        What the user says that the files are in.
+    """
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks] or [deck.node_numbers]))
+    points = deck.coordinates[deck.rows_of_nodes(used)]
+    sides = np.ptp(points, axis=0)
+    extent = float(sides.max())
+    if mass is not None:
+        density = mass / math.prod(np.maximum(sides, 1e-6 * extent)) if extent > 0 else math.inf
+        found = f"mass {mass:.2g} {units.label_of_mass}, extent {extent:.3g} {units.label_of_length}"
+    else:
+        densities = [material.density for material in deck.materials.values() if material.density is not None]
+        if not densities:
+            return
+        density = max(densities)
+        found = f"density {density:.3g} {units.label_of_mass}/{units.label_of_length}3"
+    if not _LEAST_DENSITY <= density * units.density <= _LARGEST_DENSITY:
+        raise SceneError("units", f"{found}: not {units.name}", 'give `units` that fit, "SI" or "mm-t-s"')

@@ -1,0 +1,48 @@
+"""Systems of units in which finite-element models are written, and what they are in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from studies.scene_error import SceneError
+
+
+@dataclass(frozen=True)
+class Units:
+    """A system of units by its length (m), mass (kg) and time (s); what is derived from them follows.
+
+    label_of_length, label_of_mass: for messages.
+    """
+
+    name: str
+    length: float
+    mass: float
+    label_of_length: str
+    label_of_mass: str
+
+    @property
+    def stiffness(self) -> float:
+        """N/m."""
+        return self.mass  # mass / s2
+
+    @property
+    def density(self) -> float:
+        """kg/m3."""
+        return self.mass / self.length**3
+
+    @property
+    def stress(self) -> float:
+        """Pa."""
+        return self.mass / self.length
+
+
+_SYSTEMS = (Units("SI", 1.0, 1.0, "m", "kg"), Units("mm-t-s", 1e-3, 1e3, "mm", "t"))
+
+
+def find_units(name: str) -> Units:
+    """Units by their name, "SI" or "mm-t-s". Raises SceneError about "units"."""
+    for units in _SYSTEMS:
+        if units.name == name:
+            return units
+    known = " or ".join(f'"{units.name}"' for units in _SYSTEMS)
+    raise SceneError("units", f"{name!r}", f"give {known}")

@@ -1,0 +1,223 @@
+"""What users get wrong when they export a model is found in the files, and said in one sentence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from studies.fe_models.checks import (
+    check_contact_removed,
+    check_mesh_is_of_matrices,
+    check_nodes_have_dofs,
+    check_speed,
+    check_units,
+    mass_of,
+    omega_squared_of,
+    rotation_of_deck,
+)
+from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.matrices.read import read_matrices
+from studies.fe_models.units import find_units
+from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import CUBES, SECTOR, write
+from tests.studies.fe_models.matrix_files import needs_ccx, run_ccx
+
+SI, MM = find_units("SI"), find_units("mm-t-s")
+AXIS = np.array([0.0, 0.0, 1.0])
+
+
+def changed(old: str, new: str, text: str | None = None) -> str:
+    text = SECTOR.read_text() if text is None else text
+    assert old in text
+    return text.replace(old, new)
+
+
+def exported(folder: Path, text: str) -> tuple[Deck, Matrices]:
+    job = run_ccx(folder, text)
+    return read_deck(folder / "sector.inp"), read_matrices(job)
+
+
+@pytest.fixture(scope="module")
+def sector(tmp_path_factory):
+    return exported(tmp_path_factory.mktemp("sector"), SECTOR.read_text())
+
+
+@needs_ccx
+def test_whole_export(sector):
+    deck, matrices = sector
+    blades, disks = deck.node_sets["BLADEC"], deck.node_sets["DISKC"]
+    check_mesh_is_of_matrices(deck, matrices)
+    check_nodes_have_dofs(matrices, blades, "BLADES")
+    check_contact_removed(deck, matrices, (blades, disks), ("BLADES", "DISKS"), SI)
+    check_units(deck, mass_of(deck, matrices), SI)
+    rotation = check_speed(deck, matrices)
+    assert rotation is not None
+    assert (rotation.omega_squared, rotation.speed, rotation.axis.tolist()) == (250000.0, 500.0, [0, 0, 1])
+    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
+    # along the axis there is no spin softening
+    assert omega_squared_of(deck, matrices, np.array([1.0, 0.0, 0.0])) == pytest.approx(125000, rel=1e-6)
+
+
+@needs_ccx
+def test_dofs_eliminated(tmp_path):
+    deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL\n", ""))
+    with pytest.raises(SceneError) as wrong:
+        check_nodes_have_dofs(matrices, deck.node_sets["BLADEC"], "BLADES")
+    assert str(wrong.value) == (
+        "matrices: BLADES: 9 of 9 nodes have no dof in sector.dof (tied or fixed); export with *EQUATION,REMOVE ALL."
+    )
+    check_nodes_have_dofs(matrices, deck.node_sets["DISKC"], "DISKS")
+    # ties are no hindrance for a rigid translation
+    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
+
+
+@needs_ccx
+def test_held_model_does_not_tell_its_speed(tmp_path):
+    deck, matrices = exported(tmp_path, changed("*BOUNDARY,OP=NEW\n", ""))
+    assert omega_squared_of(deck, matrices, AXIS) is None
+    assert check_speed(deck, matrices) == rotation_of_deck(deck)
+    with pytest.raises(SceneError, match=r"BORE: 18 of 21 nodes have no dof in sector.dof"):
+        check_nodes_have_dofs(matrices, deck.node_sets["BORE"], "BORE")
+
+
+@needs_ccx
+def test_no_perturbation(tmp_path):
+    deck, matrices = exported(tmp_path, changed("*STEP,PERTURBATION", "*STEP"))
+    with pytest.raises(SceneError) as wrong:
+        check_speed(deck, matrices)
+    assert str(wrong.value) == (
+        "matrices: the deck spins at 500 rad/s, the stiffness holds 0; write *STEP,PERTURBATION."
+    )
+
+
+@needs_ccx
+def test_another_speed(tmp_path, sector):
+    deck = read_deck(write(tmp_path, changed("250000.0", "160000.0")))
+    with pytest.raises(SceneError, match=r"spins at 400 rad/s, the stiffness holds 500; give the files of one run"):
+        check_speed(deck, sector[1])
+
+
+CONTACT = """\
+*SURFACE INTERACTION,NAME=ROOT
+*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED
+1e13
+*FRICTION
+0.4,1e13
+*CONTACT PAIR,INTERACTION=ROOT,TYPE=SURFACE TO SURFACE
+"""
+
+
+@needs_ccx
+def test_contact_still_in_the_stiffness(tmp_path):
+    text = changed("*TIE,NAME=GLUE,POSITION TOLERANCE=1e-4\n", CONTACT)
+    deck, matrices = exported(tmp_path, text)
+    (pair,) = deck.contact_pairs
+    assert (pair.dependent, pair.independent, pair.friction_coefficient) == ("BLADES", "DISKS", 0.4)
+    nodes = deck.node_sets["BLADEC"], deck.node_sets["DISKC"]
+    with pytest.raises(SceneError) as wrong:
+        check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
+    assert str(wrong.value) == (
+        "matrices: the stiffness couples BLADES and DISKS (1.6e+09 N/m);"
+        " add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair."
+    )
+    with pytest.raises(SceneError, match=r"\(1.6e\+12 N/m\)"):
+        check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), MM)
+    removed = "*MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE\nBLADES,DISKS\n*EQUATION,REMOVE ALL"
+    deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL", removed, text))
+    assert deck.steps[-1].contact_removed == (("BLADES", "DISKS"),)
+    check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
+
+
+@needs_ccx
+def test_inner_nodes_of_elements(tmp_path, sector):
+    """C3D8I has amplitudes inside, with numbers above those of the mesh: no part of a translation."""
+    deck, matrices = exported(tmp_path, changed("TYPE=C3D8,", "TYPE=C3D8I,"))
+    assert matrices.node.max() > deck.node_numbers.max()
+    assert mass_of(deck, matrices) == pytest.approx(mass_of(*sector), rel=1e-9)
+    assert matrices.mass.sum() / 3 > 2 * mass_of(*sector)
+    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
+
+
+def springs(deck: Deck, pairs: list[tuple[int, int, float]]) -> Matrices:
+    """Springs along x, y and z between nodes of a mesh whose nodes weigh 1."""
+    n = deck.node_numbers.size
+    stiffness = sp.lil_array((n, n))
+    for one, other, value in pairs:
+        row, column = deck.rows_of_nodes(np.array([one, other]))
+        stiffness[row, row] += value
+        stiffness[column, column] += value
+        stiffness[row, column] -= value
+        stiffness[column, row] -= value
+    whole = sp.csr_array(sp.kron(stiffness.tocsr(), sp.eye_array(3)))
+    rows = np.repeat(deck.node_numbers, 3), np.tile([0, 1, 2], n)
+    return Matrices(whole, sp.csr_array(sp.eye_array(3 * n)), *rows, ("job_STIF1.mtx", "job_MASS1.mtx"), "abaqus")
+
+
+def test_coupling_through_an_element_is_none_of_contact(tmp_path):
+    deck = read_deck(write(tmp_path, CUBES))
+    # 1 and 7 belong to the lower cube, 11 and 17 to the upper one
+    matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9), (2, 12, 1e-3)])
+    lower, upper = np.array([1, 2, 7]), np.array([11, 12, 17])
+    check_contact_removed(deck, matrices, (np.array([1, 2]), np.array([7])), ("A", "B"), SI)
+    check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
+    # the same nodes in both surfaces
+    check_contact_removed(deck, matrices, (lower, lower), ("A", "B"), SI)
+    matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9), (7, 11, 5e8)])
+    with pytest.raises(SceneError, match=r"couples A and B \(5.0e\+08 N/m\)"):
+        check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
+
+
+def test_speed_of_other_codes_and_none(tmp_path):
+    deck = read_deck(write(tmp_path, CUBES))
+    matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9)])
+    with pytest.raises(SceneError, match=r"spins at 100 rad/s, the stiffness holds 0; write \*STEP,NLGEOM"):
+        check_speed(deck, matrices)
+    turning = replace(matrices, stiffness=sp.csr_array(matrices.stiffness - 1e4 * matrices.mass))
+    assert omega_squared_of(deck, turning, AXIS) == pytest.approx(1e4, rel=1e-6)
+    assert check_speed(deck, turning) is not None
+    assert check_speed(replace(deck, steps=()), matrices) is None
+
+
+def test_deck_of_two_speeds(tmp_path):
+    text = CUBES.replace("ALL, CENTRIF, 1e4", "LOWER, CENTRIF, 4e4, 0., 0., 0., 0., 0., 1.\nUPPER, CENTRIF, 1e4")
+    with pytest.raises(SceneError, match="LOWER at 200 rad/s and UPPER at 100 rad/s; give all of the model one speed"):
+        rotation_of_deck(read_deck(write(tmp_path, text)))
+    with pytest.raises(SceneError, match="1 of 2 elements have a centrifugal load; give it to all of them"):
+        rotation_of_deck(read_deck(write(tmp_path, CUBES.replace("ALL, CENTRIF", "UPPER, CENTRIF"))))
+
+
+def test_units(tmp_path):
+    deck = read_deck(SECTOR)
+    check_units(deck, 3.8, SI)
+    check_units(deck, None, SI)
+    with pytest.raises(SceneError, match=r"units: mass 3.8 t, extent 0.203 mm: not mm-t-s; give `units`"):
+        check_units(deck, 3.8, MM)
+    with pytest.raises(SceneError, match=r"units: density 7.8e\+03 t/mm3: not mm-t-s; give `units`"):
+        check_units(deck, None, MM)
+    in_mm = replace(deck, coordinates=1000 * deck.coordinates)
+    check_units(in_mm, 3.8e-3, MM)
+    with pytest.raises(SceneError, match=r"units: mass 0.0038 kg, extent 203 m: not SI; give `units`"):
+        check_units(in_mm, 3.8e-3, SI)
+    with pytest.raises(SceneError, match='units: \'inch\'; give "SI" or "mm-t-s"'):
+        find_units("inch")
+
+
+def test_matrices_of_another_mesh(tmp_path):
+    deck = read_deck(write(tmp_path, CUBES))
+    matrices = springs(deck, [(1, 2, 1.0)])
+    other = replace(matrices, node=matrices.node + 1000)
+    with pytest.raises(SceneError, match=r"job_STIF1.mtx and deck.inp have no node in common"):
+        check_mesh_is_of_matrices(deck, other)
+    with pytest.raises(SceneError, match=r"A: 2 of 2 nodes have no dof in job_STIF1.mtx"):
+        check_nodes_have_dofs(other, np.array([1, 2]), "A")
+    part = matrices.node != 1
+    part[1] = True
+    kept = replace(matrices, node=matrices.node[part], direction=matrices.direction[part])
+    with pytest.raises(SceneError, match=r"A: 1 of 2 nodes lack dofs in job_STIF1.mtx"):
+        check_nodes_have_dofs(kept, np.array([1, 2]), "A")

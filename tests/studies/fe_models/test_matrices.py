@@ -1,0 +1,171 @@
+"""Matrices come out of the files of the codes as they went in."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.matrices.read import find_matrix_files, read_matrices
+from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import SECTOR
+from tests.studies.fe_models.matrix_files import (
+    chain,
+    entries,
+    needs_ccx,
+    run_ccx,
+    write_abaqus,
+    write_calculix,
+    write_nastran,
+)
+
+
+def check(read: Matrices, nodes: tuple[int, ...], rtol: float) -> None:
+    """The matrices of `chain`, whose rows the reader sorts by node."""
+    stiffness, mass, node, direction = chain(nodes)
+    order = np.lexsort((direction, node))
+    assert read.node.tolist() == node[order].tolist()
+    assert (read.direction + 1).tolist() == direction[order].tolist()
+    for found, expected in ((read.stiffness, stiffness), (read.mass, mass)):
+        np.testing.assert_allclose(found.toarray(), expected[np.ix_(order, order)], rtol=rtol)
+
+
+def test_calculix(tmp_path):
+    # 1.1 and 10.1: read as numbers, node 10 would be node 1, and 1.10 a direction
+    read = read_matrices(write_calculix(tmp_path, nodes=(1, 10, 100)))
+    check(read, (1, 10, 100), 1e-13)
+    assert (read.code, read.files) == ("calculix", ("job.sti", "job.mas", "job.dof"))
+
+
+@pytest.mark.parametrize("triangles", ["lower", "upper", "both"])
+def test_abaqus(tmp_path, triangles: str):
+    read = read_matrices(write_abaqus(tmp_path, triangles=triangles))
+    check(read, (1, 2, -7), 1e-14)
+    assert read.files == ("job_STIF1.mtx", "job_MASS1.mtx")
+
+
+@pytest.mark.parametrize(("large", "rtol"), [(True, 1e-9), (False, 6e-4)])
+def test_nastran(tmp_path, large: bool, rtol: float):
+    check(read_matrices(write_nastran(tmp_path, large=large)), (1, 2, 10), rtol)
+
+
+def test_names_of_files(tmp_path):
+    job = write_calculix(tmp_path)
+    assert [path.suffix for path in find_matrix_files(job)] == [".sti", ".mas", ".dof"]
+    assert find_matrix_files(tmp_path / "job.mas") == find_matrix_files(job)
+    write_abaqus(tmp_path)
+    with pytest.raises(SceneError, match=r"there are job.sti and job_STIF1.mtx; give the name of one"):
+        read_matrices(job)
+    assert read_matrices(tmp_path / "job_MASS1.mtx").code == "abaqus"
+    with pytest.raises(SceneError, match=r"there is no other.sti, other_STIF1.mtx"):
+        read_matrices(tmp_path / "other")
+
+
+def edit(path: Path, old: str, new: str, count: int = 1) -> None:
+    text = path.read_text()
+    changed = re.sub(old, new, text, count=count, flags=re.MULTILINE)
+    assert changed != text
+    path.write_text(changed)
+
+
+@pytest.mark.parametrize(
+    ("end", "old", "new", "sentence"),
+    [
+        ("sti", r"^2 2 .*", "2 2 nan", r"job.sti: line 3 is '2 2 nan'"),
+        ("sti", r"^2 2 .*", "2 2 1e999", "job.sti: line 3 is"),
+        ("sti", r"^2 2 .*", "2 2", "job.sti: line 3 is '2 2'"),
+        ("sti", r"^2 2 .*", "2 2 1.0 5", "job.sti: line 3 is '2 2 1.0 5'"),
+        ("sti", r"^2 2 ", "2.5 2 ", "job.sti: line 3 is"),
+        ("sti", r"^2 2 ", "0 2 ", "job.sti: a row or column below 1"),
+        ("sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1", "job.sti: 1 entries are given twice"),
+        ("sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0", "job.sti: the matrix is not symmetric"),
+        ("sti", r"^9 9 ", "1000000000 9 ", "job.sti: 1000000000 rows for 9 dofs in job.dof"),
+        ("mas", r"^9 9 .*", "", "job.mas: 8 rows for 9 dofs in job.dof"),
+        ("dof", r"10.3\n", "", "job.sti: 9 rows for 8 dofs in job.dof"),
+        ("dof", r"10.3", "10.4", r"job.dof: line 9 is 10.4"),
+        ("dof", r"10.3", "10.2", r"job.sti: dof 2 of node 10 has two rows"),
+        ("dof", r"10.3", "10", r"job.dof: line 9 is '10'"),
+    ],
+)
+def test_wrong_files_of_calculix(tmp_path, end: str, old: str, new: str, sentence: str):
+    job = write_calculix(tmp_path)
+    edit(job.with_suffix(f".{end}"), old, new)
+    with pytest.raises(SceneError, match=sentence):
+        read_matrices(job)
+
+
+def test_twice_the_size(tmp_path):
+    job = write_calculix(tmp_path)
+    with job.with_suffix(".sti").open("a") as file:
+        file.write("18 18 1.0\n")
+    with pytest.raises(SceneError, match=r"18 rows for 9 dofs .* export without \*SELECT CYCLIC SYMMETRY MODES"):
+        read_matrices(job)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (r"^1,1, 1,1, .*", "1,1, 1,1, 1e36", "1 entries of the diagonal are 1e36: boundary conditions were active"),
+        (r"^1,1, 1,1,", "1,4, 1,4,", "node 1 has the dof 4"),
+        (r"^1,1, 1,1,", "0,1, 0,1,", "a node with the number 0"),
+        (r"^1,1, 1,1,", "1,1, 1,", "job_STIF1.mtx: line 2 is"),
+        (r"^1,1, 1,1,", "9999999999999,1, 1,1,", "job_STIF1.mtx: node 9999999999999"),
+    ],
+)
+def test_wrong_files_of_abaqus(tmp_path, old: str, new: str, sentence: str):
+    job = write_abaqus(tmp_path)
+    edit(tmp_path / "job_STIF1.mtx", old, new)
+    with pytest.raises(SceneError, match=sentence):
+        read_matrices(job)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("KAAX           0       6       2", "KAAX           0       6       4", "line 3 says that KAAX is complex"),
+        ("KAAX           0       6       2", "KAAX           0       2       2", "KAAX is of form 2"),
+        ("KAAX           0", "LAAX           0", "line 4 is a column of KAAX, whose header is missing"),
+        (r"\*(\s+)1(\s+)1 ", r"*\g<1>1\g<2>4 ", "node 1 has the dof 4"),
+        (r"\*(\s+)1(\s+)1 ", r"*\g<1>1\g<2>0 ", "node 1 has the dof 0"),
+        ("D[+]10", "D+10         1.0D+10", "has an imaginary part"),
+        ("D[+]10", "X+10", "in place of a number"),
+        ("MAAX", "BAAX", "no matrix MAAX but KAAX, PAX, BAAX"),
+    ],
+)
+def test_wrong_files_of_nastran(tmp_path, old: str, new: str, sentence: str):
+    job = write_nastran(tmp_path)
+    edit(job.with_suffix(".pch"), old, new, 0 if "AAX" in old and "AX " not in old else 1)
+    with pytest.raises(SceneError, match=sentence):
+        read_matrices(job)
+
+
+@needs_ccx
+def test_sector_of_calculix(tmp_path):
+    read = read_matrices(run_ccx(tmp_path, SECTOR.read_text()))
+    deck = read_deck(SECTOR)
+    # all dofs are there: of 129 nodes, those that are tied, fixed and cyclic included
+    assert read.stiffness.shape == read.mass.shape == (3 * 129, 3 * 129)
+    np.testing.assert_array_equal(read.node, np.repeat(deck.node_numbers, 3))
+    np.testing.assert_array_equal(read.direction, np.tile([0, 1, 2], 129))
+    for matrix in (read.stiffness, read.mass):
+        assert abs(matrix - matrix.T).max() == 0
+    # density times the volume of the hexahedra, by their diagonals (van Oosterom's formula needs no code of ours)
+    corners = deck.coordinates[deck.rows_of_nodes(np.concatenate([block.nodes for block in deck.blocks]))]
+    tetrahedra = corners[:, [[0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [1, 4, 5, 6], [3, 4, 6, 7]]]
+    edges = tetrahedra[:, :, 1:] - tetrahedra[:, :, :1]
+    volume = abs(np.linalg.det(edges)).sum() / 6
+    assert read.mass.sum() / 3 == pytest.approx(7800 * volume, rel=1e-9)
+    assert np.linalg.eigvalsh(read.mass.toarray()).min() > 0
+
+
+def test_many_entries_are_read_in_parts(tmp_path, monkeypatch):
+    job = write_calculix(tmp_path)
+    monkeypatch.setattr("studies.fe_models.matrices.columns._ROWS_AT_ONCE", 7)
+    monkeypatch.setattr("studies.fe_models.matrices.nastran._AT_ONCE", 7)
+    assert len(entries(chain()[0])) > 14
+    check(read_matrices(job), (1, 2, 10), 1e-13)
+    check(read_matrices(write_nastran(tmp_path, "other")), (1, 2, 10), 1e-9)
