@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import NoReturn
 
@@ -20,14 +21,18 @@ from studies.fe_models.text.places import check_file, shown
 
 _LONGEST_LINE = 1000
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d{1,4})|[eEdD](\d{1,4}))?")
-_AT_ONCE = 200_000
+_AT_ONCE = 100_000
 
 
 @dataclass
 class _Dmig:
-    """A matrix while it is read. column: node and component. fields: of its entries. labels, values: done."""
+    """A matrix while it is read.
 
-    form: int
+    name: in capitals. column: node and component of the present one. labels (m, 4), values (m,): entries that are done.
+    rows, numbers: those that are not packed yet.
+    """
+
+    name: str
     column: tuple[int, int] = (0, 0)
     labels: list[np.ndarray] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
@@ -96,11 +101,16 @@ class _Reader:
     def matrices(self) -> dict[str, _Dmig]:
         """All real symmetric matrices by name."""
         with self.path.open(encoding="latin-1") as file:
-            while text := file.readline(_LONGEST_LINE + 1):
-                self.number += 1
-                if len(text) > _LONGEST_LINE or "\0" in text:
-                    self._wrong("is no text, or very long")
-                self._line(text.rstrip())
+            # a readline with a limit, as a line of a damaged file may be as long as the file
+            while lines := list(islice(iter(lambda: file.readline(_LONGEST_LINE + 1), ""), _AT_ONCE)):
+                if self._plain_lines(lines):
+                    self.number += len(lines)
+                    continue
+                for text in lines:
+                    self.number += 1
+                    if len(text) > _LONGEST_LINE or "\0" in text:
+                        self._wrong("is no text, or very long")
+                    self._line(text.rstrip())
         self._entries()
         for item in self.found.values():
             item.pack()
@@ -126,6 +136,49 @@ class _Reader:
                 self._wrong("is a DMIG with commas")
             self._entries()
             self.current = None
+
+    def _plain_lines(self, lines: list[str]) -> bool:
+        """Takes lines that are all columns and entries of one matrix in large fields; False where one of them is not.
+
+        The same as `_line` for each of them, in arrays: a large file has nearly no others.
+        """
+        item = self.current
+        if item is None or self.fields:
+            return False
+        try:
+            table = np.array(lines, dtype="S73").view("S1").reshape(len(lines), 73)
+            heads, entries = (table[:, :5] == np.frombuffer(b"DMIG*", dtype="S1")).all(axis=1), table[:, 0] == b"*"
+            blank = np.isin(table, (b" ", b"", b"\n", b"\r"))
+            if (
+                not (heads | entries).all()
+                or not (blank[entries, 1:8].all() and blank[:, 56:].all())
+                or np.any(table == b"_")
+                or np.any(_field(table[heads], 8) != item.name.ljust(16).encode())
+            ):
+                return False
+            table[:, 40:56][table[:, 40:56] == b"D"] = b"E"
+            nodes, components = (_field(table[entries], at).astype(np.int64) for at in (8, 24))
+            values = _field(table[entries], 40).astype(np.float64)
+            columns = np.stack([_field(table[heads], at).astype(np.int64) for at in (24, 40)], axis=1)
+        except (ValueError, OverflowError, UnicodeEncodeError):
+            return False
+        columns = np.concatenate((np.array([item.column], dtype=np.int64), columns))
+        for found in (nodes, columns[1:, 0]):
+            if np.any((found < 1) | (found >= 2**31)):
+                return False
+        if np.any((components < 0) | (components > 9)):
+            return False
+        item.pack()
+        item.labels.append(np.column_stack((columns[np.cumsum(heads)[entries]], nodes, components)))
+        item.values.append(values)
+        item.column = int(columns[-1, 0]), int(columns[-1, 1])
+        self._count(item, values.size)
+        return True
+
+    def _count(self, item: _Dmig, n: int) -> None:
+        item.n_entries += n
+        if item.n_entries > LARGEST_ENTRIES:
+            wrong(self.file, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
 
     def _plain_entry(self, text: str) -> bool:
         """Takes a line of one entry in large fields, by far the most frequent one; False where it is not that."""
@@ -155,7 +208,7 @@ class _Reader:
                 self._wrong(f"says that {shown(name)} is of form {form}, neither 6 (symmetric) nor 1 (square)")
             if len(self.found) >= 1000:
                 self._wrong("is one matrix too many")
-            self.found[name] = _Dmig(form)
+            self.found[name] = _Dmig(name)
             self.current = None
             return
         if name not in self.found:
@@ -187,9 +240,7 @@ class _Reader:
             self._wrong(f"has the node {node}, component {component}")
         item.rows.append((*item.column, node, component))
         item.numbers.append(value)
-        item.n_entries += 1
-        if item.n_entries > LARGEST_ENTRIES:
-            wrong(self.file, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
+        self._count(item, 1)
         if len(item.rows) >= _AT_ONCE:
             item.pack()
 
@@ -206,6 +257,11 @@ class _Reader:
 
     def _wrong(self, found: str) -> NoReturn:
         wrong(self.file, f"line {self.number} {found}", "punch the matrices again, real and symmetric")
+
+
+def _field(table: np.ndarray, at: int) -> np.ndarray:
+    """Texts (m,) of 16 characters out of a table (m, n) of characters."""
+    return np.ascontiguousarray(table[:, at : at + 16]).view("S16").reshape(len(table))
 
 
 def _cut(text: str, width: int) -> list[str]:

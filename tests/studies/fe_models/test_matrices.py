@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies.fe_models.deck.read import read_deck
+from studies.fe_models.matrices import nastran
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.scene_error import SceneError
@@ -160,6 +161,28 @@ def test_sector_of_calculix(tmp_path):
     volume = abs(np.linalg.det(edges)).sum() / 6
     assert read.mass.sum() / 3 == pytest.approx(7800 * volume, rel=1e-9)
     assert np.linalg.eigvalsh(read.mass.toarray()).min() > 0
+
+
+def test_large_fields_are_read_in_arrays(tmp_path, monkeypatch):
+    """Arrays take what `_line` takes line by line, and leave to it what it refuses."""
+    taken: list[bool] = []
+    plain_lines = nastran._Reader._plain_lines
+
+    def watched(reader: nastran._Reader, lines: list[str]) -> bool:
+        taken.append(plain_lines(reader, lines))
+        return taken[-1]
+
+    monkeypatch.setattr(nastran, "_AT_ONCE", 5)
+    monkeypatch.setattr(nastran._Reader, "_plain_lines", watched)
+    job = write_nastran(tmp_path)
+    check(read_matrices(job), (1, 2, 10), 1e-9)
+    assert 10 < taken.count(True) < len(taken)
+    text = job.with_suffix(".pch").read_text()
+    for old, new in (("D-", "X-"), ("DMIG*   MAAX   ", "DMIG*   KAAX   ")):
+        last = text.rindex(old)
+        job.with_suffix(".pch").write_text(text[:last] + new + text[last + len(old) :])
+        with pytest.raises(SceneError, match=r"job.pch: (line \d+ |\d entries are given twice)"):
+            read_matrices(job)
 
 
 def test_many_entries_are_read_in_parts(tmp_path, monkeypatch):

@@ -1,0 +1,180 @@
+"""Files that other libraries read; skipped where the library is not installed."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.fe_models.libraries import process
+from studies.fe_models.libraries.meshes import read_library_mesh
+from studies.fe_models.matrices.read import read_matrices
+from studies.scene_error import SceneError
+from tests.studies.fe_models.meshes import BRICKS, GMSH_22, GMSH_41, PYRAMID, write_cdb
+from tests.studies.fe_models.mutations import mutate
+
+needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
+needs_ansys = pytest.mark.skipif(
+    importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None,
+    reason="ansys-mapdl-reader is not installed",
+)
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "mesh.msh"
+    path.write_text(text)
+    return path
+
+
+@needs_meshio
+def test_gmsh_22(tmp_path):
+    deck = read_library_mesh(write(tmp_path, GMSH_22))
+    assert deck.node_numbers.tolist() == list(range(1, 10))  # those behind belong to no solid element
+    assert deck.coordinates[6].tolist() == [1, 1, 1]
+    blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
+    assert blocks == {
+        "C3D8I": ([1], [[1, 2, 3, 4, 5, 6, 7, 8]]),
+        "C3D4": ([2, 3], [[5, 6, 7, 9], [5, 7, 8, 9]]),
+    }
+    assert {name: nodes.tolist() for name, nodes in deck.node_sets.items()} == {
+        "UNDER": [1, 2, 3, 4],
+        "TOP": [5, 6, 7, 8],
+        "BLOCK": list(range(1, 10)),
+    }
+    assert {name: numbers.tolist() for name, numbers in deck.element_sets.items()} == {"BLOCK": [1, 2, 3]}
+
+
+@needs_meshio
+def test_gmsh_41(tmp_path):
+    deck = read_library_mesh(write(tmp_path, GMSH_41))
+    assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
+    assert deck.node_sets["UNDER"].tolist() == [1, 2, 3]
+    assert deck.element_sets["BLOCK"].tolist() == [1, 2]
+
+
+@needs_meshio
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("4 4 2 2 1 5 6 7 9\n5 4 2 2 1 5 7 8 9", "4 7 2 2 1 5 6 7 8 9\n5 4 2 2 1 5 7 8 9", "elements of type pyramid"),
+        ("3 5 2 2 1 1 2 3 4 5 6 7 8", "3 5 2 2 1 1 2 3 4 5 6 7 99", "mesh.msh is damaged"),
+        ("$Nodes\n13", "$Nodes\n999999999999999", "mesh.msh is damaged"),
+        ("$Nodes\n13", "$Nodes\n1000000000", "mesh.msh is damaged"),
+        ("6 1 0 1\n", "6 nan 0 1\n", "coordinate is not a finite number|is damaged"),
+    ],
+)
+def test_damaged_gmsh(tmp_path, old: str, new: str, sentence: str):
+    assert old in GMSH_22
+    with pytest.raises(SceneError, match=sentence):
+        read_library_mesh(write(tmp_path, GMSH_22.replace(old, new)))
+
+
+@needs_meshio
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_mutated_gmsh(tmp_path, seed: int):
+    path = tmp_path / "mesh.msh"
+    path.write_bytes(mutate((GMSH_22, GMSH_41)[seed % 2].encode(), seed))
+    try:
+        deck = read_library_mesh(path)
+    except SceneError as error:
+        said = str(error)
+    else:
+        said = deck.path
+    assert said.isprintable()
+
+
+@needs_ansys
+def test_cdb(tmp_path):
+    """Written by the test: a brick, and bricks collapsed to a wedge and a tetrahedron."""
+    deck = read_library_mesh(write_cdb(tmp_path))
+    blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
+    assert blocks == {
+        "C3D8I": ([1], [list(BRICKS[1])]),
+        "C3D6": ([2], [[5, 6, 7, 9, 10, 11]]),
+        "C3D4": ([3], [[9, 10, 11, 12]]),
+    }
+    assert deck.node_sets["UNDER"].tolist() == [1, 2, 3, 4]
+    assert deck.element_sets["FIRST"].tolist() == [1]
+    assert deck.coordinates[11].tolist() == [0.5, 0.5, 3]
+
+
+@needs_ansys
+@pytest.mark.slow
+def test_wrong_cdb(tmp_path):
+    with pytest.raises(SceneError, match="element 7 has an unusual shape; mesh with whole hexahedra"):
+        read_library_mesh(write_cdb(tmp_path, {7: PYRAMID}))
+    with pytest.raises(SceneError, match="nodes with coordinate systems of their own"):
+        read_library_mesh(write_cdb(tmp_path, turned=30.0))
+    path = write_cdb(tmp_path)
+    path.write_bytes(path.read_bytes()[:900])
+    with pytest.raises(SceneError, match=r"mesh.cdb"):
+        read_library_mesh(path)
+
+
+def example(name: str) -> Path:
+    """A file that ansys-mapdl-reader ships."""
+    from ansys.mapdl.reader import examples
+
+    return Path(getattr(examples, name))
+
+
+@needs_ansys
+@pytest.mark.slow
+def test_full_of_the_package():
+    """HexBeam.cdb and file.full are one model: 40 SOLID186, 1 x 1 x 5, 21 nodes held at one end."""
+    mesh = read_library_mesh(example("hexarchivefile"))
+    read = read_matrices(example("fullfile"))
+    assert [(block.kind, block.numbers.size) for block in mesh.blocks] == [("C3D20R", 40)]
+    assert np.ptp(mesh.coordinates, axis=0).tolist() == [1, 1, 5]
+    held = np.setdiff1d(mesh.node_numbers, read.node)
+    assert held.size == 21
+    np.testing.assert_array_equal(mesh.coordinates[mesh.rows_of_nodes(held), 2], 0.0)
+    assert read.stiffness.shape == (3 * (321 - 21),) * 2
+    assert abs(read.stiffness - read.stiffness.T).max() == 0
+    # the package's own example: first natural frequencies of the beam by load_km and eigsh, Hz
+    from scipy.sparse.linalg import eigsh
+
+    squares = eigsh(read.stiffness.tocsc(), 4, read.mass.tocsc(), sigma=1.0, return_eigenvectors=False)
+    frequencies = np.sort(np.sqrt(squares) / (2 * np.pi))
+    # two bending modes of a square beam have one frequency
+    assert frequencies[1] == pytest.approx(frequencies[0], rel=1e-4)
+
+
+@needs_ansys
+@pytest.mark.slow
+def test_damaged_full(tmp_path):
+    good = example("fullfile").read_bytes()
+    path = tmp_path / "file.full"
+    for damaged in (good[:3000], good[:500_000], b"\xff" * 5000):
+        path.write_bytes(damaged)
+        with pytest.raises(SceneError, match=r"matrices: file.full is "):
+            read_matrices(path)
+    shutil.copy(example("rstfile"), path)
+    with pytest.raises(SceneError, match=r"file.full is no .full file|file.full is damaged"):
+        read_matrices(path)
+
+
+def test_missing_library(tmp_path, monkeypatch):
+    monkeypatch.setattr(process, "_READERS", {"gmsh": ("no_such_library", "meshio"), "full": ("none.at.all", "ansys")})
+    with pytest.raises(SceneError) as wrong:
+        read_library_mesh(write(tmp_path, GMSH_22))
+    assert str(wrong.value) == (
+        "model: mesh.msh needs the library no_such_library, which is not installed;"
+        " install the project with its extra: pip install 'fretwear[meshio]'."
+    )
+    (tmp_path / "job.full").write_bytes(b"1")
+    with pytest.raises(SceneError, match=r"fretwear\[ansys\]"):
+        read_matrices(tmp_path / "job")
+
+
+def test_process_that_ends_badly(tmp_path, monkeypatch):
+    path = write(tmp_path, GMSH_22)
+    monkeypatch.setattr(process, "_is_installed", lambda _: True)
+    for end in ("import os; os.abort()", "import sys; sys.exit(0)", "raise SystemExit", "x = bytearray(2 ** 60)"):
+        monkeypatch.setattr(process, "_START", end)
+        with pytest.raises(SceneError, match=r"mesh.msh is damaged: meshio cannot read it"):
+            read_library_mesh(path)
