@@ -66,8 +66,8 @@ class Tie:
     """Two surfaces that are glued, or the cut faces of a sector.
 
     dependent, independent: names of surfaces (the slave comes first, as in the deck). tolerance: largest distance of a
-    node that is tied, in units of length of the file; None where the deck does not say. cyclic: whether these are the
-    cut faces of a sector.
+    node that is tied, in units of length of the file; None where the deck does not say, or says 0. cyclic: whether
+    these are the cut faces of a sector.
     """
 
     name: str

@@ -20,7 +20,8 @@ def read_tie(draft: Draft, block: Block) -> None:
         return
     tolerance = None
     if "POSITIONTOLERANCE" in block.parameters:
-        tolerance = read_float(block.parameters["POSITIONTOLERANCE"], block.place)
+        given = read_float(block.parameters["POSITIONTOLERANCE"], block.place)
+        tolerance = given if given > 0 else None
     cyclic = "CYCLICSYMMETRY" in block.parameters
     draft.ties.extend(read_pairs(draft, block, read_name(block.parameters.get("NAME", "")), tolerance, cyclic))
 

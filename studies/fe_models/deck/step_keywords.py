@@ -74,6 +74,9 @@ def read_boundary(draft: Draft, block: Block) -> None:
         if word in _HELD:
             boundaries.extend(DraftBoundary(nodes, first, last, 0.0) for first, last in _HELD[word])
             continue
+        if word == "0":  # a temperature or a mass flow
+            draft.skip(block, " of dof 0")
+            continue
         first = read_integer(word, place, "the first dof")
         last = read_integer(fields[2], place, "the last dof") if len(fields) > 2 and fields[2] else first
         value_ = read_float(fields[3], place) if len(fields) > 3 else 0.0

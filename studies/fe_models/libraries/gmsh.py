@@ -28,6 +28,9 @@ def read_arrays(path: Path) -> Arrays:
     import meshio
     from meshio._mesh import topological_dimension
 
+    # meshio 5.3.5 knows the order of their nodes, but cannot hold them for want of their dimension
+    for missing in ("wedge15", "pyramid13"):
+        topological_dimension.setdefault(missing, _SOLID)
     mesh = meshio.read(path, file_format="gmsh")
     points = np.asarray(mesh.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import warnings
-from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, NoReturn
 
 import numpy as np
 import pandas as pd
+from pandas.io.parsers import TextFileReader
 
 from studies.fe_models.matrices.matrices import LARGEST_ENTRIES, LARGEST_FILE, wrong
 from studies.fe_models.text.places import check_file, shown
@@ -17,6 +17,7 @@ from studies.scene_error import SceneError
 
 _ROWS_AT_ONCE = 1_000_000
 _LONGEST_LINE = 1000
+_BYTES_AT_ONCE = 2**24
 
 
 def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None = None) -> list[np.ndarray]:
@@ -39,6 +40,7 @@ def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: s
         About "matrices": where a line is no such row, with its number.
     """
     check_file(path, LARGEST_FILE, "matrices")
+    _check_lines(path)
     parts: list[list[np.ndarray]] = [[] for _ in kinds]
     n_rows = 0
     try:
@@ -46,12 +48,13 @@ def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: s
             # a row that is longer than the others, and a number that is none of the type
             warnings.simplefilter("error", pd.errors.ParserWarning)
             warnings.simplefilter("ignore", RuntimeWarning)
-            for frame in _frames(file, separator, kinds, comment):
-                n_rows += len(frame)
-                if n_rows > LARGEST_ENTRIES:
-                    wrong(path.name, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
-                for place, column in enumerate(frame):
-                    parts[place].append(frame[column].to_numpy())
+            with _frames(file, separator, kinds, comment) as frames:
+                for frame in frames:
+                    n_rows += len(frame)
+                    if n_rows > LARGEST_ENTRIES:
+                        wrong(path.name, f"more than {LARGEST_ENTRIES} entries", "reduce the model")
+                    for place, column in enumerate(frame):
+                        parts[place].append(frame[column].to_numpy())
     except SceneError:  # which is a ValueError, too
         raise
     except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning, csv.Error):
@@ -64,9 +67,22 @@ def read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: s
     return columns
 
 
-def _frames(file: IO[bytes], separator: str, kinds: tuple[type, ...], comment: str | None) -> Iterable[pd.DataFrame]:
+def _check_lines(path: Path) -> None:
+    """Raises SceneError where a line is longer than any with numbers: each field of it would become a column."""
+    n_lines, open_bytes = 0, 0
+    with path.open("rb") as file:
+        while part := file.read(_BYTES_AT_ONCE):
+            ends = np.flatnonzero(np.frombuffer(part, dtype=np.uint8) == ord("\n"))
+            lengths = np.diff(np.concatenate(([-1 - open_bytes], ends, [len(part)])))
+            if lengths.max() > _LONGEST_LINE:
+                number = n_lines + int(lengths.argmax()) + 1
+                wrong(path.name, f"line {number} is very long", "export it again, as text")
+            n_lines, open_bytes = n_lines + ends.size, int(lengths[-1]) - 1
+
+
+def _frames(file: IO[bytes], separator: str, kinds: tuple[type, ...], comment: str | None) -> TextFileReader:
     names = [f"c{place}" for place in range(len(kinds))]
-    frames: Iterable[pd.DataFrame] = pd.read_csv(
+    frames: TextFileReader = pd.read_csv(
         file,
         sep=r"\s+" if separator == " " else separator,
         header=None,

@@ -15,7 +15,7 @@ _DEEPEST_INCLUDE = 10
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET")
 _MOST_BLOCKS = 1_000_000
 # the name of a parameter, and its value: quoted, or up to the next comma
-_PARAMETER = re.compile(r'\s*([^,="]+?)\s*(?:=\s*("[^"]*"|[^,"]*))?\s*(?:,|$)')
+_PARAMETER = re.compile(r'[\s,]*([^,="]+?)\s*(?:=\s*("[^"]*"|[^,"]*))?\s*(?:,|$)')
 
 
 @dataclass
@@ -112,7 +112,7 @@ class _Cutter:
                 if len(raw) > _LONGEST_LINE or "\0" in raw:
                     raise Place(name, number).wrong("no text, or a very long line", "give a deck of CalculiX or Abaqus")
                 text = raw.strip()
-                if not text or text.startswith("**"):
+                if not text or text == "*" or text.startswith("**"):
                     continue
                 place = Place(name, number)
                 if begun is not None:

@@ -46,7 +46,7 @@ def test_least_deck(tmp_path):
         ("*NODE\n" + "1," * 10_000, "deck.inp, line 2: no text, or a very long line"),
         ("*" + "a" * 9000 + "\n", "deck.inp has no nodes"),
         ("*HEADING\n", "deck.inp has no nodes"),
-        ("*\n", "deck.inp, line 1: a star without a keyword"),
+        ("*,NODE\n", "deck.inp, line 1: a star without a keyword"),
         ('*NODE,"=\n', "deck.inp, line 1: .* is no parameter"),
         ("*NODE\n1,0,0,nan\n", "deck.inp, line 2: 'nan' in place of a number"),
         ("*NODE\n1,0,0,0\n2,0,1e999,0\n", "deck.inp, line 3: '1e999' in place of a number"),

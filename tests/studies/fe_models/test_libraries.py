@@ -12,6 +12,7 @@ import pytest
 from studies.fe_models.libraries import process
 from studies.fe_models.libraries.meshes import read_library_mesh
 from studies.fe_models.matrices.read import read_matrices
+from studies.fe_models.mesh_files import read_mesh_file
 from studies.scene_error import SceneError
 from tests.studies.fe_models.meshes import BRICKS, GMSH_22, GMSH_41, PYRAMID, write_cdb
 from tests.studies.fe_models.mutations import mutate
@@ -158,6 +159,16 @@ def test_damaged_full(tmp_path):
         read_matrices(path)
 
 
+def test_meshes_by_their_ending(tmp_path):
+    path = tmp_path / "mesh.inp"
+    path.write_text("*NODE\n1,0,0,0\n")
+    assert read_mesh_file(path).node_numbers.tolist() == [1]
+    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh or .cdb"):
+        read_mesh_file(tmp_path / "mesh.med")
+    with pytest.raises(SceneError, match=r"none.cdb: there is no such file"):
+        read_mesh_file(tmp_path / "none.cdb")
+
+
 def test_missing_library(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "_READERS", {"gmsh": ("no_such_library", "meshio"), "full": ("none.at.all", "ansys")})
     with pytest.raises(SceneError) as wrong:
@@ -178,3 +189,47 @@ def test_process_that_ends_badly(tmp_path, monkeypatch):
         monkeypatch.setattr(process, "_START", end)
         with pytest.raises(SceneError, match=r"mesh.msh is damaged: meshio cannot read it"):
             read_library_mesh(path)
+
+
+# edges of the mid-side nodes, from corners counted from 0, by the manuals of Gmsh and of CalculiX
+ORDERS = {
+    "C3D10": (
+        11,
+        ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+        ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    ),
+    "C3D15": (
+        18,
+        ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
+        ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)),
+        ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    ),
+    "C3D20": (
+        17,
+        ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
+        (*((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3)), *((2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))),
+        (*((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)), *((6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))),
+    ),
+}
+
+
+@needs_meshio
+@pytest.mark.parametrize("kind", ORDERS)
+def test_order_of_mid_side_nodes(tmp_path, kind: str):
+    number, corners, edges, expected = ORDERS[kind]
+    points = np.array([*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in edges)])
+    nodes = "\n".join(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, 1))
+    element = " ".join(map(str, range(1, len(points) + 1)))
+    text = (
+        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
+        f"$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"
+    )
+    deck = read_library_mesh(write(tmp_path, text))
+    (block,) = deck.blocks
+    found = deck.coordinates[deck.rows_of_nodes(block.nodes[0])]
+    assert block.kind == kind
+    n = len(corners)
+    np.testing.assert_array_equal(found[:n], corners)
+    for place, (a, b) in enumerate(expected):
+        np.testing.assert_array_equal(found[n + place], (found[a] + found[b]) / 2)

@@ -1,0 +1,26 @@
+"""The mesh of a model, whatever program wrote it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.libraries.meshes import read_library_mesh
+from studies.scene_error import SceneError
+
+
+def read_mesh_file(path: Path) -> Deck:
+    """The mesh of a file, told by its ending: .inp (CalculiX, Abaqus), .msh (Gmsh) or .cdb (ANSYS).
+
+    Raises
+    ------
+    SceneError
+        About "model": another ending, a library that is not installed, or what is wrong in the file.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".inp":
+        return read_deck(path)
+    if suffix in (".msh", ".cdb"):
+        return read_library_mesh(path)
+    raise SceneError("model", f"{path.name} is no mesh that is known", "give .inp, .msh or .cdb")
