@@ -33,11 +33,15 @@ from studies.guards.hdf5_guard import (
 from studies.model_check import check_model, check_sector
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, scene_attributes, scene_datasets
+from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, ORIGIN, scene_attributes, scene_datasets
 
 
-def write_scene(model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None) -> None:
+def write_scene(
+    model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None, origin: Mapping[str, str] | None = None
+) -> None:
     """Write a model as a scene file, complete or not at all; an existing file is replaced.
+
+    origin: texts on where the model comes from, attributes of the file.
 
     Reading it gives the same model bit by bit. Raises SceneError where the model is impossible, OSError where the file
     cannot be written.
@@ -50,7 +54,7 @@ def write_scene(model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None 
         unfinished.unlink(missing_ok=True)
         os.close(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
         with h5py.File(unfinished, "w") as file:
-            file.attrs.update(scene_attributes(model))
+            file.attrs.update({**scene_attributes(model), **(origin or {})})
             for key, values in scene_datasets(model, mesh):
                 kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
                 file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
@@ -80,6 +84,20 @@ def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
         return _read_mesh(datasets) if _has_mesh(datasets) else None
 
 
+def read_origin(path: str | Path) -> dict[str, str]:
+    """Attributes of a scene or result file that say which model its scene was reduced from; none where it does not say.
+
+    Raises what `read_scene` raises.
+    """
+    with open_hdf5(Path(path), LARGEST_RESULT) as file:
+        values = {name: read_attribute(file, name) for name in ORIGIN}
+        found = {name: value.item() for name, value in values.items() if value is not None}
+    texts = {
+        name: value.decode(errors="replace") if isinstance(value, bytes) else value for name, value in found.items()
+    }
+    return {name: value for name, value in texts.items() if isinstance(value, str)}
+
+
 def has_mesh(path: str | Path, group: str = "") -> bool:
     """Whether a scene file has a mesh. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
@@ -91,6 +109,8 @@ def read_through(path: str | Path, group: str = "") -> None:
     with _open_scene(Path(path), group) as (root, datasets):
         for name in ATTRIBUTES:
             read_attribute(root, name)
+        for name in ORIGIN:
+            read_attribute(root.file, name)
         for key, dataset in datasets.items():
             if is_number(dataset.dtype):
                 _read_numbers(datasets, key)

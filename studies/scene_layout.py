@@ -15,6 +15,8 @@ CONTACT = ("dofs", "area", "gap", "normal_load", "friction_coefficient", "positi
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
+ORIGIN = ("model_files", "model_units", "model_reduced_by")
+"""Attributes of a file whose scene was reduced here from a finite-element model."""
 
 
 def scene_attributes(model: ReducedModel) -> dict[str, int]:

@@ -33,6 +33,7 @@ _SECONDS_FOR_RANK_0 = 60.0
 """Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
 
 _SECONDS_FOR_A_LINE = 2.0
+_SECONDS_WITHOUT_A_WORD = 3.0
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -44,6 +45,7 @@ examples:
   run-study                                              the bundled study "dovetail" -> dovetail.nc
   run-study --plan                                       what that would compute, and how long it takes
   mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
+  run-study my_study.toml --check                        mass, pairs, frequencies of a finite-element model
   run-study worn.nc -o again.nc                          the study of a result file again
   run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
 
@@ -65,11 +67,24 @@ class Options:
     study: str
     output: Path | None
     plan: bool
+    check: bool
     overrides: list[str]
     write_scene: Path | None
     fresh: bool
     retry_failed: bool
     prune: bool
+
+
+class _SlowSteps:
+    """Lines on stderr about a scene that takes long to build; none where it is built, or refused, at once."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
+
+    def say(self, doing: str) -> None:
+        seconds = time.monotonic() - self._began
+        if seconds > _SECONDS_WITHOUT_A_WORD:
+            print(f"[{seconds:5.0f} s] {doing}", file=sys.stderr, flush=True)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -99,6 +114,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
         "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
     )
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
+    parser.add_argument(
+        "--check", action="store_true", help="print what a finite-element model is, draw its contact pairs; then stop"
+    )
     parser.add_argument(
         "--set",
         dest="overrides",
@@ -202,6 +220,8 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         study = read_study(options.study, options.overrides)
         if options.plan:
             status = _show_plan(study)
+        elif options.check:
+            status = _check(study)
         elif options.write_scene is not None:
             status = _write_scene(study, options.write_scene)
         else:
@@ -239,11 +259,22 @@ def _show_plan(study: Study) -> int:
     from studyrunner.plan.tasks import build_tasks
     from studyrunner.scene.scene import build_study_scene, describe_scene
 
-    facts = describe_scene(build_study_scene(study))
+    facts = describe_scene(build_study_scene(study, _SlowSteps().say))
     print(format_plan(study, facts, build_tasks(study, facts.n_displacements)), flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
+    return CONVERGED
+
+
+def _check(study: Study) -> int:
+    from studyrunner.netcdf.output import check_output
+    from studyrunner.scene.model_check import check_study_model
+
+    picture = Path(f"{study.study.name}.check.png")
+    target = check_output("--check", picture, study.files)
+    print(check_study_model(study, target, _SlowSteps().say), flush=True)
+    print(f"{picture}: the contact pairs and their frames", flush=True)
     return CONVERGED
 
 
@@ -252,7 +283,7 @@ def _write_scene(study: Study, path: Path) -> int:
     from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
-    write_study_scene(study, target)
+    write_study_scene(study, target, _SlowSteps().say)
     print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
@@ -268,7 +299,7 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     target = check_output("-o", path, study.files)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = build_study_scene(study)
+    model = build_study_scene(study, _SlowSteps().say)
     for line in compare_with_archived(study, model):
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:

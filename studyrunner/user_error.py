@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_LONGEST_VALUE, _LONGEST_KEY, _LONGEST_REMEDY = 80, 120, 600
+_LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
 
 
 class UserError(Exception):
@@ -71,8 +71,8 @@ def show_value(value: object) -> str:
         # whole numbers of more digits than Python writes
         text = "too long to be shown"
     if isinstance(value, Verbatim):
-        text = str(value)
-    elif isinstance(value, str):
+        return _cut(show_text(" ".join(value.split())), _LONGEST_VERBATIM)
+    if isinstance(value, str):
         text = '"' + value + '"'
     return _cut(show_text(" ".join(text.split())), _LONGEST_VALUE)
 

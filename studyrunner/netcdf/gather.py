@@ -115,7 +115,8 @@ def gather(
         return gathered
     try:
         with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
-            file.setncatts({**describe_run(study, facts), "certificate_summary": gathered.certificates})
+            origin = {} if scene is None else scene.origin
+            file.setncatts({**describe_run(study, facts), **origin, "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
             _write_values(file, study, facts, completion.store, index)
             _write_scene(file, study, completion.store, of_scene)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,8 +42,14 @@ class SceneFacts:
     largest_harmonics: int | None = None
 
 
-def build_study_scene(study: Study) -> ReducedModel:
+def _silent(_: str) -> None:
+    """Tells nobody."""
+
+
+def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -> ReducedModel:
     """Reduced model of the study's scene, for the largest number of harmonics that the study gives.
+
+    progress: takes a line on what is done next, where that may take long.
 
     Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
     may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
@@ -53,20 +59,24 @@ def build_study_scene(study: Study) -> ReducedModel:
     UserError
         Where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
     """
-    model = _build(study)
+    model = _build(study, progress)
     check_outputs(study, model)
     _check_surfaces(study, model)
     return model
 
 
-def _build(study: Study) -> ReducedModel:
+def harmonics_to_build(study: Study) -> int:
+    """Harmonics whose nodal diameters a scene is built with."""
     given = max(study.given_harmonics, default=1)
-    built = max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
-    scene = study.scene
+    return max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
+
+
+def _build(study: Study, progress: Callable[[str], None]) -> ReducedModel:
+    given, scene = max(study.given_harmonics, default=1), study.scene
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
         if scene.path is None:
-            return _build_bundled(study, built)
+            return _build_here(study, progress)
         # h5py is loaded for scene files only: the bundled scenes do without it.
         from studies.scene_file import read_scene
 
@@ -95,9 +105,14 @@ def _check_surfaces(study: Study, model: ReducedModel) -> None:
         raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
 
 
-def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:
+def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
+    scene, n_harmonics = study.scene, harmonics_to_build(study)
     try:
-        return build_scene(study.scene.model, study.scene.parameters, n_harmonics)
+        if scene.files is None:
+            return build_scene(scene.model, scene.parameters, n_harmonics)
+        from studies.fe_models.from_files.scene import build
+
+        return build(scene.files, scene.parameters, n_harmonics, progress)
     except SceneError:
         raise
     except (ArithmeticError, ValueError, MemoryError) as error:
@@ -107,15 +122,15 @@ def _build_bundled(study: Study, n_harmonics: int) -> ReducedModel:
         ) from None
 
 
-def write_study_scene(study: Study, path: Path) -> None:
+def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
     """Writes the scene of a study as a scene file, whole or not at all. Raises UserError where the scene is wrong."""
     from studies.scene_file import write_scene
 
-    model = build_study_scene(study)
+    model = build_study_scene(study, progress)
     with scene_errors(study.source, study.scene.path):
-        mesh = build_mesh(study)
+        mesh, origin = build_mesh(study), describe_origin(study)
     try:
-        write_scene(model, path, mesh)
+        write_scene(model, path, mesh, origin)
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror or error}"
         raise UserError("command line", "--write-scene", str(path), remedy) from None
@@ -123,20 +138,39 @@ def write_study_scene(study: Study, path: Path) -> None:
 
 @dataclass(frozen=True)
 class KeptScene:
-    """What a result file keeps of a scene file: its attributes, and its datasets by name with groups."""
+    """What a result file keeps of a scene file: its attributes, and its datasets by name with groups.
+
+    origin: attributes of the result on the files of a finite-element model.
+    """
 
     attributes: Mapping[str, int]
     datasets: tuple[tuple[str, NDArray[np.generic]], ...]
+    origin: Mapping[str, str] = field(default_factory=dict)
 
 
 def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
     """The whole content of a scene file; None of a bundled scene, which its parameters give again."""
-    if study.scene.path is None:
+    if study.scene.is_bundled:
         return None
     from studies.scene_layout import scene_attributes, scene_datasets
 
     with scene_errors(study.source, study.scene.path):
-        return KeptScene(scene_attributes(model), tuple(scene_datasets(model, build_mesh(study))))
+        datasets = tuple(scene_datasets(model, build_mesh(study)))
+        return KeptScene(scene_attributes(model), datasets, describe_origin(study))
+
+
+def describe_origin(study: Study) -> dict[str, str]:
+    """Attributes on the files of a finite-element model; none of other scenes. Raises OSError, SceneError."""
+    scene = study.scene
+    if scene.files is not None:
+        from studies.fe_models.from_files.scene import describe_origin as describe_files
+
+        return describe_files(scene.files, scene.parameters)
+    if scene.path is None:
+        return {}
+    from studies.scene_file import read_origin
+
+    return read_origin(scene.path)
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -98,7 +98,7 @@ def _user_errors(study: Study) -> Iterator[None]:
 
 def _has_frequencies(study: Study) -> bool:
     """Whether the scene knows more natural frequencies than those of its reduced model."""
-    return study.scene.path is None and scene_has(study.scene.model, "natural_frequencies")
+    return study.scene.is_bundled and scene_has(study.scene.model, "natural_frequencies")
 
 
 def build_mesh(study: Study) -> SurfaceMesh | None:
@@ -106,6 +106,10 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
     scene = study.scene
     if "mesh" not in scene.offers:
         return None
+    if scene.files is not None:
+        from studies.fe_models.from_files.scene import describe_model_mesh
+
+        return describe_model_mesh(scene.files, scene.parameters)
     if scene.path is None:
         return scene_mesh(scene.model, scene.parameters)
     # h5py is loaded for scene files only

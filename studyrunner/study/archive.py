@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.sandboxed_read import check_result_readable, check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
+from studies.scene_layout import ORIGIN
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ class Archived:
 
     study: the whole effective study, TOML. scene_sha256, solver_digest: of the scene and the solver that computed it,
     versions: of the packages; empty where the file does not say. holds_scene: whether its scene stands in SCENE_GROUP.
-    model: what the study calls its scene.
+    scene: the table [scene] of that study.
     """
 
     study: str
@@ -35,7 +36,7 @@ class Archived:
     solver_digest: str
     versions: str
     holds_scene: bool
-    model: str = ""
+    scene: Mapping[str, object] = field(default_factory=dict)
 
     def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
         """A line for each reason why a result that is computed now may have other numbers."""
@@ -70,13 +71,14 @@ def read_archived(path: Path, name: str) -> Archived:
     from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
 
     with _user_errors(name, "the attribute "):
-        check_scene_readable(path, SCENE_GROUP, _ATTRIBUTES)
+        check_scene_readable(path, SCENE_GROUP, (*_ATTRIBUTES, *ORIGIN))
         with open_hdf5(path, LARGEST_RESULT) as file:
             found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
             if not found["study"]:
                 remedy = "missing: give a study file (TOML) or a result file of run-study"
                 raise UserError(name, "the attribute study", None, remedy)
-            return Archived(**found, holds_scene=SCENE_GROUP in file)
+            study, scene_sha256, solver_digest, versions = found.values()
+            return Archived(study, scene_sha256, solver_digest, versions, holds_scene=SCENE_GROUP in file)
 
 
 def check_result_file(path: Path, name: str) -> None:

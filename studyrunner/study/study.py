@@ -13,6 +13,7 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, WearTarget
+from studies.fe_models.model_files import ModelFiles
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
     Axis,
@@ -168,15 +169,22 @@ class SceneSection(Section):
     """[scene]: which model, and the parameters that this model knows.
 
     parameters: checked object of the class that the scene names, with at least `friction_coefficient`.
-    path: the file that the scene stands in, None where it is a bundled one. group: where in that file, empty where it
-    is a scene file. offers: names in `outputs.variables` of what this scene can tell and not all can.
+    path: the file that the scene stands in, None where it is built here. group: where in that file, empty where it
+    is a scene file. files: those of a finite-element model, None of other scenes. offers: names in `outputs.variables`
+    of what this scene can tell and not all can.
     """
 
     model: Text
     parameters: SerializeAsAny[BaseModel]
     path: Path | None = Field(None, exclude=True)
     group: str = Field("", exclude=True)
+    files: ModelFiles | None = Field(None, exclude=True)
     offers: tuple[str, ...] = Field((), exclude=True)
+
+    @property
+    def is_bundled(self) -> bool:
+        """Whether it is one of the bundled scenes, which needs no file."""
+        return self.path is None and self.files is None
 
 
 class Study(Section):
@@ -255,13 +263,15 @@ class Study(Section):
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
         study_file = self.folder / Path(self.source).name
-        return (study_file,) if self.scene.path is None else (study_file, self.scene.path)
+        scene = () if self.scene.path is None else (self.scene.path,)
+        model = () if self.scene.files is None else self.scene.files.all
+        return (study_file, *scene, *model)
 
     @property
     def friction_coefficient(self) -> float | None:
-        """Coulomb's coefficient of all pairs; None where the scene file has one of each pair."""
+        """Coulomb's coefficient of all pairs; None where the scene has one of each pair."""
         value = dict(self.scene.parameters)["friction_coefficient"]
-        return None if value is None else float(value)
+        return None if value is None or isinstance(value, dict) else float(value)
 
     @property
     def wear_law(self) -> WearLaw:
@@ -316,6 +326,11 @@ class Study(Section):
         """Name and values of the axes of the result, in its order; solver keys only where they are axes."""
         names = (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
         return {name: getattr(self.axes, name) for name in names}
+
+
+def names_model(model: str) -> bool:
+    """Whether the text under `scene.model` names a finite-element model: a deck or a mesh."""
+    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb")
 
 
 def names_file(model: str) -> bool:

@@ -20,7 +20,7 @@ from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
 from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
 from studyrunner.study.scene_errors import scene_errors
-from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file
+from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file, names_model
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 
@@ -61,7 +61,7 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
         if is_hdf5(path):
             archived = read_archived(path, argument)
             table = read_toml(archived.study.encode(), argument)
-            archived = replace(archived, model=str(_section(table, "scene").get("model")))
+            archived = replace(archived, scene=dict(_section(table, "scene")))
         else:
             table = read_toml_file(path, argument)
     except OSError as error:
@@ -218,6 +218,8 @@ def _check_scene(table: Table, source: str, path: Path, archived: Archived | Non
         raise UserError(source, "scene.model", None, "missing: give a bundled scene or the path of a scene file")
     if not isinstance(model, str):
         raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
+    if names_model(model):
+        return _check_model_scene(model, parameters, source, path, archived)
     if names_file(model):
         found = _find_scene(model, source, path, archived)
         return SceneSection(model=model, parameters=_check(SceneFileParameters, parameters, source, "scene"), **found)
@@ -229,11 +231,32 @@ def _check_scene(table: Table, source: str, path: Path, archived: Archived | Non
     return SceneSection(model=model, parameters=_check(kind, parameters, source, "scene"), offers=offers)
 
 
+def _check_model_scene(model: str, table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:
+    """A finite-element model; a result file holds what it was reduced to."""
+    # what reads and reduces it is loaded where there is one
+    from studies.fe_models.from_files.model import find_files
+    from studies.fe_models.from_files.parameters import Parameters
+
+    parameters = _check(Parameters, table, source, "scene")
+    if archived is not None and archived.holds_scene and model == archived.scene.get("model"):
+        before = _check(
+            Parameters, {key: archived.scene[key] for key in archived.scene if key != "model"}, source, "scene"
+        )
+        for key, value in parameters:
+            if value != getattr(before, key) and not (key == "friction_coefficient" and isinstance(value, float)):
+                remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
+                raise UserError(source, f"scene.{key}", table.get(key), remedy)
+        return SceneSection(model=model, parameters=parameters, **_find_scene(model, source, path, archived))
+    with scene_errors(source, None):
+        files = find_files(path.parent, model, parameters)
+    return SceneSection(model=model, parameters=parameters, files=files, offers=("mesh",))
+
+
 def _find_scene(model: str, source: str, path: Path, archived: Archived | None) -> dict[str, Any]:
     """Where the scene of a scene file stands and what it offers, once it is known that it can be read at all."""
     from studies.scene_file import has_mesh
 
-    if archived is not None and archived.holds_scene and model == archived.model:
+    if archived is not None and archived.holds_scene and model == archived.scene.get("model"):
         scene_path, group = path, SCENE_GROUP
     else:
         scene_path, group = path.parent / model, ""

@@ -89,7 +89,7 @@ class Draft:
     """All that was read so far.
 
     scope: PART inside of *PART and *INSTANCE, else "". instance: name of the only one, "" before. in_parts: whether the
-    deck has parts. step: the one being read, None outside.
+    deck has parts. step: the one being read, None outside. included: files, relative to the deck's folder.
     """
 
     nodes: list[tuple[IntArray, FloatArray, Place]] = field(default_factory=list)
@@ -113,6 +113,7 @@ class Draft:
     instance: str = ""
     in_parts: bool = False
     shift: tuple[FloatArray, FloatArray] | None = None
+    included: list[str] = field(default_factory=list)
 
     def skip(self, block: Block, what: str = "") -> None:
         """Notes a keyword, or a part of one, that is not read."""

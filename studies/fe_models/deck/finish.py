@@ -77,6 +77,7 @@ class _Finish:
             steps=tuple(self._step(step) for step in draft.steps),
             skipped=tuple(draft.skipped.values()),
             notes=(*self.node_sets.notes, *self.element_sets.notes),
+            included=tuple(draft.included),
         )
 
     def _public(self, key: tuple[str, str], all_of_them: Mapping[tuple[str, str], object]) -> str:

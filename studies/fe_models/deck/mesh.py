@@ -205,6 +205,8 @@ class Deck:
         Keywords that were not read, each as "sector.inp, line 7: *KEYWORD", the first of every kind.
     notes
         What was read but left out in part, a sentence each.
+    included
+        Files that the deck includes, relative to its folder.
     """
 
     path: str
@@ -223,6 +225,7 @@ class Deck:
     steps: tuple[Step, ...] = ()
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    included: tuple[str, ...] = ()
 
     def rows_of_nodes(self, numbers: IntArray) -> IntArray:
         """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""

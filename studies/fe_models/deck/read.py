@@ -94,7 +94,7 @@ def read_deck(path: Path) -> Deck:
         About "model": in one sentence with file and line, where the deck cannot be read or makes no sense.
     """
     draft = Draft()
-    for block in read_blocks(path):
+    for block in read_blocks(path, draft.included):
         reader = _READERS.get(block.keyword)
         if reader is None:
             draft.skip(block)

@@ -54,22 +54,23 @@ def read_name(text: str) -> str:
     return "".join(text.split()).upper()
 
 
-def read_blocks(path: Path) -> Iterator[Block]:
+def read_blocks(path: Path, included: list[str] | None = None) -> Iterator[Block]:
     """The keywords of a deck, one after the other, those of files that it includes in their places.
 
-    An included file stands in the deck's folder or below; its name is taken from there.
+    An included file stands in the deck's folder or below; its name is taken from there, and appended to `included`.
 
     Raises
     ------
     SceneError
         Where a file is missing, is no text, too large, or includes itself.
     """
-    return _Cutter(path).blocks()
+    return _Cutter(path, [] if included is None else included).blocks()
 
 
 class _Cutter:
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, included: list[str]) -> None:
         self.path = path
+        self.included = included
         self.folder = path.parent.resolve()
         self.bytes_left = LARGEST_DECK
         self.n_includes = 0
@@ -157,7 +158,10 @@ class _Cutter:
         if self.n_includes > _MOST_INCLUDES or len(self.open) > _DEEPEST_INCLUDE:
             found = f"more than {_MOST_INCLUDES} files, or {_DEEPEST_INCLUDE} within each other"
             raise block.place.wrong(found, "put the deck into fewer files")
-        yield from self._lines(path, str(path.relative_to(self.folder)))
+        relative = str(path.relative_to(self.folder))
+        if relative not in self.included:
+            self.included.append(relative)
+        yield from self._lines(path, relative)
 
 
 def _cut_keyword(text: str, place: Place) -> Block:

@@ -1,0 +1,146 @@
+"""What a user checks of a finite-element model before it is computed with, in lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.linalg import eigh
+
+from solver.model import FloatArray, LinearModel, ReducedModel
+from studies.fe_models.fe_model import MatrixModel
+from studies.fe_models.fe_scene import FeScene, Progress, glued_frequencies, prepare_model, silent
+from studies.fe_models.from_files.model import LoadedModel
+from studies.fe_models.from_files.parameters import Parameters
+from studies.fe_models.from_files.scene import reduce_model
+
+N_FREQUENCIES = 4
+"""Natural frequencies that are shown."""
+
+_RPM = 30.0 / np.pi
+_FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
+
+
+def describe_model(
+    loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
+) -> list[tuple[str, str]]:
+    """Label and text of each line. scene: the reduced model. Raises SceneError."""
+    summary, deck, joint = scene.summary, loaded.deck, loaded.joint
+    rows = [
+        ("mass", f"{summary.mass:.6g} kg, {summary.n_dofs} displacements that are not held"),
+        ("extent", f"{_vector(summary.extent)} m; given in {loaded.units.name}"),
+        ("centre", f"{_vector(summary.centre)} m"),
+    ]
+    rotation = loaded.model.rotation
+    if rotation is None:
+        rows.append(("speed", "none"))
+    else:
+        rows.append(
+            ("speed", f"{np.sqrt(rotation.omega_squared) * _RPM:.6g} rpm about {_vector(rotation.axis)}{_held(loaded)}")
+        )
+    if joint.cut is not None:
+        n = joint.cut.axis.n_sectors
+        rows.append(("sectors", f"{n}, {360.0 / n:.5g} degrees each, {len(joint.cut.left)} nodes on a cut face"))
+    rows += [("contact", text) for text in _contacts(scene)]
+    rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
+    progress("natural frequencies of the glued model")
+    prepared = prepare_model(loaded.model, joint)
+    k = parameters.nodal_diameter
+    turning = glued_frequencies(prepared, k, N_FREQUENCIES)
+    where = f"nodal diameter {k}: " if joint.cut is not None else ""
+    if isinstance(loaded.model, MatrixModel):
+        rows.append(("glued", f"{where}{_frequencies(turning)} Hz, with what the matrices hold"))
+    elif prepared.at_rest is None:
+        rows.append(("glued", f"{where}{_frequencies(turning)} Hz without prestress"))
+    else:
+        still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
+        rows.append(("glued", f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"))
+    progress("reduction with twice the modes")
+    rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
+    held = count_held_by_friction(scene.model)
+    if held:
+        verb = "motion is" if held == 1 else "motions are"
+        rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
+    pull = _static_pull(scene.model)
+    if pull is not None:
+        rows.append(("static", pull))
+    rows += [("left out", text) for text in (*deck.skipped, *deck.notes)]
+    return rows
+
+
+def count_held_by_friction(model: ReducedModel) -> int:
+    """Motions without stiffness where all pairs stay closed and slide freely."""
+    linear, dofs = model.linear[0], model.contact.dofs
+    closing = dofs[:, 0][dofs[:, 0] >= 0]
+    free = np.setdiff1d(np.arange(len(linear.stiffness)), closing)
+    stiffness = linear.stiffness.real[np.ix_(free, free)]
+    # modal coordinates have another unit: each displacement is scaled by its own stiffness
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(stiffness), np.finfo(np.float64).tiny))
+    return int(np.count_nonzero(np.linalg.eigvalsh(stiffness * scale * scale[:, None]) < _FREE))
+
+
+def sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray:
+    """Natural frequencies, Hz, ascending, with all pairs closed and sliding freely; 0 of what nothing holds."""
+    dofs = model.contact.dofs
+    free = np.setdiff1d(np.arange(len(linear.stiffness)), dofs[:, 0][dofs[:, 0] >= 0])
+    stiffness, mass = (part[np.ix_(free, free)] for part in (linear.stiffness, linear.mass))
+    # A mass may be singular, and spin softening alone acts on what slides as a whole: M x = (K + s M) x / (w^2 + s),
+    # s from the lowest glued mode, the first of those behind the relative displacements.
+    shift = float(np.diag(linear.stiffness)[np.count_nonzero(dofs >= 0)].real)
+    inverse = eigh(mass, stiffness + shift * mass, eigvals_only=True)[::-1]
+    squares = 1.0 / inverse[inverse > 0.0] - shift
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
+
+
+def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Parameters) -> str:
+    """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
+    more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
+    finer = reduce_model(loaded, more, 1).model
+    k = parameters.nodal_diameter
+    own, other = (sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
+    n = min(len(own), len(other))
+    elastic = other[:n] > 1e-3 * other[:n].max()
+    own, other = own[:n][elastic][:N_FREQUENCIES], other[:n][elastic][:N_FREQUENCIES]
+    worst = np.abs(own / other - 1.0).max()
+    return (
+        f"{parameters.stuck_modes} modes; with the pairs sliding freely {_frequencies(own)} Hz, by at most"
+        f" {100.0 * worst:.2g} % off those with {more.stuck_modes}"
+    )
+
+
+def _contacts(scene: FeScene) -> Iterator[str]:
+    pairs = scene.pairs
+    for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
+        own = pairs.surface == place
+        distance = pairs.distance[own]
+        yield (
+            f"{own.sum()} nodes of {moving} on {opposite}, {1e6 * pairs.area[own].sum():.5g} mm2,"
+            f" distances {distance.min():.2g} to {distance.max():.2g} m"
+        )
+
+
+def _static_pull(model: ReducedModel) -> str | None:
+    """Sum of the normal forces that the static load has the glued pairs carry."""
+    dofs = model.contact.dofs[:, 0]
+    forces = model.linear[0].load_static[dofs[dofs >= 0]]
+    if not forces.any():
+        return "no static load: nothing presses the surfaces together"
+    n_pull = np.count_nonzero(forces < 0)
+    text = f"normal forces of the glued pairs: sum {forces.sum():.4g} N, {n_pull} of {len(forces)} pull"
+    return text + (": the joint opens, give a preload" if forces.sum() < 0 else "")
+
+
+def _held(loaded: LoadedModel) -> str:
+    if not isinstance(loaded.model, MatrixModel):
+        return ""
+    if loaded.omega_squared_held is None:
+        return "; the matrices do not tell theirs"
+    return f"; the stiffness holds {np.sqrt(loaded.omega_squared_held) * _RPM:.6g} rpm"
+
+
+def _vector(values: FloatArray) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in np.where(np.abs(values) < 1e-12, 0.0, values)) + ")"
+
+
+def _frequencies(values: FloatArray) -> str:
+    return ", ".join(f"{value:.2f}" for value in values)

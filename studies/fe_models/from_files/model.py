@@ -1,0 +1,191 @@
+"""From files and a study's parameters to a model and what is done with it, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import FloatArray
+from studies.fe_models.checks import (
+    check_contact_removed,
+    check_mesh_is_of_matrices,
+    check_nodes_have_dofs,
+    check_speed,
+    check_units,
+    mass_of,
+    omega_squared_of,
+)
+from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.elements.solid_mesh import Rotation, SolidMesh
+from studies.fe_models.fe_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
+from studies.fe_models.fe_scene import Progress, silent
+from studies.fe_models.from_files.parameters import Parameters, SetDirection
+from studies.fe_models.from_files.selections import Selections
+from studies.fe_models.from_files.solid import build_solid_mesh
+from studies.fe_models.from_files.supports import find_cut, find_held, find_rotation
+from studies.fe_models.from_files.surfaces_in_contact import Surfaces, find_surfaces
+from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.matrices.read import find_matrix_files, read_matrices
+from studies.fe_models.mesh_files import read_mesh_file
+from studies.fe_models.model_files import ModelFiles
+from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.fe_models.units import Units, find_units
+from studies.scene_error import SceneError
+
+_SPEED_AGREES = 1e-3  # relative difference of the speed of a study from that of its matrices
+
+
+@dataclass(frozen=True)
+class PreloadForce:
+    """A constant force. motion: where it acts. force: N."""
+
+    motion: SetMotion
+    force: float
+
+
+@dataclass(frozen=True)
+class LoadedModel:
+    """A model as its files and the study describe it.
+
+    deck: in units of the file. mesh: m. model, joint: SI. preloads: constant forces beside the centrifugal one.
+    omega_squared_held: square of the speed at which the matrices were made, rad2/s2; None where they do not tell.
+    """
+
+    deck: Deck
+    units: Units
+    mesh: SolidMesh
+    model: MeshModel | MatrixModel
+    joint: JointDefinition
+    preloads: tuple[PreloadForce, ...]
+    omega_squared_held: float | None
+
+
+def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
+    """The files of a model, whose names are relative to a folder.
+
+    Raises SceneError where there are none of these names.
+    """
+    mesh = folder / model
+    _check_there(mesh, "model")
+    if parameters.matrices is None:
+        return ModelFiles(mesh)
+    matrices = find_matrix_files(folder / parameters.matrices)
+    for path in matrices:
+        _check_there(path, "matrices")
+    return ModelFiles(mesh, matrices)
+
+
+def load_mesh(files: ModelFiles, parameters: Parameters) -> SolidMesh:
+    """The mesh alone. Raises SceneError."""
+    return build_solid_mesh(read_mesh_file(files.mesh), parameters, find_units(parameters.units))
+
+
+def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
+    """Reads the files and puts the model together.
+
+    Raises
+    ------
+    SceneError
+        Where a file cannot be read, the study names what is not there, or what was exported is of no use.
+    """
+    units = find_units(parameters.units)
+    progress(f"reading {files.mesh.name}")
+    deck = read_mesh_file(files.mesh)
+    mesh = build_solid_mesh(deck, parameters, units)
+    selections = Selections(deck, mesh)
+    if not files.matrices:
+        check_units(deck, None, units)
+    rotation = find_rotation(deck, parameters, units)
+    surfaces = find_surfaces(selections, parameters, units)
+    cut, held = find_cut(selections, parameters, units), find_held(selections, parameters)
+    model: MeshModel | MatrixModel = MeshModel(mesh, rotation, parameters.stress_stiffening)
+    held_speed = None
+    if files.matrices:
+        if not parameters.stress_stiffening:
+            raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
+        progress(f"reading {', '.join(path.name for path in files.matrices)}")
+        matrices = read_matrices(files.matrices[0])
+        check_mesh_is_of_matrices(deck, matrices)
+        check_units(deck, mass_of(deck, matrices), units)
+        _check_export(deck, matrices, mesh, surfaces, units)
+        if rotation is not None:
+            held_speed = _check_rotation(deck, matrices, rotation, parameters)
+        nodal = order_by_nodes(
+            sparse.csr_matrix(matrices.stiffness * units.stiffness),
+            sparse.csr_matrix(matrices.mass * units.mass),
+            matrices.node,
+            matrices.direction,
+            mesh.numbers,
+            mesh.coordinates,
+        )
+        _check_free_nodes(matrices, mesh, np.asarray(held.all(axis=1)))
+        held = np.concatenate([held, np.zeros((len(nodal.numbers) - len(held), 3), dtype=np.bool_)]) | nodal.missing
+        model = nodal.model(rotation)
+    joint = JointDefinition(
+        contacts=surfaces.contacts,
+        held=held,
+        load=_motion(selections, parameters.load, "load.set"),
+        responses={
+            name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
+        },
+        cut=cut,
+        retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
+        ties=surfaces.ties,
+    )
+    preloads = tuple(PreloadForce(_motion(selections, each, "preload.set"), each.force) for each in parameters.preload)
+    return LoadedModel(deck, units, mesh, model, joint, preloads, held_speed)
+
+
+def _check_there(path: Path, key: str) -> None:
+    try:
+        exists = path.is_file()
+    except (OSError, ValueError):
+        exists = False
+    if not exists:
+        raise SceneError(key, f"there is no file {path.name}", "give a path relative to the study file")
+
+
+def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
+    return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
+
+
+def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
+    if parameters.retention_stiffness == 0.0:
+        return None
+    direction = parameters.retention_direction
+    if direction is not None:
+        return Retainer(parameters.retention_stiffness, np.array(direction))
+    if axis is None and rotation is not None:
+        axis = rotation.axis
+    if axis is None:
+        raise SceneError("retention_direction", "missing", "give it: the model has no axis")
+    return Retainer(parameters.retention_stiffness, axis)
+
+
+def _check_export(deck: Deck, matrices: Matrices, mesh: SolidMesh, surfaces: Surfaces, units: Units) -> None:
+    """The matrices have the nodes of all surfaces, and nothing joins those in contact."""
+    for each in (*surfaces.contacts, *surfaces.ties):
+        for surface in (each.first, each.second):
+            check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
+    for each in surfaces.contacts:
+        nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
+        check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
+
+
+def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> None:
+    """The matrices have all nodes that nothing holds."""
+    check_nodes_have_dofs(matrices, mesh.numbers[~held.astype(bool)], "the mesh without its clamps")
+
+
+def _check_rotation(deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters) -> float | None:
+    """Square of the speed that the matrices hold; it must be that of the rotation."""
+    if parameters.rotation_speed is None:
+        check_speed(deck, matrices)
+    held = omega_squared_of(deck, matrices, rotation.axis)
+    if held is not None and abs(held - rotation.omega_squared) > 2.0 * _SPEED_AGREES * rotation.omega_squared:
+        found = f"{parameters.rotation_speed:g} rpm, the stiffness holds {30.0 * np.sqrt(held) / np.pi:.6g} rpm"
+        raise SceneError("rotation_speed", found, "export the matrices at this speed, or leave it out")
+    return held

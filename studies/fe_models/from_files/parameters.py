@@ -1,0 +1,120 @@
+"""What a study says of a finite-element model, in SI units whatever units its files have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+from studies.scene_error import SceneError
+
+
+def _as_tuple(value: object) -> object:
+    """TOML has lists; what is frozen has none."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _with_length(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not math.sqrt(sum(part * part for part in value)) > 0.0:
+        raise ValueError("give a direction that is not 0")
+    return value
+
+
+Vector = Annotated[tuple[float, float, float], BeforeValidator(_as_tuple)]
+Direction = Annotated[Vector, AfterValidator(_with_length)]
+Pair = Annotated[tuple[str, str], BeforeValidator(_as_tuple)]
+Pairs = Annotated[tuple[Pair, ...], BeforeValidator(_as_tuple)]
+Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
+
+
+class Table(BaseModel):
+    """A table: frozen, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class SetDirection(Table):
+    """Mean displacement of a set of nodes along a direction, or a force of 1 N that is shared evenly."""
+
+    set: str = Field(description="set of nodes or surface")
+    direction: Direction = Field(description="three numbers, of any length")
+
+
+class Preload(SetDirection):
+    """A constant force on a set of nodes, shared evenly."""
+
+    force: float = Field(description="N")
+
+
+class AxisTable(Table):
+    """The axis of rotation, and of a cyclic structure."""
+
+    point: Vector = Field((0.0, 0.0, 0.0), description="on the axis, m")
+    direction: Direction = Field(description="three numbers, of any length")
+
+
+class MaterialTable(Table):
+    """An isotropic elastic material."""
+
+    young_modulus: float = Field(gt=0, description="Pa")
+    poisson_ratio: float = Field(ge=0, lt=0.5, description="-")
+    density: float = Field(gt=0, description="kg/m3")
+
+
+class Parameters(Table):
+    """[scene] of a finite-element model. What is not given comes from the deck."""
+
+    friction_coefficient: float | dict[str, float] | None = Field(
+        None, description="Coulomb's, of all pairs or by the name of a surface of each contact; default: the deck's, -"
+    )
+    matrices: str | None = Field(
+        None, description="name that the files with the matrices have in common; without it they are assembled here"
+    )
+    units: Literal["SI", "mm-t-s"] = Field(description='of the files, "SI" or "mm-t-s"')
+    contact: Pairs | None = Field(
+        None, description="pairs of surfaces or sets of nodes; default: the deck's CONTACT PAIR, or its TIE"
+    )
+    load: SetDirection = Field(description="where the harmonic load of 1 N acts: {set, direction}")
+    response: dict[str, SetDirection] | None = Field(
+        None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"
+    )
+    preload: Annotated[tuple[Preload, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="constant forces beside the centrifugal one: {set, direction, force}"
+    )
+    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites, -")
+    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
+    stuck_modes: int = Field(20, ge=1, le=200, description="modes of the glued structure kept in the reduction, -")
+    retention_stiffness: float = Field(
+        0.0, ge=0, description="stiffness of the retainer on the mean relative displacement of all pairs, N/m"
+    )
+    retention_direction: Direction | None = Field(None, description="of the retainer; default: that of the axis")
+    tolerance: float | None = Field(
+        None,
+        gt=0,
+        description="largest distance of a node that is paired, m; default: that of the TIE, or 5 % of a facet",
+    )
+    gaps: bool = Field(False, description="whether distances of the surfaces in the mesh are gaps of the joint")
+    clamp: Names | None = Field(
+        None, description="sets of nodes or surfaces that are held; default: the deck's BOUNDARY"
+    )
+    material: MaterialTable | dict[str, MaterialTable] | None = Field(
+        None, description="of all elements, or by the name of a set of elements"
+    )
+    rotation_speed: float | None = Field(None, ge=0, description="rpm; default: that of the deck's CENTRIF")
+    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
+    axis: AxisTable | None = Field(None, description="{point, direction}; default: the deck's")
+    n_sectors: int | None = Field(None, ge=2, description="sectors of the whole; default: the deck's, -")
+    cut_faces: Pair | None = Field(None, description="sets of nodes or surfaces; default: the deck's, or found")
+
+    @property
+    def responses(self) -> Mapping[str, SetDirection]:
+        """Responses by name, that of the load if none is given. Raises SceneError where the table is empty."""
+        if self.response is None:
+            return {"load": self.load}
+        if not self.response:
+            raise SceneError(
+                "response", "an empty table", "give at least one {name = {set, direction}}, or leave it out"
+            )
+        return self.response

@@ -1,0 +1,80 @@
+"""The reduced model of a study's finite-element model, its mesh for pictures, and where it comes from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import metadata
+
+import numpy as np
+from pydantic import BaseModel
+
+from solver.model import LinearModel, ReducedModel
+from studies.fe_models.fe_model import ReductionOptions
+from studies.fe_models.fe_scene import FeScene, Progress, build_fe_scene, silent
+from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_model
+from studies.fe_models.from_files.parameters import Parameters
+from studies.fe_models.joint.surfaces import describe_mesh
+from studies.fe_models.mesh_files import read_mesh_file
+from studies.fe_models.model_files import ModelFiles, file_digest
+from studies.scene_answers import SurfaceMesh
+
+
+def checked(parameters: BaseModel) -> Parameters:
+    """Parameters of a finite-element model; TypeError where they belong to another scene."""
+    if not isinstance(parameters, Parameters):
+        raise TypeError(f"a finite-element model takes {Parameters.__module__}.Parameters, not {type(parameters)}")
+    return parameters
+
+
+def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
+    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see.
+
+    Raises SceneError where the files or parameters describe no possible joint.
+    """
+    own = checked(parameters)
+    return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
+
+
+def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
+    """Reduced model of a loaded one. Raises SceneError."""
+    options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
+    # A mean displacement and a force that is shared evenly have the same row: constant forces are reduced as responses.
+    joint, extra = loaded.joint, {f"preload {place}": each.motion for place, each in enumerate(loaded.preloads)}
+    joint = replace(joint, responses={**joint.responses, **extra})
+    scene = build_fe_scene(loaded.model, joint, options, n_harmonics, progress)
+    if not extra:
+        return scene
+    n_own = len(loaded.joint.responses)
+    forces = np.array([each.force for each in loaded.preloads])
+
+    def preloaded(k: int, linear: LinearModel) -> LinearModel:
+        own, others = linear.response[:n_own], linear.response[n_own:]
+        static = linear.load_static + (forces @ others.real if k == 0 else 0.0)
+        return replace(linear, response=own, load_static=static)
+
+    model = replace(
+        scene.model,
+        linear={k: preloaded(k, linear) for k, linear in scene.model.linear.items()},
+        response_names=scene.model.response_names[:n_own],
+    )
+    return replace(scene, model=model)
+
+
+def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
+    """Outer faces of the mesh. Raises SceneError."""
+    return describe_mesh(load_mesh(files, checked(parameters)))
+
+
+def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
+    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them.
+
+    Raises SceneError or OSError where a file cannot be read.
+    """
+    folder = files.mesh.parent
+    paths = (files.mesh, *(folder / name for name in read_mesh_file(files.mesh).included), *files.matrices)
+    listed = ", ".join(f"{path.name} sha256:{file_digest(path)}" for path in paths)
+    return {
+        "model_files": listed,
+        "model_units": checked(parameters).units,
+        "model_reduced_by": f"fretwear {metadata.version('fretwear')}",
+    }

@@ -1,0 +1,121 @@
+"""Which surfaces of a deck touch, which are glued, and with what friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.from_files.parameters import Parameters
+from studies.fe_models.from_files.selections import Selections
+from studies.fe_models.joint.pairing import ContactSurfaces
+from studies.fe_models.units import Units
+from studies.scene_error import SceneError
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """Two surfaces of the deck. tolerance: units of the file. friction_coefficient: None where there is none."""
+
+    names: tuple[str, str]
+    tolerance: float | None = None
+    friction_coefficient: float | None = None
+
+    def joins(self, names: tuple[str, str]) -> bool:
+        return set(self.names) == set(names)
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Surfaces in contact, at least one pair, and surfaces that are glued for good."""
+
+    contacts: tuple[ContactSurfaces, ...]
+    ties: tuple[ContactSurfaces, ...]
+
+
+def find_surfaces(selections: Selections, parameters: Parameters, units: Units) -> Surfaces:
+    """Pairs of surfaces that the study names, else those of CONTACT PAIR, else those of TIE; other ties stay glued.
+
+    Raises
+    ------
+    SceneError
+        Where there is no contact, a name is not known, or a pair has no friction coefficient.
+    """
+    deck = selections.deck
+    ties = [_Definition((tie.dependent, tie.independent), tie.tolerance) for tie in deck.ties if not tie.cyclic]
+    touching = [
+        _Definition((pair.dependent, pair.independent), None, pair.friction_coefficient) for pair in deck.contact_pairs
+    ]
+    if parameters.contact is not None:
+        chosen = [_known(_capital(names), [*touching, *ties]) for names in parameters.contact]
+    else:
+        chosen = touching or ties
+    if not chosen:
+        raise SceneError(
+            "contact",
+            f"{deck.path} has neither CONTACT PAIR nor TIE",
+            'give pairs of surfaces, as [["BLADES", "DISKS"]]',
+        )
+    friction = list(_friction(chosen, parameters, deck))
+    contacts = [
+        _surfaces(selections, definition, parameters, units, "contact", coefficient)
+        for definition, coefficient in zip(chosen, friction, strict=True)
+    ]
+    glued = [tie for tie in ties if not any(tie.joins(each.names) for each in chosen)]
+    return Surfaces(
+        tuple(contacts), tuple(_surfaces(selections, tie, parameters, units, "model", None) for tie in glued)
+    )
+
+
+def _capital(names: tuple[str, str]) -> tuple[str, str]:
+    return names[0].strip().upper(), names[1].strip().upper()
+
+
+def _known(names: tuple[str, str], definitions: list[_Definition]) -> _Definition:
+    """What the deck says of two surfaces, nothing but their names where it says nothing."""
+    return next((each for each in definitions if each.joins(names)), _Definition(names))
+
+
+def _surfaces(
+    selections: Selections,
+    definition: _Definition,
+    parameters: Parameters,
+    units: Units,
+    key: str,
+    friction_coefficient: float | None,
+) -> ContactSurfaces:
+    first, second = (selections.surface(name, key) for name in definition.names)
+    tolerance = parameters.tolerance
+    if tolerance is None and definition.tolerance is not None:
+        tolerance = definition.tolerance * units.length
+    return ContactSurfaces(first, second, tolerance, friction_coefficient, with_gaps=parameters.gaps)
+
+
+def _friction(chosen: list[_Definition], parameters: Parameters, deck: Deck) -> Iterator[float | None]:
+    """Friction coefficient of each contact; None of all where the study has one number."""
+    given = parameters.friction_coefficient
+    if isinstance(given, float | int):
+        yield from [None] * len(chosen)
+        return
+    named = {} if given is None else {name.strip().upper(): value for name, value in given.items()}
+    for name, value in named.items():
+        if not any(name in _labels(each) for each in chosen):
+            known = ", ".join(_labels(each)[-1] for each in chosen)
+            raise SceneError(f"friction_coefficient.{name}", "no contact has this name", f"give one of {known}")
+        if value < 0.0:
+            raise SceneError(f"friction_coefficient.{name}", f"{value}", "give 0 or more")
+    for each in chosen:
+        own = [named[label] for label in _labels(each) if label in named]
+        value_or_none = own[-1] if own else each.friction_coefficient
+        if value_or_none is None:
+            raise SceneError(
+                "friction_coefficient",
+                f"missing for {_labels(each)[-1]}",
+                f"give it, or *FRICTION for a CONTACT PAIR in {deck.path}",
+            )
+        yield value_or_none
+
+
+def _labels(definition: _Definition) -> tuple[str, str, str]:
+    first, second = definition.names
+    return first, second, f"{first}-{second}"
