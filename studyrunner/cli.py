@@ -7,6 +7,7 @@ import studyrunner.system.search_path  # noqa: F401 - where all others are looke
 # isort: split
 import argparse
 import os
+import resource
 import sys
 import time
 import traceback
@@ -260,7 +261,8 @@ def _show_plan(study: Study) -> int:
     from studyrunner.scene.scene import build_study_scene, describe_scene
 
     facts = describe_scene(build_study_scene(study, _SlowSteps().say))
-    print(format_plan(study, facts, build_tasks(study, facts.n_displacements)), flush=True)
+    built_with = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(format_plan(study, facts, build_tasks(study, facts.n_displacements), built_with), flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")

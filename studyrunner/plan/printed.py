@@ -22,8 +22,8 @@ from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE
 
 
-def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
-    """The plan of a study in lines for a reader."""
+def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float) -> str:
+    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene took."""
     marches = [task for line in plan.marches for task in line]
     n_tasks = len(plan.branches) + len(marches)
     n_values = _result_values(study, facts, plan.n_points)
@@ -38,7 +38,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan) -> str:
         "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
     ]
     size = n_values * 8 / 1e6
-    memory = memory_a_rank(plan.n_unknowns, n_values) / 1e9
+    memory = memory_a_rank(plan.n_unknowns, n_values, AUTO in study.harmonics, built_with) / 1e9
     rows = [
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),

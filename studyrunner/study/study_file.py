@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
 from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
+from studyrunner.study.names import nearest_name
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file, names_model
 from studyrunner.study.toml_text import read_toml, read_toml_file
@@ -90,7 +90,7 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     sections = dict(table)
     for name, section in sections.items():
         if name not in _SECTIONS:
-            raise UserError(source, name, section, f"unknown table, give {_nearest(name, _SECTIONS)}")
+            raise UserError(source, name, section, f"unknown table, give {nearest_name(name, _SECTIONS)}")
         if not isinstance(section, dict):
             raise UserError(source, name, section, f"give a table [{name}] with keys")
     for name in ("study", "scene", "axes"):
@@ -293,7 +293,7 @@ def _user_error(kind: type[BaseModel], details: ErrorDetails, source: str, prefi
     description = owner.model_fields[field].description if field in owner.model_fields else None
     unit = f" ({description})" if description else ""
     if details["type"] == "extra_forbidden":
-        return UserError(source, key, details["input"], f"unknown key, give {_nearest(field, owner.model_fields)}")
+        return UserError(source, key, details["input"], f"unknown key, give {nearest_name(field, owner.model_fields)}")
     if details["type"] == "missing":
         return UserError(source, key, None, f"missing: give it{unit}")
     cause = details.get("ctx", {}).get("error")
@@ -302,6 +302,9 @@ def _user_error(kind: type[BaseModel], details: ErrorDetails, source: str, prefi
     if isinstance(cause, SceneError):
         named = ".".join(filter(None, (prefix, cause.key)))
         return UserError(source, named or key, Verbatim(cause.value), cause.remedy + unit)
+    if isinstance(details["input"], list) and details["type"].endswith("_type") and prefix != "axes":
+        several = "give one value: only keys of [axes] have several, which keys of [solver] may be, too"
+        return UserError(source, key, details["input"], several + unit)
     message = details["msg"].removeprefix("Value error, ").replace("Input should be", "give").strip()
     return UserError(source, key, details["input"], message + unit)
 
@@ -314,12 +317,6 @@ def _owner(kind: type[BaseModel], place: Sequence[str]) -> tuple[type[BaseModel]
             return kind, place[:depth]
         kind = inner
     return kind, ()
-
-
-def _nearest(name: str, known: Mapping[str, object] | Sequence[str]) -> str:
-    """The known name that looks like `name`, or all of them."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return near[0] if near else "one of " + ", ".join(known)
 
 
 def _toml_key(key: str) -> str:

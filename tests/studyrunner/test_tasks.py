@@ -11,7 +11,7 @@ import pytest
 
 from solver.settings import SolverSettings
 from studyrunner.cli import main
-from studyrunner.plan.estimate import AUTOMATIC_HARMONICS
+from studyrunner.plan.estimate import AUTOMATIC_HARMONICS, memory_a_rank
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import TaskPlan, build_tasks
 from studyrunner.study.study import Study
@@ -225,3 +225,9 @@ def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines["time"].endswith("on two, if every point wears (rough)")
     assert "ms or less a step" in lines["assumed"]
     assert "GB a rank" in lines["memory"]
+
+
+def test_the_memory_of_a_rank_holds_building_its_scene() -> None:
+    for n_unknowns, automatic, measured in ((1584, True, 0.37e9), (5280, True, 1.6e9), (3360, False, 0.44e9)):
+        assert 1.0 / 1.5 < memory_a_rank(n_unknowns, 0, automatic, 0.0) / measured < 1.5
+    assert memory_a_rank(1584, 1000, False, 2.6e9) == 2.6e9 + 8000.0
