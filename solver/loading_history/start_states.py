@@ -114,7 +114,9 @@ def follow_branch(
             ),
         )
         started, counted = now, walks.n_iterations
-        if keep is not None and counted >= kept + LOADING.iterations_per_report and walks.walk is not None:
+        # a walk that has found no state to begin with has nothing to go on from
+        begun = walks.walk is not None and walks.walk.saved is not None
+        if keep is not None and begun and counted >= kept + LOADING.iterations_per_report:
             keep(pack((counted, walks.state_dict())))
             kept = counted
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
 
+from solver.loading_history import start_states
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
+from solver.packing import Packed
 from solver.results.history import PeriodicState
 from solver.settings import SolverSettings
 from solver.structure.penalty import build_penalty
@@ -246,3 +249,18 @@ def test_a_sweep_is_the_same_twice() -> None:
         assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
         assert np.array_equal(one.state.contact_force_h, other.state.contact_force_h)
         assert one.newton_iterations == other.newton_iterations
+
+
+def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
+    def in_vain(*given: Any) -> tuple[Outcome, None]:
+        given[-1].iterations += 1000
+        return Outcome.STATIC_FAILED, None
+
+    monkeypatch.setattr(start_states, "solve_first_state", in_vain)
+    kept: list[Packed] = []
+    frequencies = np.array([150.0, 160.0, 170.0])
+    found = dict(
+        follow_branch(scene("sdof_slider"), 0.3, 10.0, frequencies, "up", SolverSettings(3, 64), keep=kept.append)
+    )
+    assert [found[place].outcome for place in range(3)] == [Outcome.STATIC_FAILED] * 3
+    assert not kept
