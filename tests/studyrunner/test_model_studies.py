@@ -243,3 +243,67 @@ def test_matrices_of_calculix_give_the_scene_of_the_mesh(folder, capsys):
     assert "rotation_speed = 3000 rpm, the stiffness holds 4774.65 rpm" in message(
         "scene.matrices=sector", "scene.rotation_speed=3000"
     )
+
+
+PAIRS = """\
+*SURFACE INTERACTION,NAME=ROOT
+*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED
+1e13
+*FRICTION
+0.4,1e13
+*CONTACT PAIR,INTERACTION=ROOT,TYPE=SURFACE TO SURFACE
+"""
+TIE = "*TIE,NAME=GLUE,POSITION TOLERANCE=1e-4\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("*EQUATION,REMOVE ALL\n", "", "BLADES: 9 of 9 nodes have no dof in sector.dof (tied or fixed)"),
+        ("*STEP,PERTURBATION", "*STEP", "the deck spins at 500 rad/s, the stiffness holds 0"),
+        (TIE, PAIRS, "the stiffness couples BLADES and DISKS (1.6e+09 N/m)"),
+    ],
+)
+def test_what_is_wrong_with_an_export_is_said_in_a_sentence(old, new, expected, folder):
+    text = SECTOR.read_text()
+    assert old in text
+    (folder / "sector.inp").write_text(text.replace(old, new))
+    subprocess.run(["ccx", "-i", "sector"], check=True, capture_output=True, timeout=100)
+    assert expected in message("scene.matrices=sector")
+
+
+def test_pairs_that_are_too_far_apart_are_counted(folder):
+    lines = SECTOR.read_text().splitlines()
+    # the blade, three millimetres further out: the deck ties within a tenth of one
+    disk = {int(word) for word in _numbers(lines, "*ELEMENT,TYPE=C3D8,ELSET=DISK")}
+    for at, line in enumerate(lines[1:], start=1):
+        if line.startswith("*"):
+            break
+        number, x, y, z = line.split(",")
+        if int(number) not in disk:
+            lines[at] = f"{number},{float(x) + 3e-3!r},{y},{z}"
+    (folder / "sector.inp").write_text("\n".join(lines) + "\n")
+    assert "9 of 9 nodes of BLADES are farther than 0.0001 m from DISKS" in message()
+
+
+def _numbers(lines, keyword):
+    """Node numbers of the elements behind a keyword."""
+    begin = lines.index(keyword) + 1
+    for line in lines[begin:]:
+        if line.startswith("*"):
+            return
+        yield from line.split(",")[1:]
+
+
+def test_contact_pairs_give_the_scene_of_a_tie_and_their_friction(folder):
+    tied = scene_of()
+    text = SECTOR.read_text()
+    (folder / "sector.inp").write_text(text.replace(TIE, PAIRS))
+    touching = scene_of()
+    assert np.array_equal(touching.linear[0].stiffness, tied.linear[0].stiffness)
+    (folder / "wear.toml").write_text(STUDY.replace("friction_coefficient = 0.1\n", ""))
+    pairs = scene_of().contact.friction_coefficient
+    assert pairs is not None
+    assert (pairs == 0.4).all()
