@@ -7,7 +7,6 @@ import studyrunner.system.search_path  # noqa: F401 - where all others are looke
 # isort: split
 import argparse
 import os
-import resource
 import sys
 import time
 import traceback
@@ -256,12 +255,14 @@ def _follow(ranks: Ranks) -> int:
 
 
 def _show_plan(study: Study) -> int:
+    from studyrunner.plan.estimate import largest_memory
     from studyrunner.plan.printed import format_plan
     from studyrunner.plan.tasks import build_tasks
     from studyrunner.scene.scene import build_study_scene, describe_scene
 
+    before = largest_memory()
     facts = describe_scene(build_study_scene(study, _SlowSteps().say))
-    built_with = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    built_with = largest_memory() - before
     print(format_plan(study, facts, build_tasks(study, facts.n_displacements), built_with), flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough

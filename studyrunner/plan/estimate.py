@@ -7,6 +7,7 @@ slips takes no step at all.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 ITERATIONS_AT_FIRST = 400
 """For the walk to the first state of a branch: 1000 to 1400 iterations to a resonance, half of them with few harmonics
@@ -35,6 +36,7 @@ AUTOMATIC_HARMONICS_AT_MOST = 9
 """That the memory is to hold, beside those that they are compared with."""
 
 _BASE_MEMORY = 250e6
+_NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
 _MATRICES_A_RANK = 2
 
 
@@ -59,9 +61,22 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
     Measured 0.37 and 1.6 GB at 48 and 160 pairs with automatic harmonics, 0.44 and 1.04 GB at 160 and 336 with three:
     within a factor of 1.3.
 
-    n_unknowns: of the largest state. automatic: whether that is one of `AUTOMATIC_HARMONICS`. built_with: bytes that it
-    took to build the scene, which every rank does.
+    n_unknowns: of the largest state. automatic: whether that is one of `AUTOMATIC_HARMONICS`. built_with: bytes that
+    building the scene takes beside the libraries, which every rank does.
     """
     grown = (2.0 * AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
     solved = _BASE_MEMORY + _MATRICES_A_RANK * 8.0 * (grown * n_unknowns) ** 2
-    return max(solved, built_with) + 8.0 * result_values
+    built = _BASE_MEMORY + _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
+    return max(solved, built) + 8.0 * result_values
+
+
+def largest_memory() -> float:
+    """Memory that this process has had at most, bytes; 0 where the system does not say.
+
+    That of `getrusage` would be the largest one of the process that has started this one, too.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return 0.0
+    return next((1024.0 * float(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0.0)

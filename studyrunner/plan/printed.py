@@ -23,7 +23,7 @@ from studyrunner.variables import ASKED, KEPT, SCENE
 
 
 def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float) -> str:
-    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene took."""
+    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene takes."""
     marches = [task for line in plan.marches for task in line]
     n_tasks = len(plan.branches) + len(marches)
     n_values = _result_values(study, facts, plan.n_points)

@@ -109,3 +109,22 @@ def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang() -> None:
         [sys.executable, "-c", WRITER], cwd=ROOT, capture_output=True, text=True, timeout=200.0, check=False
     )
     assert ended.stdout == "closed\n", ended.stderr
+
+
+EARLY = """
+import os, signal, time
+from studyrunner.system.own_process import run_in_own_process
+
+fork = os.fork
+def interrupted_fork():
+    os.kill(os.getpid(), signal.SIGINT)
+    return fork()
+
+os.fork = interrupted_fork
+print(run_in_own_process(lambda: time.sleep(600) or 0))
+"""
+
+
+def test_a_signal_that_comes_before_the_other_process_is_there_is_handed_on() -> None:
+    ended = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, timeout=60, check=True)
+    assert ended.stdout == "1\n"

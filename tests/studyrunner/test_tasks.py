@@ -11,7 +11,7 @@ import pytest
 
 from solver.settings import SolverSettings
 from studyrunner.cli import main
-from studyrunner.plan.estimate import AUTOMATIC_HARMONICS, memory_a_rank
+from studyrunner.plan.estimate import AUTOMATIC_HARMONICS, largest_memory, memory_a_rank
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import TaskPlan, build_tasks
 from studyrunner.study.study import Study
@@ -230,4 +230,14 @@ def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_memory_of_a_rank_holds_building_its_scene() -> None:
     for n_unknowns, automatic, measured in ((1584, True, 0.37e9), (5280, True, 1.6e9), (3360, False, 0.44e9)):
         assert 1.0 / 1.5 < memory_a_rank(n_unknowns, 0, automatic, 0.0) / measured < 1.5
-    assert memory_a_rank(1584, 1000, False, 2.6e9) == 2.6e9 + 8000.0
+    small, large = (memory_a_rank(1584, 1000, False, built_with) for built_with in (3e7, 2.6e9))
+    assert small == memory_a_rank(1584, 1000, False, 0.0)
+    assert large == pytest.approx(small + 2.6e9, rel=0.03)
+
+
+def test_the_largest_memory_grows_with_what_is_held() -> None:
+    before = largest_memory()
+    assert before > 1e7
+    held = b"1" * int(before + 2e8)
+    assert largest_memory() >= before + 1e8
+    assert held.endswith(b"1")
