@@ -117,7 +117,7 @@ from studyrunner.system.own_process import run_in_own_process
 
 fork = os.fork
 def interrupted_fork():
-    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getpid(), signal.SIGTERM)
     return fork()
 
 os.fork = interrupted_fork

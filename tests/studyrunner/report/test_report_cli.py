@@ -108,6 +108,8 @@ def test_an_interrupt_is_one_line(
 
 APART = """
 import ctypes, os, signal, sys, time
+# in the background of a shell it is ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from studyrunner.report import gallery
 from studyrunner.report.cli import main
 gallery.draw_report = lambda _: {}
