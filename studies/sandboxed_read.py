@@ -107,7 +107,7 @@ def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = 
 
     seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
     if path.is_file():
-        seconds += min(path.stat().st_size, 2**30) // _BYTES_A_SECOND
+        seconds += min(path.stat().st_size, 2**31) // _BYTES_A_SECOND
     for what, limit in (
         (resource.RLIMIT_AS, LARGEST_MEMORY),
         (resource.RLIMIT_CPU, seconds),

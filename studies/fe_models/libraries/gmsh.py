@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,16 +65,16 @@ def read_arrays(path: Path) -> Arrays:
     )
 
 
-def _groups(mesh: object, place: int, n_cells: int) -> list[tuple[str, IntArray]]:
+def _groups(mesh: Any, place: int, n_cells: int) -> list[tuple[str, IntArray]]:
     """Named groups that cells of a block belong to, and which of its cells."""
     found: list[tuple[str, IntArray]] = []
-    cells = mesh.cells[place]  # type: ignore[attr-defined]
-    for name, (tag, dimension) in mesh.field_data.items():  # type: ignore[attr-defined]
-        if name in mesh.cell_sets:  # type: ignore[attr-defined]
-            members = mesh.cell_sets[name][place]  # type: ignore[attr-defined]
+    cells = mesh.cells[place]
+    for name, (tag, dimension) in mesh.field_data.items():
+        if name in mesh.cell_sets:
+            members = mesh.cell_sets[name][place]
             members = np.empty(0) if members is None else members
-        elif cells.dim == dimension and "gmsh:physical" in mesh.cell_data:  # type: ignore[attr-defined]
-            members = np.flatnonzero(mesh.cell_data["gmsh:physical"][place] == tag)  # type: ignore[attr-defined]
+        elif cells.dim == dimension and "gmsh:physical" in mesh.cell_data:
+            members = np.flatnonzero(mesh.cell_data["gmsh:physical"][place] == tag)
         else:
             continue
         members = np.asarray(members, dtype=np.int64)
