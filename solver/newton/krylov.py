@@ -83,20 +83,46 @@ def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, 
     return solution, norms[-1] <= rtol * size
 
 
-def ritz_values(product: Product, start: FloatArray, most: int) -> ComplexArray:
-    """Ritz values (k,), k <= `most`, of a real operator after k products of Arnoldi's method from `start` (n,)."""
+def ritz_values(
+    product: Product, start: FloatArray, most: int, enough: Callable[[ComplexArray, FloatArray], bool] | None = None
+) -> tuple[ComplexArray, FloatArray]:
+    """Ritz values of a real operator by Arnoldi's method; outliers of the spectrum are found first.
+
+    Parameters
+    ----------
+    product : callable
+        The operator applied to a vector (n,).
+    start : array (n,)
+        Vector to begin with.
+    most : int
+        Products.
+    enough : callable, optional
+        Whether values and residuals will do; asked every few products. By default the end is after `most`.
+
+    Returns
+    -------
+    values : array (k,)
+        k is the number of products, or less where the space ended before; NaN where the operator overflows.
+    residuals : array (k,)
+        Norms of `A x - value x` for their vectors of norm 1.
+    """
     size = min(most, start.size)
     basis = np.zeros((size + 1, start.size))
     projected = np.zeros((size + 1, size))
     basis[0] = start / np.linalg.norm(start)
-    for k in range(size):
-        projected[: k + 2, k], lost = _extend(basis, k, product(basis[k]))
-        if lost:
-            size = k + 1
+    values, residuals = np.empty(0, complex), np.empty(0)
+    for k in range(1, size + 1):
+        projected[: k + 1, k - 1], lost = _extend(basis, k - 1, product(basis[k - 1]))
+        if not np.all(np.isfinite(projected)):
+            return np.full(k, np.nan, complex), np.full(k, np.nan)
+        look = enough is not None and k >= NEWTON.sign_products and k % NEWTON.sign_check == 0
+        if not (lost or look or k == size):
+            continue
+        found, vectors = np.linalg.eig(projected[:k, :k])
+        values, residuals = found.astype(complex), (0.0 if lost else projected[k, k - 1]) * np.abs(vectors[-1])
+        if lost or (enough is not None and enough(values, residuals)):
             break
-    if not np.all(np.isfinite(projected)):
-        return np.full(size, np.nan, complex)
-    return np.linalg.eigvals(projected[:size, :size]).astype(complex)
+    return values, residuals
 
 
 def _extend(basis: FloatArray, k: int, image: FloatArray) -> tuple[FloatArray, bool]:

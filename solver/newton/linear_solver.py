@@ -15,7 +15,7 @@ from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import ritz_values, solve_gmres
 from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import PeriodFactor
-from solver.newton.preconditioner import Factor, SignedFactor, build_factor, build_signed_factor
+from solver.newton.preconditioner import Factor, build_factor
 from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
 
 
@@ -39,7 +39,7 @@ class JacobianSolver:
         # the columns of all other unknowns are those of the identity
         rest = np.ones(right.shape[0], bool)
         rest[rows] = False
-        step[rest] = (right - tangent.apply(step))[rest]
+        step[rest] = (right - tangent.apply_roughly(step))[rest]
         return step
 
     def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -56,7 +56,7 @@ class JacobianSolver:
             step[rows] = column.reshape(rows.size, -1)
             rest = np.ones(right.shape[0], bool)
             rest[rows] = False
-            step[rest] = (right - tangent.apply(step))[rest]
+            step[rest] = (right - tangent.apply_roughly(step))[rest]
             steps.append(step)
         return steps[0], steps[1]
 
@@ -64,42 +64,37 @@ class JacobianSolver:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
         Where the slip space is large it is the sign of the kept factorisation P times (-1)^k, k the number of real
-        negative eigenvalues of J P^-1. Most of these are near 1, and Arnoldi's method finds the outliers first: where
-        none is near or below zero k = 0, else the whole slip space is factorised. Where that is too large, k is counted
-        among the eigenvalues found.
+        negative eigenvalues of J P^-1. Most of these are near 1, and Arnoldi's method finds the outliers first. Where
+        they do not settle, a factorisation of this Jacobian takes the place of the kept one; where they still do not,
+        the whole slip space is factorised, unless it is too large.
         """
-        factor = self._factor
-        if (
-            factor is None
-            or isinstance(factor, PeriodFactor)
-            or factor.exact
-            or not np.isin(tangent.active(), factor.pairs).all()
-        ):
-            kept, factor = factor, build_signed_factor(tangent, tangent.active())
-            # the march has no determinant, but is the better preconditioner
-            self._factor = kept if isinstance(kept, PeriodFactor) else factor
-            if factor.exact:
-                return factor.sign
-        values = self._eigenvalues(factor, tangent, tangent.joint.basis.synthesis.shape[0])
-        if np.all(np.isfinite(values)) and values.real.min() > NEWTON.certain_real_part:
+        kept, active = self._factor, tangent.active()
+        if kept is not None and not kept.exact and np.isin(active, kept.pairs).all():
+            sign, settled = self._judge(kept, tangent)
+            if settled:
+                return sign
+        factor = self._factor = build_factor(tangent, active)
+        if factor.exact:
             return factor.sign
-        whole = find_slip_space(tangent, NEWTON.sign_directions, 0, 0.0)
-        if whole is not None:
-            return build_slip_factor(tangent, whole).sign
-        # complex ones come in pairs of one real part and do not change the sign
-        return factor.sign * float((-1) ** np.count_nonzero(values.real < 0.0))
+        sign, settled = self._judge(factor, tangent)
+        whole = None if settled else find_slip_space(tangent, NEWTON.sign_directions, 0, 0.0)
+        return sign if whole is None else build_slip_factor(tangent, whole).sign
 
-    def _eigenvalues(self, factor: SignedFactor, tangent: Linearisation, m: int) -> ComplexArray:
-        """Outlying eigenvalues of J P^-1."""
-        full = np.zeros((tangent.joint.component_index.size, m))
+    def _judge(self, factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
+        """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these have settled."""
+        full = np.zeros((tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]))
+        shape = factor.rows.size, full.shape[1]
 
         def product(vector: FloatArray) -> FloatArray:
-            full[factor.rows] = factor.solve(vector.reshape(factor.rows.size, m))
-            return tangent.apply(full)[factor.rows].ravel()
+            full[factor.rows] = factor.solve(vector.reshape(shape))
+            return tangent.apply_roughly(full)[factor.rows].ravel()
 
         # a fixed start: the answer must not depend on what was computed before
-        start = np.random.default_rng(0).normal(size=factor.rows.size * m)
-        return ritz_values(product, start, NEWTON.sign_products)
+        start = np.random.default_rng(0).normal(size=factor.rows.size * full.shape[1])
+        values, residuals = ritz_values(product, start, NEWTON.most_sign_products, _settled)
+        # complex ones come in pairs of one real part and do not change the sign
+        negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
+        return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
     def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
         if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
@@ -144,11 +139,17 @@ class JacobianSolver:
 
         def product(vector: FloatArray) -> FloatArray:
             full[rows] = precondition(vector)
-            return tangent.apply(full, roughly=True)[rows].ravel()
+            return tangent.apply_roughly(full)[rows].ravel()
 
         # preconditioned from the right, so that the residual that GMRES watches is the true one
         solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts)
         return precondition(solution), found
+
+
+def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
+    """Whether it is certain which eigenvalues are negative, from Ritz values and their residuals."""
+    doubtful = ~(values.real >= NEWTON.certain_real_part)
+    return bool(np.all((residuals < NEWTON.settled * np.abs(values))[doubtful]))
 
 
 def _most_products(factor: Factor) -> int:

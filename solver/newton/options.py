@@ -35,10 +35,16 @@ class NewtonOptions:
     """Singular value over the largest one: directions below it are left out of a solution that does not converge."""
     round_off: float = 1e-11
     """Of a vector, or of a pair that slips: less is no new direction. Double precision has 2e-16."""
-    sign_products: int = 24
-    """Products of Arnoldi's method from which the sign of a determinant is judged."""
+    sign_products: int = 16
+    """Products of Arnoldi's method from which on the sign of a determinant is judged."""
+    sign_check: int = 4
+    """Products between two looks at the eigenvalues."""
+    most_sign_products: int = 64
+    """Products after which the eigenvalues are given up. At 160 pairs 32 settle those that lie at 0.01."""
     certain_real_part: float = 0.15
     """Of the eigenvalues, 1 where the factorisation is exact: above it they are certainly positive."""
+    settled: float = 0.1
+    """Residual of an eigenvalue over its modulus below which its sign is known."""
 
     # which factorisation
     dense_unknowns: int = 250

@@ -8,10 +8,12 @@ were one real stiffness Z in all harmonics, this would hold sample by sample,
 
 with A and B the derivatives of the contact law at a sample, blocks of the pairs; B is the history. So
 
-    [1 + (Z / eps - 1) A(t)] dp(t) = r(t) - (Z / eps - 1) B(t) dx(t - 1)
+    dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
-is solved by a march with one small system a sample, whatever the number of harmonics that the pairs couple, and costs
-less than one factorisation in harmonics. The stiffness of an elastic joint hardly changes with the harmonic, except for
+is a march with one small system a sample, whatever the number of harmonics that the pairs couple. A is zero where a
+pair sticks and closed: the system has the rows of those alone that slip or are open at the sample, and the state does
+not change but where a pair does so at some sample. `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. The
+stiffness of an elastic joint hardly changes with the harmonic, except for
 resonances of the structure behind it: each adds a term of rank two, `U V^T`, to the harmonics that are near it. With T
 the march to `dp` and T_x that to `dx`, the Woodbury identity
 
@@ -23,6 +25,8 @@ accounts for them. The truncation of the series is neglected: its effect is smal
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
 
 import numpy as np
 from numba import njit
@@ -30,51 +34,86 @@ from numba import njit
 from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
-from solver.newton.options import NEWTON
+from solver.newton.options import NEWTON, NewtonOptions
+from solver.structure.condensation import CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
-from solver.structure.harmonic_stiffness import SingleArray
+from solver.structure.identity import Identity
 from solver.structure.joint import Joint
+from solver.structure.rough_forms import SingleArray
 
 
 @dataclass(frozen=True)
 class SampleMarch:
-    """Matrices of the march through N samples; n = 3 n_contact, with identity rows where a pair has no displacement.
+    """Matrices of the march through N samples, for the n pairs that slip or are open at one of them.
 
-    inverse (N, n, n): of `1 + (Z / eps - 1) A`. coupling (n, n): `Z / eps - 1`. own (N, n_contact, 3, 3): A. carried
-    (N, n_contact, 2, 2): B.
+    pairs (n,). own (N, n, 3, 3), carried (N, n, 2, 2): A, B. coupling (n_rel, 3n): `Z / eps - 1`; columns of
+    displacements that a pair does not have are zero. row (k,): those of A that are not zero at a sample, `3 place +
+    component` with the place among `pairs`, sample by sample. first (N + 1,): where the rows of a sample begin.
+    swept (2 n k,): `A (Z / eps - 1)`, these rows, tangential columns. inverse: of `1 + A (Z / eps - 1)` in these rows
+    and columns, one sample after the other, which begin at `inverse_first` (N + 1,).
     """
 
     joint: Joint
     basis: FourierBasis
-    inverse: SingleArray
-    coupling: SingleArray
+    pairs: IntArray
     own: FloatArray
     carried: FloatArray
+    coupling: FloatArray
+    row: IntArray
+    first: IntArray
+    swept: SingleArray
+    inverse: SingleArray
+    inverse_first: IntArray
+
+    @property
+    def sign(self) -> float:
+        """Sign of the product of the determinants of all samples' systems."""
+        ends = zip(self.inverse_first[:-1], self.inverse_first[1:], np.diff(self.first), strict=True)
+        systems = (self.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
+        return float(np.prod([np.linalg.slogdet(system)[0] for system in systems]))
 
     def solve(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Step `T r` and change of the state `T_x r` (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
-        spread = self.joint.to_pairs(right).reshape(-1, right.shape[1])
-        right_t = np.ascontiguousarray((spread @ self.basis.synthesis).T, np.float32)
-        both_t = march_samples(self.inverse, self.coupling, self.own, self.carried, right_t, NEWTON.march_periods)
-        step, state = (
-            self.joint.to_relative((part_t.T @ self.basis.analysis).reshape(-1, 3, right.shape[1])) for part_t in both_t
+        spread = self.joint.to_pairs(right)
+        if not self.pairs.size:
+            return right.copy(), np.zeros_like(right)
+        right_t = (spread[self.pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
+        state_t = march_samples(
+            np.ascontiguousarray(right_t),
+            *(self.own, self.carried, self.row, self.first, self.swept, self.inverse, self.inverse_first),
+            NEWTON.march_periods,
         )
-        return step, state
+        state = state_t.T @ self.basis.analysis
+        spread[:] = 0.0
+        spread[self.pairs] = state.reshape(-1, 3, right.shape[1])
+        return right - self.coupling @ state, self.joint.to_relative(spread)
 
 
 @dataclass(frozen=True)
 class PeriodFactor:
     """The march, and k directions in which the harmonics differ.
 
-    seen (k, n_rel (2H+1)): `V^T`. bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`. pairs, rows: all of the joint.
+    seen (k, n_rel (2H+1)): `V^T`. bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`. resonance (k, k): the matrix in
+    brackets. pairs, rows: all of the joint.
     """
 
     march: SampleMarch
     seen: FloatArray
     bent: FloatArray
+    resonance: FloatArray
     pairs: IntArray
     rows: IntArray
     exact: bool = False
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of its inverse, 0 where that is singular.
+
+        The march through one period is a product of the samples' systems, and its start, which is that of a second
+        period, does not change the determinant. That the harmonics left out do not change its sign is not known: the
+        eigenvalues of the Jacobian times this tell.
+        """
+        return self.march.sign * float(np.linalg.slogdet(self.resonance)[0])
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
@@ -92,10 +131,12 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         added, seen = resonances(joint)
         both = [march.solve(column.reshape(joint.component_index.size, -1)) for column in added]
         steps, states = (np.reshape([part[place] for part in both], added.shape).T for place in (0, 1))
-        bent = np.linalg.solve((np.eye(len(seen)) + seen @ states).T, steps.T).T
+        resonance = np.eye(len(seen)) + seen @ states
+        bent = np.linalg.solve(resonance.T, steps.T).T
     except np.linalg.LinAlgError:
         return None
-    return PeriodFactor(march, seen, bent, np.arange(joint.contact.n_contact), np.arange(joint.component_index.size))
+    every = np.arange(joint.contact.n_contact), np.arange(joint.component_index.size)
+    return PeriodFactor(march, seen, bent, resonance, *every)
 
 
 def build_march(tangent: Linearisation) -> SampleMarch:
@@ -109,19 +150,34 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     own, carried = sample_tangents(
         at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
     )
-    n_contact, size = joint.contact.n_contact, 3 * joint.contact.n_contact
-    coupling = np.zeros((size, size))
-    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
-    coupling[joint.component_index, joint.component_index] -= 1.0
-    blocks = np.ascontiguousarray(coupling.reshape(size, n_contact, 3).transpose(1, 0, 2))
-    # in single precision: the matrices are read from memory at every solve, and this is only a preconditioner
-    matrix = np.empty((n_samples, size, size), np.float32)
-    for sample in range(n_samples):
-        matrix[sample] = np.matmul(blocks, own[sample]).transpose(1, 0, 2).reshape(size, size)
-    matrix[:, np.arange(size), np.arange(size)] += 1.0
+    pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
+    own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
+    size, components = joint.component_index.size, (3 * pairs[:, None] + np.arange(3)).ravel()
+    whole = np.zeros((size, 3 * joint.contact.n_contact))
+    whole[:, joint.component_index] = stiffness_of_most(joint) / joint.relative_penalty
+    whole[np.arange(size), joint.component_index] -= 1.0
+    coupling = np.ascontiguousarray(whole[:, components])
+    # rows of displacements that a pair does not have are zero, as their columns
+    square = np.zeros((3 * joint.contact.n_contact, components.size))
+    square[joint.component_index] = coupling
+    blocks = square[components].reshape(pairs.size, 3, components.size)
+    tangential = np.flatnonzero(np.arange(components.size) % 3)
+    rows, swept, inverse = [], [], []
+    for sample in own:
+        row = np.flatnonzero(sample.any(axis=2))
+        product = np.matmul(sample.reshape(-1, 1, 3)[row], blocks[row // 3])[:, 0]
+        matrix = product[:, row]
+        matrix[np.diag_indices(row.size)] += 1.0
+        # in single precision: the matrices are read from memory at every solve, and this is only a preconditioner
+        inverse.append(np.linalg.inv(matrix.astype(np.float32)).ravel())
+        swept.append(product[:, tangential].astype(np.float32).ravel())
+        rows.append(row)
+    sizes = np.array([row.size for row in rows])
+    first, inverse_first = (np.concatenate([[0], np.cumsum(part)]) for part in (sizes, sizes**2))
     basis = build_basis(joint.basis.orders, n_samples)
-    inverse = np.asarray(np.linalg.inv(matrix), np.float32)
-    return SampleMarch(joint, basis, inverse, coupling.astype(np.float32), own, carried)
+    flat = (np.concatenate(part) for part in (rows, swept, inverse))
+    row, all_swept, all_inverse = flat
+    return SampleMarch(joint, basis, pairs, own, carried, coupling, row, first, all_swept, all_inverse, inverse_first)
 
 
 def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
@@ -135,17 +191,36 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
     added, seen : array (k, n_rel (2H+1))
         Rows of `U^T` and `V^T`, dimensionless.
     """
-    structure, n_rel, m = joint.structure, joint.component_index.size, joint.basis.synthesis.shape[0]
-    most, penalty = stiffness_of_most(joint), joint.relative_penalty
-    added, seen = [], []
+    return _resonances(Identity(joint.structure), joint.relative_penalty.tobytes(), NEWTON)
+
+
+def stiffness_of_most(joint: Joint) -> FloatArray:
+    """Real stiffness (n_rel, n_rel), N/m, of most harmonics: the median ignores those near a resonance."""
+    return _stiffness_of_most(Identity(joint.structure))
+
+
+# a march asks for those of one structure again and again
+@lru_cache(maxsize=2)
+def _stiffness_of_most(of: Identity) -> FloatArray:
+    structure = cast("CondensedStructure", of.objects[0])
+    return np.asarray(
+        np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
+    )
+
+
+@lru_cache(maxsize=2)
+def _resonances(of: Identity, relative_penalty: bytes, options: NewtonOptions) -> tuple[FloatArray, FloatArray]:
+    structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
+    n_rel, m = penalty.size, 2 * structure.n_harmonics + 1
+    most, added, seen = _stiffness_of_most(of), [], []
     for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
         change = (stiffness - most) / penalty
-        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(NEWTON.resonances, n_rel)))
-        for _ in range(NEWTON.power_iterations):
+        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(options.resonances, n_rel)))
+        for _ in range(options.power_iterations):
             image = change @ (change.conj().T @ np.linalg.qr(image)[0])
         basis = np.linalg.qr(image)[0]
         left, size, right = np.linalg.svd(basis.conj().T @ change, full_matrices=False)
-        for direction in np.flatnonzero(size > NEWTON.resonant_difference):
+        for direction in np.flatnonzero(size > options.resonant_difference):
             force, motion = size[direction] * (basis @ left[:, direction]), right[direction]
             both = np.zeros((2, 2, n_rel, m))
             if place == 0:
@@ -161,58 +236,67 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
     return np.reshape(added, shape), np.reshape(seen, shape)
 
 
-def stiffness_of_most(joint: Joint) -> FloatArray:
-    """Real stiffness (n_rel, n_rel), N/m, of most harmonics: the median ignores those near a resonance."""
-    structure = joint.structure
-    return np.asarray(
-        np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
-    )
-
-
 @njit(cache=True)
 def march_samples(
-    inverse: SingleArray,
-    coupling: SingleArray,
+    right_t: FloatArray,
     own: FloatArray,
     carried: FloatArray,
-    right_t: SingleArray,
+    row: IntArray,
+    first: IntArray,
+    swept: SingleArray,
+    inverse: SingleArray,
+    inverse_first: IntArray,
     periods: int,
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     """March through the samples of some periods, without any change of the state before the first one.
 
     Parameters
     ----------
-    inverse, coupling, own, carried : array
+    right_t : array (N, 3n)
+        Right-hand sides at the pairs of the march.
+    own, carried, row, first, swept, inverse, inverse_first : array
         As in `SampleMarch`.
-    right_t : array (N, n)
-        Right-hand sides.
     periods : int
         Times that the period is marched through; the last one counts.
 
     Returns
     -------
-    step_t, state_t : array (N, n)
-        Steps of the predicted force and changes of the state.
+    array (N, 3n)
+        Changes of the state.
     """
     n_samples, size = right_t.shape
-    n_contact = size // 3
-    step_t, state_t = np.zeros((n_samples, size)), np.zeros((n_samples, size))
-    state, before = np.zeros((n_contact, 2)), np.zeros(size, right_t.dtype)
+    n_pairs = size // 3
+    state_t = np.zeros((n_samples, size))
+    before = np.zeros(2 * n_pairs, inverse.dtype)
+    after = np.zeros((n_pairs, 2))
+    pushed = np.zeros(size, inverse.dtype)
     for _ in range(periods):
         for n in range(n_samples):
-            for pair in range(n_contact):
+            begin, end = first[n], first[n + 1]
+            n_rows = end - begin
+            for pair in range(n_pairs):
                 for i in range(2):
-                    before[3 * pair + 1 + i] = (
-                        carried[n, pair, i, 0] * state[pair, 0] + carried[n, pair, i, 1] * state[pair, 1]
-                    )
-            step = np.dot(inverse[n], right_t[n] - np.dot(coupling, before))
-            for pair in range(n_contact):
-                for i in range(3):
-                    changed = before[3 * pair + i]
+                    left = carried[n, pair, i, 0] * after[pair, 0] + carried[n, pair, i, 1] * after[pair, 1]
+                    before[2 * pair + i] = left
+                    state_t[n, 3 * pair + 1 + i] = left
+            if n_rows > 0:
+                matrix = swept[2 * n_pairs * begin : 2 * n_pairs * end].reshape(n_rows, 2 * n_pairs)
+                held = np.dot(matrix, before)
+                for place in range(n_rows):
+                    pair, i = row[begin + place] // 3, row[begin + place] % 3
+                    total = 0.0
                     for k in range(3):
-                        changed += own[n, pair, i, k] * step[3 * pair + k]
-                    state_t[n, 3 * pair + i] = changed
-                    if i > 0:
-                        state[pair, i - 1] = changed
-            step_t[n] = step
-    return step_t, state_t
+                        total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
+                    pushed[place] = total - held[place]
+                small = inverse[inverse_first[n] : inverse_first[n + 1]].reshape(n_rows, n_rows)
+                change = np.dot(small, pushed[:n_rows])
+                for place in range(n_rows):
+                    where = row[begin + place]
+                    if where % 3 == 0:
+                        state_t[n, where] = change[place]
+                    else:
+                        state_t[n, where] += change[place]
+            for pair in range(n_pairs):
+                for i in range(2):
+                    after[pair, i] = state_t[n, 3 * pair + 1 + i]
+    return state_t

@@ -22,7 +22,6 @@ from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
 from solver.newton.slip_preconditioner import (
     SlipFactor,
-    SlipSpace,
     build_slip_factor,
     find_slip_space,
     sign_of,
@@ -64,28 +63,20 @@ class HarmonicFactor:
         return solved
 
 
-SignedFactor = SlipFactor | HarmonicFactor
-Factor = SignedFactor | PeriodFactor
+Factor = SlipFactor | PeriodFactor | HarmonicFactor
 
 
 def build_factor(tangent: Linearisation, pairs: IntArray) -> Factor:
     """Factorisation of a Jacobian whose pairs other than `pairs` do not depend on their predicted force."""
-    space = _slip_space(tangent)
-    if space is not None:
-        return build_slip_factor(tangent, space)
-    return build_period_factor(tangent) or build_harmonic_factor(tangent, pairs)
-
-
-def build_signed_factor(tangent: Linearisation, pairs: IntArray) -> SignedFactor:
-    """The same, by a factorisation that has the sign of its determinant."""
-    space = _slip_space(tangent)
-    return build_harmonic_factor(tangent, pairs) if space is None else build_slip_factor(tangent, space)
-
-
-def _slip_space(tangent: Linearisation) -> SlipSpace | None:
     few = tangent.joint.component_index.size <= NEWTON.small_joint_displacements
     exact = NEWTON.exact_directions_of_few if few else NEWTON.exact_directions
-    return find_slip_space(tangent, exact, NEWTON.partial_directions, NEWTON.partial_cutoff)
+    space = find_slip_space(tangent, exact, 0, 0.0)
+    found = None if space is not None else build_period_factor(tangent)
+    if found is not None:
+        return found
+    # masses on sliders: the march does not apply
+    space = space or find_slip_space(tangent, exact, NEWTON.partial_directions, NEWTON.partial_cutoff)
+    return build_harmonic_factor(tangent, pairs) if space is None else build_slip_factor(tangent, space)
 
 
 def build_harmonic_factor(tangent: Linearisation, pairs: IntArray) -> HarmonicFactor:

@@ -62,7 +62,7 @@ class CondensedStructure:
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
-        """The same to six digits at least, in less time."""
+        """The same to three digits at least, in less time."""
         force = self.moving.apply_roughly(displacement_h)
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
 

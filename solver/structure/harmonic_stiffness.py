@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import to_complex
-
-SingleArray = NDArray[np.float32]
+from solver.structure.options import STRUCTURE
+from solver.structure.rough_forms import RoughForms, SingleArray, rough_forms
 
 
 class HarmonicStiffness(Protocol):
@@ -26,7 +26,7 @@ class HarmonicStiffness(Protocol):
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
 
     def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
-        """The same to six digits at least, in less time: for directions of Newton's method, not for its residual."""
+        """The same to three digits at least, in less time: for directions of Newton's method, not for its residual."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,16 @@ class DenseStiffness:
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
-    apply_roughly = apply
+    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
+        """As in HarmonicStiffness: in single precision where the matrices do not stay in the cache."""
+        if self.dense.nbytes <= STRUCTURE.dense_bytes:
+            return self.apply(displacement_h)
+        moving = np.ascontiguousarray(to_complex(displacement_h).T, np.complex64)[:, :, None]
+        return np.matmul(self._single, moving)[:, :, 0].T.astype(complex)
+
+    @cached_property
+    def _single(self) -> NDArray[np.complex64]:
+        return self.dense.astype(np.complex64)
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ class SharedStiffness:
     A product takes three real ones for all harmonics at once and is bound by reading 3 n_rel^2 numbers, whatever H.
 
     n_rel: of the joint. rates (H,): n w, rad/s. columns (3, n, n_rel): columns r of K, M, C, rows r before rows i.
-    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N.
+    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. rough: of the same structure.
     """
 
     n_rel: int
@@ -62,6 +71,7 @@ class SharedStiffness:
     columns: FloatArray
     back: FloatArray
     held_compliance: ComplexArray
+    rough: RoughForms
 
     @cached_property
     def dense(self) -> ComplexArray:
@@ -77,36 +87,49 @@ class SharedStiffness:
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in HarmonicStiffness."""
-        return self._apply(displacement_h, self.columns, self.back)
+        forces = self._combine(*_products(self.columns, displacement_h[:, 1:]))
+        return forces[: self.n_rel] - self._combine(*_products(self.back, self._behind(forces[self.n_rel :])))
 
     def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness: the matrices are read in single precision, which is what takes the time."""
-        return self._apply(displacement_h, *self._single)
+        """As in HarmonicStiffness, by `RoughForms`."""
+        # displacements of the order of 1e-6 m and stiffnesses of 1e9 N/m are far within the range
+        moving = displacement_h[:, 1:].astype(np.float32)
+        forces = self._combine(*self.rough.apply(moving, self.rates))
+        behind = self._behind(self._combine(*_products(self._single[0], moving)))
+        return forces - self._combine(*_products(self._single[1], behind.astype(np.float32)))
 
     @cached_property
     def _single(self) -> tuple[SingleArray, SingleArray]:
-        return self.columns.astype(np.float32), self.back.astype(np.float32)
+        return self.columns[:, self.n_rel :].astype(np.float32), self.back.astype(np.float32)
 
-    def _apply(
-        self, displacement_h: FloatArray, columns: FloatArray | SingleArray, back: FloatArray | SingleArray
-    ) -> ComplexArray:
-        forces = self._combine(columns, displacement_h[:, 1:])
-        behind = np.matmul(self.held_compliance, forces[self.n_rel :].T[:, :, None])[:, :, 0].T
+    def _behind(self, forces: ComplexArray) -> FloatArray:
+        """Harmonics cosine, sine, ... (n_i, 2H) of `A_ii^-1 f` from f (n_i, H)."""
+        behind = np.matmul(self.held_compliance, forces.T[:, :, None])[:, :, 0].T
         parts = np.empty((behind.shape[0], 2 * self.rates.size))
         parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
-        return forces[: self.n_rel] - self._combine(back, parts)
+        return parts
 
-    def _combine(self, forms: FloatArray | SingleArray, moving: FloatArray) -> ComplexArray:
-        """`(K + i n w C - (n w)^2 M) u` (rows, H) from K, M, C (3, rows, k) and harmonics cosine, sine, ... (k, 2H)."""
-        n_rows = forms.shape[1]
-        if forms.dtype == np.float32:
-            # displacements of the order of 1e-6 m and stiffnesses of 1e9 N/m are far within its range
-            moving = moving.astype(np.float32)
-        parts = (forms.reshape(3 * n_rows, -1) @ moving).reshape(3, n_rows, -1, 2).astype(np.float64, copy=False)
-        spring = parts[0] - self.rates[:, None] ** 2 * parts[1]
-        drag = self.rates[:, None] * parts[2]
+    def _combine(
+        self,
+        by_stiffness: FloatArray | SingleArray,
+        by_mass: FloatArray | SingleArray,
+        by_damping: FloatArray | SingleArray,
+    ) -> ComplexArray:
+        """`(K + i n w C - (n w)^2 M) u` (rows, H) from `K u`, `M u`, `C u`, harmonics cosine, sine, ... (rows, 2H)."""
+        spring, inertia, drag = (
+            part.astype(np.float64, copy=False).reshape(part.shape[0], -1, 2)
+            for part in (by_stiffness, by_mass, by_damping)
+        )
+        spring = spring - self.rates[:, None] ** 2 * inertia
+        drag = self.rates[:, None] * drag
         # i (cosine - i sine) = sine + i cosine
         return cast("ComplexArray", spring[..., 0] + drag[..., 1] - 1j * (spring[..., 1] - drag[..., 0]))
+
+
+def _products(forms: FloatArray | SingleArray, moving: FloatArray | SingleArray) -> FloatArray | SingleArray:
+    """`K u`, `M u`, `C u` (3, rows, k) of one type, in one product."""
+    _, n_rows, n_columns = forms.shape
+    return cast("FloatArray | SingleArray", (forms.reshape(-1, n_columns) @ moving).reshape(3, n_rows, -1))
 
 
 def share_matrices(
@@ -121,4 +144,5 @@ def share_matrices(
         np.stack([part[every[:, None], relative] for part in parts]),
         np.stack([part[relative[:, None], internal] for part in parts]),
         held_compliance,
+        rough_forms(linear, relative),
     )

@@ -15,6 +15,10 @@ class StructureOptions:
     dense_bytes: float = 2e6
     """Matrices of all harmonics up to which a product with each of them is fastest: more do not stay in the cache. Does
     not change results."""
+    rough_directions: int = 48
+    """Motions of the joint that carry its mass, and damping that is no multiple of stiffness, in rough products."""
+    rough: float = 1e-3
+    """Of the stiffness: what may be left out of a rough product. Does not change results."""
     kept_structures: int = 4
     """Condensed structures that are kept for the next one who asks: harmonics of a march, of its companion and of the
     errors of pairs. Does not change results."""

@@ -73,7 +73,7 @@ def explicit_step_limit(
     if not np.all(np.isfinite(start)) or not start.any():
         return float("inf")
     n_wearing = int(np.count_nonzero(rate))
-    values = ritz_values(product, start, min(WEAR.arnoldi_products, n_wearing))
+    values = ritz_values(product, start, min(WEAR.arnoldi_products, n_wearing))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
     # below round-off of the largest there is nothing
     fastest = float(falling.max(initial=0.0))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.linalg
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, sample_tangents
 from solver.harmonic_balance.dlft import Balance, Linearisation
@@ -18,7 +17,6 @@ from solver.newton.period_preconditioner import (
     PeriodFactor,
     build_march,
     build_period_factor,
-    march_samples,
     resonances,
     stiffness_of_most,
 )
@@ -88,32 +86,51 @@ def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
 @pytest.mark.slow
 def test_the_march_solves_what_it_says_sample_by_sample() -> None:
     balance, predicted = case(3)
-    found = build_march(tangent_of(balance, predicted))
-    n_samples, size = found.inverse.shape[:2]
-    n_contact = size // 3
-    right = np.random.default_rng(4).normal(size=(n_samples, size))
-    # in double precision, so that the comparison is one of formulas
-    coupling = found.coupling.astype(float)
-    eliminated = np.array([np.eye(size) + coupling @ scipy.linalg.block_diag(*own) for own in found.own])
-    inverse = np.linalg.inv(eliminated)
-    assert np.abs(found.inverse - inverse).max() < 1e-5 * np.abs(inverse).max()
-    steps, states = march_samples(inverse, coupling, found.own, found.carried, right, NEWTON.march_periods)
-    state = np.zeros((n_contact, 3))
+    tangent = tangent_of(balance, predicted)
+    found, joint = build_march(tangent), balance.joint
+    n_samples, size = len(found.own), 3 * joint.contact.n_contact
+    own, carried = sample_tangents(
+        tangent.at.predicted_t,
+        joint.friction_coefficient,
+        tangent.at.state_t,
+        tangent.at.status_t,
+        joint.has_normal,
+        joint.basis.n_samples // n_samples,
+    )
+    coupling = np.zeros((size, size))
+    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
+    coupling[joint.component_index, joint.component_index] -= 1.0
+    right = np.random.default_rng(4).normal(size=(joint.component_index.size, joint.basis.synthesis.shape[0]))
+    right_t = (joint.to_pairs(right).reshape(size, -1) @ found.basis.synthesis).T
+    state = np.zeros((size // 3, 3))
+    slow = np.empty((2, n_samples, size))
     for _ in range(NEWTON.march_periods):
-        slow = np.empty((2, n_samples, size))
         for n in range(n_samples):
-            # step and state as two unknowns, nothing eliminated
+            # step and state as two unknowns, nothing eliminated, no pair left out
             whole = np.eye(2 * size)
             whole[:size, size:] = coupling
-            held = np.zeros((n_contact, 3))
-            for pair in range(n_contact):
+            held = np.zeros((size // 3, 3))
+            for pair in range(size // 3):
                 here = slice(3 * pair, 3 * pair + 3)
-                whole[size:, :size][here, here] = -found.own[n, pair]
-                held[pair, 1:] = found.carried[n, pair] @ state[pair, 1:]
-            slow[:, n] = np.linalg.solve(whole, np.concatenate([right[n], held.ravel()])).reshape(2, size)
-            state = slow[1, n].reshape(n_contact, 3)
-    assert np.allclose(steps, slow[0], rtol=1e-9, atol=1e-9)
-    assert np.allclose(states, slow[1], rtol=1e-9, atol=1e-9)
+                whole[size:, :size][here, here] = -own[n, pair]
+                held[pair, 1:] = carried[n, pair] @ state[pair, 1:]
+            slow[:, n] = np.linalg.solve(whole, np.concatenate([right_t[n], held.ravel()])).reshape(2, size)
+            state = slow[1, n].reshape(size // 3, 3)
+    expected = [(part.T @ found.basis.analysis)[joint.component_index] for part in slow]
+    for ours, theirs in zip(found.solve(right), expected, strict=True):
+        # small systems are solved in single precision
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-5 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_its_sign_is_that_of_its_matrix(seed: int) -> None:
+    balance, predicted = case(seed, highest=3, samples=14)
+    # a stiffness that is not positive definite, so that both signs come up
+    random = np.random.default_rng(seed)
+    predicted = predicted * random.uniform(0.5, 2.0, size=(len(predicted), 1))
+    factor = factor_of(tangent_of(balance, predicted))
+    matrix = [factor.solve(unit.reshape(predicted.shape)).ravel() for unit in np.eye(predicted.size)]
+    assert factor.sign == np.linalg.slogdet(np.array(matrix))[0]
 
 
 def differing(joint: Joint) -> FloatArray:
@@ -182,21 +199,21 @@ def test_no_more_samples_are_marched_than_tell_the_harmonics_apart() -> None:
     for highest, samples, marched in ((3, 24, 12), (5, 64, 16), (12, 25, 25), (7, 30, 15)):
         balance, predicted = case(7, highest, samples)
         found = build_march(tangent_of(balance, predicted))
-        assert found.inverse.shape[0] == marched
+        assert len(found.own) == marched
         assert found.basis is build_basis(all_orders(highest), marched)
 
 
 def products(monkeypatch: pytest.MonkeyPatch, solver: JacobianSolver, tangent: Linearisation, right: FloatArray) -> int:
     """Products with the Jacobian that a direction takes; its residual is checked."""
     counted = [0]
-    plain = Linearisation.apply
+    plain = Linearisation.apply_roughly
 
-    def apply(self: Linearisation, step: FloatArray, *, roughly: bool = False) -> FloatArray:
+    def apply(self: Linearisation, step: FloatArray) -> FloatArray:
         counted[0] += 1
-        return plain(self, step, roughly=roughly)
+        return plain(self, step)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Linearisation, "apply", apply)
+        patch.setattr(Linearisation, "apply_roughly", apply)
         step = solver.solve(tangent, right)
     assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
     return counted[0]
