@@ -178,9 +178,9 @@ class Linearisation:
         """The same to three digits at least, in less time: for directions of Newton's method."""
         joint, (pairs, held_back) = self.joint, self._held_back
         spread = joint.to_pairs(step)
-        moving = spread[pairs].reshape(pairs.size, -1)
+        moving = spread[pairs].reshape(pairs.size, 3 * step.shape[1])
         # only what the pairs do not transmit moves them
-        kept = np.matmul(held_back, moving.astype(np.float32)[:, :, None])[:, :, 0].astype(np.float64)
+        kept = np.matmul(held_back, moving.astype(held_back.dtype)[:, :, None])[:, :, 0]
         part = np.zeros_like(spread)
         part[pairs] = kept.reshape(-1, *spread.shape[1:])
         motion = joint.motion(part)
@@ -188,10 +188,11 @@ class Linearisation:
         return joint.structure.apply_roughly(joint.to_relative(motion)) + step - joint.to_relative(part)
 
     @cached_property
-    def _held_back(self) -> tuple[IntArray, NDArray[np.float32]]:
-        """Pairs that move with their predicted force, and what they do not transmit of it, in single precision."""
+    def _held_back(self) -> tuple[IntArray, FloatArray | NDArray[np.float32]]:
+        """Pairs that move with their predicted force, and what they do not transmit of it; large ones rounded."""
         pairs = self.active()
-        return pairs, (np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]).astype(np.float32)
+        held_back = np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]
+        return pairs, held_back if held_back.nbytes <= BALANCE.exact_bytes else held_back.astype(np.float32)
 
     def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
         """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic).

@@ -17,19 +17,23 @@ from solver.newton.options import NEWTON
 Product = Callable[[FloatArray], FloatArray]
 
 
-def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, cycles: int) -> tuple[FloatArray, bool]:
-    """Solve `product(x) = right` by restarted GMRES from zero.
+def solve_gmres(
+    product: Product, right: FloatArray, rtol: float, restart: int, cycles: int, exact: Product | None = None
+) -> tuple[FloatArray, bool]:
+    """Solve `exact(x) = right` by restarted GMRES from zero.
 
     Parameters
     ----------
     product : callable
-        The operator applied to a vector (n,).
+        The operator applied to a vector (n,); it may be a little wrong.
     right : array (n,)
         Right-hand side.
     rtol : float
         Relative residual that is wanted.
     restart, cycles : int
-        Products of one cycle, and the number of cycles.
+        Products of one cycle, and the number of cycles. One that converges, but by wrong products, does not count.
+    exact : callable, optional
+        The operator itself, `product` by default; applied once a cycle.
 
     Returns
     -------
@@ -42,7 +46,8 @@ def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, 
     norms = [size]
     restart = min(restart, right.size)
     basis = np.empty((restart + 1, right.size))
-    for _ in range(cycles):
+    refinements = 0
+    while cycles > 0 and refinements <= NEWTON.refinements:
         if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
             break
         basis[0] = residual / norms[-1]
@@ -76,7 +81,9 @@ def solve_gmres(product: Product, right: FloatArray, rtol: float, restart: int, 
         least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
         weights = np.linalg.lstsq(triangle[:n_columns, :n_columns], projected[:n_columns], rcond=least)[0]
         solution = solution + weights @ basis[:n_columns]
-        residual = right - product(solution)
+        refined = norms[-1] <= rtol * size
+        refinements, cycles = refinements + refined, cycles - (not refined)
+        residual = right - (exact or product)(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):
             break

@@ -141,8 +141,12 @@ class JacobianSolver:
             full[rows] = precondition(vector)
             return tangent.apply_roughly(full)[rows].ravel()
 
+        def exact(vector: FloatArray) -> FloatArray:
+            full[rows] = precondition(vector)
+            return tangent.apply(full)[rows].ravel()
+
         # preconditioned from the right, so that the residual that GMRES watches is the true one
-        solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts)
+        solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts, exact)
         return precondition(solution), found
 
 

@@ -55,6 +55,9 @@ class NewtonOptions:
     """The same where a new one would not be exact either."""
     period_products: int = 80
     """The same for the march through the period: GMRES finds resonances one by one."""
+    refinements: int = 3
+    """Cycles of GMRES that converged, but by products in single precision: a joint that slips as a whole moves far
+    under small forces."""
     restarts: int = 6
     """Cycles of GMRES with a new factorisation that is not exact."""
 

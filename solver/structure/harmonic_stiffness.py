@@ -45,7 +45,7 @@ class DenseStiffness:
         if self.dense.nbytes <= STRUCTURE.dense_bytes:
             return self.apply(displacement_h)
         moving = np.ascontiguousarray(to_complex(displacement_h).T, np.complex64)[:, :, None]
-        return np.matmul(self._single, moving)[:, :, 0].T.astype(complex)
+        return cast("ComplexArray", np.matmul(self._single, moving)[:, :, 0].T.astype(complex))
 
     @cached_property
     def _single(self) -> NDArray[np.complex64]:
@@ -129,7 +129,9 @@ class SharedStiffness:
 def _products(forms: FloatArray | SingleArray, moving: FloatArray | SingleArray) -> FloatArray | SingleArray:
     """`K u`, `M u`, `C u` (3, rows, k) of one type, in one product."""
     _, n_rows, n_columns = forms.shape
-    return cast("FloatArray | SingleArray", (forms.reshape(-1, n_columns) @ moving).reshape(3, n_rows, -1))
+    return cast(
+        "FloatArray | SingleArray", (forms.reshape(3 * n_rows, n_columns) @ moving).reshape(3, n_rows, moving.shape[1])
+    )
 
 
 def share_matrices(

@@ -82,3 +82,17 @@ def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends() -> Non
     assert converged
     assert np.array_equal(found, zero)
     assert not solve_gmres(lambda x: x * np.nan, np.ones(5), 1e-3, 5, 2)[1]
+
+
+def test_products_that_are_rounded_are_refined_by_exact_ones() -> None:
+    random = np.random.default_rng(3)
+    # a direction that moves far under a small force
+    left, right = (np.linalg.qr(random.normal(size=(30, 30)))[0] for _ in range(2))
+    matrix = (left * np.geomspace(1.0, 1e-7, 30)) @ right
+    wanted = matrix @ random.normal(size=30)
+    rounded = matrix.astype(np.float32)
+    plain, found = solve_gmres(lambda x: rounded @ x, wanted, 1e-9, 30, 1)
+    assert np.linalg.norm(matrix @ plain - wanted) > 1e-9 * np.linalg.norm(wanted)
+    solution, found = solve_gmres(lambda x: rounded @ x, wanted, 1e-9, 30, 1, lambda x: matrix @ x)
+    assert found
+    assert np.linalg.norm(matrix @ solution - wanted) < 1e-9 * np.linalg.norm(wanted)
