@@ -1,6 +1,6 @@
 """What a Newton iteration, a slow-time step, a whole trajectory and a larger joint cost, as ratios in one process.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [ranks] [start]
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [sizes] [ranks] [start]
 
 Without arguments all rows of the table. The bundled dovetail sector near its resonance: 48 pairs, 5 harmonics, 128
 samples, 1584 unknowns; the unit is one `numpy.linalg.solve` of as many. Medians over repeats that take turns. How busy
@@ -164,6 +164,32 @@ def pairs() -> None:
     print(f"exponent {np.polyfit(np.log(sizes), np.log(times), 1)[0]:.2f} (below 2)")
 
 
+def sizes() -> None:
+    """What a start state and the first ten steps of joints of real size cost, with few harmonics throughout."""
+    spent: dict[int, float] = {}
+    for mesh, highest, wanted in ((2, 3, "0.6"), (2, 5, "0.6"), (4, 3, "-"), (4, 5, "5"), (6, 3, "15")):
+        settings = SolverSettings(harmonics=highest, samples=64)
+        model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(mesh=mesh), highest)
+        began = time.thread_time()
+        # beside the resonance, which falls a little with a finer mesh
+        start = start_at(model, [FREQUENCY - (1.0 if mesh > 2 else 0.0)], AMPLITUDE, settings)
+        first = time.thread_time() - began
+        began = time.thread_time()
+        cycles = np.array([0.0, 10 * STEP])
+        history = march_wear(model, FRICTION, start, WEAR, STEP, "implicit", cycles, settings)
+        step = (time.thread_time() - began) / 10
+        unit = in_turns(dense_solve(1584), repeats=3)[0]
+        if highest == 3:
+            spent[model.contact.n_contact] = step
+        print(
+            f"{model.contact.n_contact} pairs, {highest} harmonics: start {first:.0f} s, {start.newton_iterations} "
+            f"iterations; a step of the first ten {step / unit:.1f} units ({wanted}), "
+            f"{(history.newton_iterations - start.newton_iterations) / 10:.0f} iterations",
+            flush=True,
+        )
+    print(f"exponent of a step {np.polyfit(np.log(list(spent)), np.log(list(spent.values())), 1)[0]:.2f} (1.7)")
+
+
 def two_ranks() -> None:
     """Row 5."""
     with tempfile.TemporaryDirectory() as name:
@@ -190,6 +216,7 @@ ROWS: dict[str, Callable[[], None]] = {
     "adaptive": adaptive,
     "slider": slider,
     "pairs": pairs,
+    "sizes": sizes,
     "ranks": two_ranks,
     "start": start,
 }
