@@ -15,7 +15,7 @@ from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution
+from solver.settings import Resolution, ToTheEnd
 from studyrunner.plan.places import describe_reach, known_to, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -128,8 +128,12 @@ def _solve(
     start = None if task.start is None else unpack(task.start)
     if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
-    # The march begins at cycle 0, whether that count is kept or not.
-    counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
+    counts: NDArray[np.float64] | ToTheEnd
+    if task.to_the_end is not None and not task.held:
+        counts = task.to_the_end
+    else:
+        # The march begins at cycle 0, whether that count is kept or not.
+        counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
     history = march_wear(
         model,
         friction_coefficient,
@@ -164,20 +168,23 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     """
     scaled, own = task.histories[place], task.histories[0]
     slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
-    counts = np.array(task.counts(scaled))
-    rows = np.searchsorted(history.cycles, counts)
+    endless = task.to_the_end is not None and not task.held
+    counts = history.cycles if endless else np.array(task.counts(scaled))
+    rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
     jump = history.jump_cycle
     if place:
-        jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
+        jump = jump / slower if endless or jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
     target = history.cycles_to_target / slower
     if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
         # another history of the march goes farther
         target = math.nan
-    outcome = scaled_outcome(task, history, known, place, whole=bool(reached.all()))
-    last = task.cycles[-1]
-    if not reached.all():
+    outcome = history.outcome if endless else scaled_outcome(task, history, known, place, whole=bool(reached.all()))
+    last = 0.0 if task.to_the_end is not None else task.cycles[-1]
+    if endless:
+        last = history.last_cycle / slower
+    elif not reached.all():
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
@@ -248,8 +255,10 @@ def _message(
     if said or outcome is Outcome.CONVERGED or not known.size:
         return said
     worn = float(history.worn_volume_error[known[-1]])
+    if outcome is Outcome.NO_FINAL_STATE:
+        return f"at cycle {show_count(last)} the joint wears on at {slower * history.wear_rate[-1]:.6g} m3 a cycle"
     if not outcome.complete:
-        return describe_reach(last, task.cycles[-1], worn)
+        return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
     if outcome is Outcome.SENSITIVE:
         return f"the worn volume {known_to(worn)}"
     above = np.flatnonzero(_state_errors(history, known) > task.settings.rtol)
@@ -285,6 +294,8 @@ def _variable(
         values = np.angle(history.response)
     elif name == "wear_rate":
         values = slower * history.wear_rate
+    elif name == "cycle_count":
+        values = history.cycles / slower
     else:
         values = getattr(history, name)
     found = values[np.minimum(rows, len(values) - 1)]

@@ -202,6 +202,16 @@ LOOPS = {
 }
 """Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
 
+COUNTS = {
+    "cycle_count": Variable(
+        ("cycle",),
+        "1",
+        "number of vibration cycles of the output",
+        comment="Of each point its own: its outputs are equally spaced in worn volume.",
+    )
+}
+"""That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
+
 LOOP_PHASES = 128
 """Phases of a loop, equally spaced over a period from 0: those that the solver has."""
 

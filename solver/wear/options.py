@@ -54,6 +54,20 @@ class WearOptions:
     no_wear: float = 1e-12
     """Of the same: a joint that wears less sticks."""
 
+    # marches to the end
+    steady_rate: float = 0.01
+    """Relative change of the wear rate of a joint that slips everywhere, over the last nine tenths of its worn volume,
+    below which it has become steady and does not end."""
+    acted_back: float = 100.0
+    """Of the normal force of a pair: what its depth would move by itself, all others held, before a rate counts as
+    steady: less may not have acted back on the joint yet. Long waves of n pairs are about n times as soft."""
+    bears: float = 1e-9
+    """Of the largest normal force: a pair with less does not bear the joint."""
+    steps_to_the_end: int = 20_000
+    """Of a march that comes to no end; a joint takes 2 to 10 steps a pair."""
+    longest_march: float = 1e100
+    """Cycles, the same."""
+
     # loss of a branch
     fold_resolution: float = 0.01
     """Of the cycle count: how exactly the end of a branch is found."""

@@ -43,10 +43,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
-        (
-            "cycles",
-            f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept",
-        ),
+        ("cycles", _cycles(study)),
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
@@ -59,6 +56,13 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
+
+
+def _cycles(study: Study) -> str:
+    if study.to_the_end:
+        kept = f"{len(study.cycles_kept)} states are kept, equally spaced in worn volume"
+        return f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest; {kept}"
+    return f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept"
 
 
 def _assumed(study: Study, plan: TaskPlan) -> str:

@@ -153,7 +153,12 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
             groups.append([choice])
     for group in groups:
         farthest, *others = sorted(group, key=lambda choice: -wears[choice[0]])
-        whole = [choice for choice in others if _whole_number(study.cycles_kept[-1] / steps[choice[1]]) is not None]
+        # a march to the end has no last step that is shortened
+        whole = [
+            choice
+            for choice in others
+            if study.to_the_end or _whole_number(study.cycles_kept[-1] / steps[choice[1]]) is not None
+        ]
         yield (farthest, *whole)
         yield from ((choice,) for choice in others if choice not in whole)
 

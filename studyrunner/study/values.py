@@ -107,6 +107,7 @@ def once(values: Iterable[T]) -> tuple[T, ...]:
 Number = Annotated[float, Field(allow_inf_nan=False), told("give a finite number")]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), told("give a finite number above 0")]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), told("give a finite number that is 0 or more")]
+Cycles = Annotated[float, Field(ge=0, allow_inf_nan=True), told("give a number that is 0 or more, or inf")]
 Fraction = Annotated[float, Field(gt=0, lt=1), told("give a number between 0 and 1")]
 Switch = Annotated[bool, told("give true or false")]
 Text = Annotated[str, told("give a text in quotes")]

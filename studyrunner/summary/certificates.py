@@ -185,5 +185,5 @@ def _where(study: Study, place: _Place) -> str:
             shown = value if isinstance(value, str) else f"{value:.8g}"
             texts.append(f"{name} {shown}" + (f" {units}" if units != "1" else ""))
     if place.cycle is not None and len(study.cycles_kept) > 1:
-        texts.append(f"cycle {study.cycles_kept[place.cycle]:.8g}")
+        texts.append(f"{'output' if study.to_the_end else 'cycle'} {study.cycles_kept[place.cycle]:.8g}")
     return ", ".join(texts)
