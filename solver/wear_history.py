@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import TARGETS, Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import friction_of_pairs
+from solver.wear.final_state.find import find_final_state
 from solver.wear.march import march_wear as march_from_start
 
 
@@ -27,7 +28,7 @@ def march_wear(
     wear_coefficient: float,
     cycles: ArrayLike,
     *,
-    scheme: Scheme = "adaptive",
+    scheme: Scheme | Literal["final"] = "adaptive",
     step: float | None = None,
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
@@ -57,7 +58,8 @@ def march_wear(
         at 0, which is put in front where it is missing. Or inf: until nothing wears any more, see `outputs`.
     scheme, step
         "adaptive" chooses its own steps, by `settings.rtol`; "implicit" and "explicit" take steps of `step` cycles,
-        Eqs. (23), (24).
+        Eqs. (23), (24). "final" finds the state at which nothing wears any more without slow time where it can; it
+        takes `cycles` = inf, and `final_method` of the history says how it was found.
     sweep
         How the unworn state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
     settings
@@ -85,8 +87,10 @@ def march_wear(
     counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
     if (np.diff(counts) <= 0.0).any():
         raise ValueError("cycles: give ascending counts")
-    check_word("scheme", scheme, get_args(Scheme))
-    if step is None and scheme != "adaptive":
+    check_word("scheme", scheme, (*get_args(Scheme), "final"))
+    if scheme == "final" and (not to_the_end or until is not None):
+        raise ValueError('scheme: "final" goes with cycles = inf and without until')
+    if step is None and scheme not in ("adaptive", "final"):
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
     counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
@@ -103,5 +107,7 @@ def march_wear(
     # that the law is none of these pairs is the fault of the caller, not of the march
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
+    if scheme == "final":
+        return find_final_state(model, friction, start, per_pressure, ToTheEnd(outputs, final_share), settings, law=law)
     asked = ToTheEnd(outputs, final_share) if to_the_end else counts
     return march_from_start(model, friction, start, per_pressure, length, scheme, asked, settings, law=law, until=until)

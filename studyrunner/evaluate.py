@@ -29,6 +29,7 @@ from studyrunner.system.machine_faults import (
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
+_METHODS = KEPT["final_method"].flags
 
 
 def build_evaluator(model: ReducedModel, friction_coefficient: float | None, law: WearLaw = ARCHARD) -> Evaluate:
@@ -123,6 +124,7 @@ def _solve(
     keep: Keep | None = None,
 ) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
+    from solver.wear.final_state.find import find_final_state
     from solver.wear.march import march_wear
 
     start = None if task.start is None else unpack(task.start)
@@ -134,13 +136,29 @@ def _solve(
     else:
         # The march begins at cycle 0, whether that count is kept or not.
         counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
+    if task.scheme == "final" and isinstance(counts, ToTheEnd):
+        history = find_final_state(
+            model,
+            friction_coefficient,
+            start,
+            task.wear_coefficient,
+            counts,
+            task.settings,
+            loops=task.loops,
+            keep=keep,
+            resume=task.resume,
+            law=law,
+        )
+        _raise_fault(history)
+        return history
+    scheme = "adaptive" if task.scheme == "final" else task.scheme
     history = march_wear(
         model,
         friction_coefficient,
         start,
         task.wear_coefficient,
         task.step,
-        cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
+        cast("Literal['explicit', 'implicit', 'adaptive']", scheme),
         counts,
         task.settings,
         largest_depth=task.largest_depth,
@@ -172,6 +190,8 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     counts = history.cycles if endless else np.array(task.counts(scaled))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
+    if endless and history.final_method == "active_set":
+        reached = np.isfinite(history.worn_volume)
     known = rows[reached]
     jump = history.jump_cycle
     if place:
@@ -198,6 +218,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
+        "final_method": _METHODS.index(history.final_method or "none"),
         "message": message or _missed(task, history, known, target),
     }
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}

@@ -297,6 +297,16 @@ KEPT = {
         ("steady", "oscillating"),
         comment="Only the explicit scheme is watched.",
     ),
+    "final_method": Variable(
+        (),
+        "1",
+        "how the scheme final has found the final state",
+        "int8",
+        ("none", "active_set", "march"),
+        comment="none with the other schemes. active_set: without slow time, tested to be what a march comes to;"
+        " outputs between the unworn and the final state are NaN, or 0 where a variable is a whole number, and"
+        " last_cycle is infinite. march: message says why.",
+    ),
     "message": Variable(
         (),
         "1",

@@ -68,6 +68,22 @@ class WearOptions:
     longest_march: float = 1e100
     """Cycles, the same."""
 
+    # final state without slow time
+    off_margin: float = 10.0
+    """Of the overlap of all pairs, each as if it alone gave way: how far a pair is taken off, so that it stays open
+    while others are taken off; what comes out does not depend on it."""
+    off_tolerance: float = 1e-3
+    """Of the tolerance of a state: depths are read from this one, which takes an iteration more (a sphere: 3e-6 of its
+    depth off without it)."""
+    off_attempts: int = 4
+    """With ten times the margin each."""
+    loss_of_rate: float = 0.5
+    """Of what its own wear changes of the wear rate of a pair, that the wear of the others may take of it: more, and it
+    may stick again. A cylinder in partial slip: they add 0.4 to 0.9; a sphere: they take 0.2 at the edge of the stick
+    zone unworn, and add later."""
+    tested_states: int = 3
+    """Between the unworn and the final state, the first included, at which this is tested."""
+
     # loss of a branch
     fold_resolution: float = 0.01
     """Of the cycle count: how exactly the end of a branch is found."""

@@ -72,7 +72,7 @@ class Identities:
     @staticmethod
     def _wear(march: MarchTask, scaled: ScaledHistory) -> tuple[float, float | None]:
         """Wear coefficient and, where it matters, step."""
-        of_its_own = march.held or march.scheme == "adaptive"
+        of_its_own = march.held or march.scheme in ("adaptive", "final")
         of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
         return scaled.wear_coefficient, None if of_its_own else scaled.step
 

@@ -151,7 +151,7 @@ class MarchTask:
         """Cycle counts of the march that a history is read at, one for each of `cycles`."""
         if self.held:
             return (0.0,) * len(self.cycles)
-        return march_counts(self.cycles, scaled, self.histories[0], self.scheme != "adaptive")
+        return march_counts(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
 
     @property
     def opens_others(self) -> bool:

@@ -275,6 +275,12 @@ class Study(Section):
         if self.to_the_end and "explicit" in self.axes.scheme:
             remedy = 'give "adaptive" or "implicit": explicit steps cannot grow, as slow_time.cycles = inf asks for'
             raise WrongValueError("explicit", remedy, "axes.scheme")
+        if "final" in self.axes.scheme and not self.to_the_end:
+            remedy = 'give inf: the scheme "final" finds the state at which nothing wears any more'
+            raise WrongValueError(self.slow_time.cycles, remedy, "slow_time.cycles")
+        if "final" in self.axes.scheme and self.slow_time.until is not None:
+            remedy = 'leave it out: the scheme "final" has no way on which it could be reached'
+            raise WrongValueError(self.slow_time.until, remedy, "slow_time.until")
         if self.to_the_end and "exact" in self.outputs.variables:
             remedy = "leave it out: it is of given cycle counts, and slow_time.cycles = inf has none"
             raise WrongValueError("exact", remedy, "outputs.variables")

@@ -113,7 +113,9 @@ Switch = Annotated[bool, told("give true or false")]
 Text = Annotated[str, told("give a text in quotes")]
 Harmonics = Annotated[int | Automatic, whole(1, 1000, or_auto=True)]
 Samples = Annotated[int | Automatic, whole(4, 100_000, or_auto=True)]
-Scheme = Annotated[Literal["implicit", "explicit", "adaptive"], words("implicit", "explicit", "adaptive")]
+Scheme = Annotated[
+    Literal["implicit", "explicit", "adaptive", "final"], words("implicit", "explicit", "adaptive", "final")
+]
 Sweep = Annotated[Literal["up", "down", "ramp"], words("up", "down", "ramp")]
 Axis = Annotated[tuple[T, ...], BeforeValidator(_spread), AfterValidator(once)]
 """Values of an axis in the order in which they are given, at least one and each once."""

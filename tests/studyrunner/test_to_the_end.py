@@ -55,13 +55,19 @@ def test_the_effective_study_is_to_the_end_too(tmp_path: Path) -> None:
         ("slow_time.cycles=nan", "slow_time.cycles", "or inf"),
         ("slow_time.cycles=-inf", "slow_time.cycles", "or inf"),
         ("slow_time.final_share=1", "slow_time.final_share", "between 0 and 1"),
+        ("axes.scheme=final", "slow_time.cycles", "give inf"),
+        ("slow_time.until={wear_depth = 1e-5}", "slow_time.until", "has no way"),
         ('outputs.variables=["default", "exact"]', "outputs.variables", "given cycle counts"),
     ],
 )
 def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remedy: str) -> None:
     override = override.replace("[adaptive, explicit]", '["adaptive", "explicit"]')
+    others = {
+        "slow_time.until={wear_depth = 1e-5}": ("axes.scheme=final",),
+        "axes.scheme=final": ("slow_time.cycles=5",),
+    }
     with pytest.raises(UserError) as caught:
-        study_with(override)
+        study_with(override, *others.get(override, ()))
     assert caught.value.key == key
     assert remedy in caught.value.remedy
 
@@ -152,3 +158,29 @@ def test_gross_slip_is_told_with_its_rate_for_every_coefficient(tmp_path: Path) 
     assert rates[0] == pytest.approx(10.0 * rates[1])
     for message, rate in zip(result.message.values, rates, strict=True):
         assert f"at {rate:.6g} m3 a cycle" in message or f"rate of {rate:.6g} m3 a cycle" in message
+
+
+@pytest.mark.slow
+def test_the_scheme_final_is_computed_once_and_says_how(tmp_path: Path) -> None:
+    overrides = ("axes.wear_coefficient=[1.1e-11, 1e-12]", 'axes.scheme=["adaptive", "final"]', "axes.step=[10, 100]")
+    study = study_with(*overrides)
+    plan = build_tasks(study, 2)
+    assert [len(line) for line in plan.marches] == [2]
+    assert any("comes to the same state for every wear_coefficient" in item.reason for item in plan.left_out)
+    with run_study(study, tmp_path / "final.nc") as opened:
+        result = opened.squeeze(drop=True).load()
+    direct = result.sel(scheme="final")
+    assert result.final_method.attrs["flag_meanings"].split() == ["none", "active_set", "march"]
+    assert (direct.final_method == 1).all()
+    assert (result.sel(scheme="adaptive").final_method == 0).all()
+    assert (direct.outcome == 0).all()
+    assert np.isinf(direct.cycle_count.isel(cycle=-1)).all()
+    assert direct.worn_volume.isel(cycle=slice(1, -1)).isnull().all()
+    assert not direct.harmonics_used.isel(cycle=slice(1, -1)).any()
+    assert direct.worn_volume.isel(cycle=-1).values == pytest.approx(1e-8)
+    rates = direct.wear_rate.isel(cycle=0, step=0).values
+    assert rates[0] == pytest.approx(11.0 * rates[1])
+    shown = open_for_report(tmp_path / "final.nc")
+    assert np.isfinite(shown.worn).all()
+    assert len(shown.cycles) == 6
+    shown.close()
