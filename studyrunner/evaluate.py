@@ -219,7 +219,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
         "final_method": _METHODS.index(history.final_method or "none"),
-        "message": message or _missed(task, history, known, target),
+        "message": message or _of_target(task, history, known, target, whole=bool(reached.all())),
     }
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
@@ -292,10 +292,15 @@ def _message(
     return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
 
 
-def _missed(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float) -> str:
-    """That the target of a history was not reached; empty where it was, or where there is none."""
-    if task.until is None or not known.size or not math.isnan(target):
+def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, *, whole: bool) -> str:
+    """That the target of a history was not reached, or that the counts behind it are not computed; else empty.
+
+    known, whole: as in `scaled_outcome`.
+    """
+    if task.until is None or not known.size:
         return ""
+    if not math.isnan(target):
+        return "" if whole else f"at its target at cycle {show_count(target)}: later counts are not computed"
     deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
     value, unit = (deepest, "m") if task.until.quantity == "wear_depth" else (volume, "m3")
     return f"{task.until.quantity} stays below {task.until.value:g} {unit}: it is {value:.3g} {unit} at the last count"

@@ -268,7 +268,8 @@ KEPT = {
         (),
         "1",
         "cycle count up to which the point was computed",
-        comment="Values after it are NaN, or 0 where a variable is a whole number; NaN where there is no state at all.",
+        comment="Values after it are NaN, or 0 where a variable is a whole number; NaN where there is no state at all."
+        " A point that reaches slow_time.until ends, as converged, with the step that does so.",
     ),
     "largest_wear_depth": Variable(
         (),

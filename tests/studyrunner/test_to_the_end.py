@@ -183,4 +183,8 @@ def test_the_scheme_final_is_computed_once_and_says_how(tmp_path: Path) -> None:
     shown = open_for_report(tmp_path / "final.nc")
     assert np.isfinite(shown.worn).all()
     assert len(shown.cycles) == 6
+    # states that there are not are neither unstable nor of no harmonics
+    assert "unstable states                     none" in result.attrs["certificate_summary"]
+    used = shown.read("harmonics_used").sel(scheme="final").values.reshape(-1, 6)
+    assert np.isnan(used[0]).tolist() == [False, True, True, True, True, False]
     shown.close()

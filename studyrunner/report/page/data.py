@@ -125,7 +125,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "without": np.flatnonzero(~result.held).tolist(),
         "ends": {
             str(place): float(last.flat[place])
-            for place in np.flatnonzero(result.held & ~result.computed).tolist()
+            for place in np.flatnonzero(result.held & (~result.computed | (last < result.cycles[-1]))).tolist()
             # of counts of their own all are known
             if not result.has("cycle_count")
         },

@@ -199,7 +199,7 @@ class Result:
         values = self.dataset[name]
         if values.dtype.kind in "iu" and "cycle" in values.dims:
             if self.has("cycle_count"):
-                return values.where(np.isfinite(self.dataset["cycle_count"]))
+                return values.where(self.dataset["cycle_count"].notnull())
             last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
             return values.where(self.dataset["cycle"] <= last)
         return values
