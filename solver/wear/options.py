@@ -81,6 +81,8 @@ class WearOptions:
     """Of what its own wear changes of the wear rate of a pair, that the wear of the others may take of it: more, and it
     may stick again. A cylinder in partial slip: they add 0.4 to 0.9; a sphere: they take 0.2 at the edge of the stick
     zone unworn, and add later."""
+    same_depth: float = 1e-3
+    """Of the deepest pair, by how much the final depths may differ with the friction that another way leaves."""
     tested_states: int = 3
     """Between the unworn and the final state, the first included, at which this is tested."""
 

@@ -141,6 +141,7 @@ FINAL = {
     "B, 10 x 10 patches": ("sphere_on_flat", {"patches": 10}, 0.6, 20.0, 1.0, WEAR),
     "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
     "dovetail, mesh 1, 209 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
+    "dovetail, mesh 1, 209 Hz, 4 N": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
     "dovetail, mesh 1, 212.5 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.5, 0.5, 1.1e-11),
     "dovetail, mesh 1, 212.8 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
 }

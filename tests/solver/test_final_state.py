@@ -39,6 +39,7 @@ CASES: dict[str, tuple[str, dict[str, float], float, float, float, float]] = {
     "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
     "constant load": ("sdof_slider", {"normal_stiffness": 0.0}, 0.5, 160.0, 10.0, 1.1e-11),
     "at rest": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
+    "some slip": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
     "beside resonance": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
 }
 
@@ -126,6 +127,20 @@ def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
     assert np.array_equal(direct.cycles, march.cycles)
     assert "takes that of others; it has 2" in direct.message
     assert f"the march {1e9 * march.worn_volume[-1]:.4g} mm3, depths differ by" in direct.message
+
+
+def test_where_residual_shear_matters_the_march_is_taken() -> None:
+    # the same pairs wear off; the friction that is left in the others depends on how fast
+    direct = found("some slip")
+    assert direct.final_method == "march"
+    assert "residual shear makes the depths depend on the way" in direct.message
+    trajectory = trajectory_of("some slip")
+    unworn_depth = trajectory.point.evaluation.wear_depth
+    final = wear_off(trajectory, unworn_depth, np.zeros(unworn_depth.size, bool), 1e-4)
+    worn = direct.wear_depth[-1]
+    assert np.array_equal(final.off, worn > 1e-2 * worn.max())
+    apart = np.abs(final.point.evaluation.wear_depth - worn).max() / worn.max()
+    assert 1e-3 < apart < 5e-2
 
 
 def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:

@@ -22,6 +22,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, FloatArray
 from solver.newton.solve_balance import solve_balance
+from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
 from solver.wear.options import WEAR
 from solver.wear.trajectory import Trajectory
@@ -76,8 +77,8 @@ def wear_off(trajectory: Trajectory, unworn: FloatArray, off: BoolArray, share: 
         if not trajectory.joint.has_normal[begin].all():
             raise NoActiveSetError("pairs slip whose normal force no wear changes")
         off, n_rounds = off | begin, n_rounds + 1
-        point = _without(trajectory, unworn, off)
-        depth = np.where(off, np.maximum(closing(trajectory, point.evaluation), unworn), unworn)
+        point = without(trajectory, unworn, off)
+        depth = grazing_depth(trajectory.joint, point.evaluation, unworn, off)
         held = Balance.frozen(trajectory.joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
         trajectory.accept(PathPoint(0.0, grazing, final_history(held, grazing)), 0.0)
@@ -85,13 +86,17 @@ def wear_off(trajectory: Trajectory, unworn: FloatArray, off: BoolArray, share: 
     raise NoActiveSetError("pairs begin to slip without end")
 
 
-def closing(trajectory: Trajectory, at: Evaluation) -> FloatArray:
+def grazing_depth(joint: Joint, at: Evaluation, unworn: FloatArray, off: BoolArray) -> FloatArray:
+    """Depth (n_contact,), m: that at which the pairs that are off just graze, `unworn` of the others."""
+    return np.where(off, np.maximum(closing(joint, at), unworn), unworn)
+
+
+def closing(joint: Joint, at: Evaluation) -> FloatArray:
     """Depth (n_contact,), m, at which pairs just graze: largest closing displacement at a sample, less the gap."""
-    joint = trajectory.joint
     return np.asarray((at.displacement_h[:, 0] @ joint.basis.synthesis).max(axis=1) - joint.contact.gap)
 
 
-def _without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathPoint:
+def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathPoint:
     """State in which the pairs that are off are open all period long. Raises NoActiveSetError."""
     joint, last = trajectory.joint, trajectory.point
     rows = np.flatnonzero(joint.component_index % 3 == 0)
@@ -102,7 +107,7 @@ def _without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> Path
     margin = WEAR.off_margin * unworn.size * float(overlap.max())
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
     for _ in range(WEAR.off_attempts):
-        depth = np.where(off, np.maximum(closing(trajectory, last.evaluation), unworn) + margin, unworn)
+        depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
         balance = Balance.frozen(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
         tolerance = trajectory.case.settings.tolerance

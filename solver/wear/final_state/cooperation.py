@@ -9,12 +9,15 @@ Tested are states between the unworn and the final one, at fractions of the fina
 
       sum over j != i of dg_i/dW_j g_j  >=  - `loss_of_rate` |dg_i/dW_i| g_i.
 
-All `dg_i/dW_j >= 0` would be more than is needed: beside a stick zone the pressure that a pair takes over from others
-makes it slip less at first, and it wears off all the same. At the end the walk has to arrive where nothing wears. That
-is a test of some states, not of all of them.
+At the end the walk has to arrive where nothing wears, and from there, with the friction that the walk has left in the
+joint, the pairs that are off have to graze at the same depths. All `dg_i/dW_j >= 0` would be more than is needed: beside
+a stick zone the pressure that a pair takes over from others makes it slip less at first, and it wears off all the same.
+This is a test of some states, not of all of them.
 """
 
 from __future__ import annotations
+
+from copy import copy
 
 import numpy as np
 
@@ -27,7 +30,7 @@ from solver.model import FloatArray, IntArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
-from solver.wear.final_state.active_set import WornOff, least_rate
+from solver.wear.final_state.active_set import WornOff, grazing_depth, least_rate, without
 from solver.wear.options import WEAR
 from solver.wear.trajectory import Trajectory
 
@@ -75,6 +78,12 @@ def failure(trajectory: Trajectory, unworn: PathPoint, final: WornOff, share: fl
         if fraction == 1.0:
             if (rate > np.maximum(share * largest, floor)).any():
                 return "pairs still wear at the final depths, which the vibration comes to in another state"
+            there = copy(trajectory)
+            there.point, there.solver = point, solver
+            free = without(there, before, final.off)
+            apart = float(np.abs(grazing_depth(joint, free.evaluation, before, final.off) - after).max(initial=0.0))
+            if apart > WEAR.same_depth * float(after.max(initial=0.0)):
+                return f"residual shear makes the depths depend on the way to them, by {apart:.2g} m or more"
             return ""
         wears = rate > floor
         where = f"at {100 * fraction:.0f} % of the final depths"

@@ -78,7 +78,7 @@ def find_final_state(
         law=law,
     )
     remark = f"no active set: {reason}" if reason else ""
-    if direct is not None and np.isfinite(marched.worn_volume[-1]):
+    if direct is not None and direct.worn_volume[-1] > 0.0 and np.isfinite(marched.worn_volume[-1]):
         volumes = 1e9 * direct.worn_volume[-1], 1e9 * marched.worn_volume[-1]
         apart = float(np.abs(direct.wear_depth[-1] - marched.wear_depth[-1]).max())
         remark += f"; it has {volumes[0]:.4g} mm3, the march {volumes[1]:.4g} mm3, depths differ by {apart:.2g} m"
