@@ -43,6 +43,8 @@ CASES: dict[str, tuple[str, dict[str, float], float, float, float, float]] = {
     "beside resonance": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
 }
 
+SLOW = [pytest.param("sphere", marks=pytest.mark.slow), pytest.param("much slip", marks=pytest.mark.slow)]
+
 
 @cache
 def unworn(case: str) -> tuple[ReducedModel, StartState]:
@@ -72,7 +74,7 @@ def trajectory_of(case: str) -> Trajectory:
     return trajectory
 
 
-@pytest.mark.parametrize("case", ["cylinder", "much slip", "sphere", "slider"])
+@pytest.mark.parametrize("case", ["cylinder", "slider", *SLOW])
 def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -> None:
     direct, march = found(case), marched(case)
     assert direct.final_method == "active_set"
@@ -95,7 +97,7 @@ def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -
         assert one == pytest.approx(others[-1], abs=2e-3 * np.abs(others).max()), name
 
 
-@pytest.mark.parametrize("case", ["cylinder", "much slip", "sphere"])
+@pytest.mark.parametrize("case", ["cylinder", *SLOW])
 def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
     direct = found(case)
     limit = limit_depth(unworn(case)[0], direct.slip_range[-1] == 0.0)
@@ -120,6 +122,7 @@ def test_a_joint_at_rest_is_in_its_final_state() -> None:
     assert marched("at rest").worn_volume[-1] == 0.0
 
 
+@pytest.mark.slow
 def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
     direct, march = found("beside resonance"), marched("beside resonance")
     assert direct.final_method == "march"
@@ -129,6 +132,7 @@ def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
     assert f"the march {1e9 * march.worn_volume[-1]:.4g} mm3, depths differ by" in direct.message
 
 
+@pytest.mark.slow
 def test_where_residual_shear_matters_the_march_is_taken() -> None:
     # the same pairs wear off; the friction that is left in the others depends on how fast
     direct = found("some slip")
@@ -153,7 +157,7 @@ def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:
         wear_off(trajectory, np.zeros(1), np.zeros(1, bool), 1e-4)
 
 
-@pytest.mark.parametrize("case", ["cylinder", "beside resonance"])
+@pytest.mark.parametrize("case", ["cylinder", pytest.param("beside resonance", marks=pytest.mark.slow)])
 def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -> None:
     trajectory = trajectory_of(case)
     joint, at = trajectory.joint, trajectory.point.evaluation

@@ -10,9 +10,10 @@ Tested are states between the unworn and the final one, at fractions of the fina
       sum over j != i of dg_i/dW_j g_j  >=  - `loss_of_rate` |dg_i/dW_i| g_i.
 
 At the end the walk has to arrive where nothing wears, and from there, with the friction that the walk has left in the
-joint, the pairs that are off have to graze at the same depths. All `dg_i/dW_j >= 0` would be more than is needed: beside
-a stick zone the pressure that a pair takes over from others makes it slip less at first, and it wears off all the same.
-This is a test of some states, not of all of them.
+joint, the pairs that are off have to graze at the same depths.
+
+All `dg_i/dW_j >= 0` would be more than is needed: beside a stick zone the pressure that a pair takes over from others
+makes it slip less at first, and it wears off all the same. This is a test of some states, not of all of them.
 """
 
 from __future__ import annotations
