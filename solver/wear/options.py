@@ -65,7 +65,7 @@ class WearOptions:
     """Of the largest normal force: a pair with less does not bear the joint."""
     steps_to_the_end: int = 20_000
     """Of a march that comes to no end; a joint takes 2 to 10 steps a pair."""
-    longest_march: float = 1e100
+    longest_march: float = 1e25
     """Cycles, the same."""
 
     # final state without slow time

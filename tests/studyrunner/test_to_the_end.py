@@ -16,6 +16,7 @@ from studyrunner.netcdf.attributes import attributes, coordinate_entry
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.printed import format_plan
 from studyrunner.plan.tasks import build_tasks
+from studyrunner.report.reading.door import check_numbers
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
@@ -181,6 +182,7 @@ def test_the_scheme_final_is_computed_once_and_says_how(tmp_path: Path) -> None:
     rates = direct.wear_rate.isel(cycle=0, step=0).values
     assert rates[0] == pytest.approx(11.0 * rates[1])
     shown = open_for_report(tmp_path / "final.nc")
+    check_numbers(shown.dataset, "final.nc")
     assert np.isfinite(shown.worn).all()
     assert len(shown.cycles) == 6
     # states that there are not are neither unstable nor of no harmonics

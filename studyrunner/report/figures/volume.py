@@ -167,6 +167,9 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         f"{text.capitalize()} over {course.name} and cycles",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
         "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
+        "Cycles of the shown point: the outputs of each are equally spaced in worn volume"
+        if result.has("cycle_count")
+        else "",
         choice.sentence,
         f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
     )
