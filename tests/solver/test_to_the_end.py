@@ -19,6 +19,7 @@ from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
 from solver.results.trail import TrailRecorder
 from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
+from solver.wear.final_state.find import find_final_state
 from solver.wear.march import march_wear
 from solver.wear.options import WEAR
 from studies import build_scene
@@ -169,3 +170,16 @@ def test_a_joint_at_rest_is_at_its_end() -> None:
     assert still.outcome is Outcome.CONVERGED
     assert not still.cycles.any()
     assert not still.worn_volume.any()
+
+
+def test_without_a_start_state_there_is_nothing() -> None:
+    model, start = unworn()
+    failed = replace(start, outcome=Outcome.START_FAILED, state=None)
+    for found in (
+        march_wear(model, 0.6, failed, PER_PRESSURE, 1000.0, "adaptive", ToTheEnd(3), COARSE),
+        find_final_state(model, 0.6, failed, PER_PRESSURE, ToTheEnd(3), COARSE),
+    ):
+        assert found.outcome is Outcome.START_FAILED
+        assert found.worn_volume.shape == (3,)
+        assert np.isnan(found.worn_volume).all()
+        assert np.isnan(found.last_cycle)
