@@ -30,6 +30,7 @@ class Outcome(IntEnum):
     PERIOD_DOUBLED = 14
     SENSITIVE = 15
     STEP_TOO_LONG = 16
+    NO_FINAL_STATE = 17
 
     @property
     def complete(self) -> bool:
@@ -70,6 +71,8 @@ _SENTENCES = {
     " which is not computed: the state that repeats after one is unstable.",
     Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
     " of the joint would move: its end is no result. The variable message says which step, and how long it may be.",
+    Outcome.NO_FINAL_STATE: "Wear goes on without end: the point has no final state, and message says at which rate it"
+    " wears. Give slow_time.cycles or slow_time.until an end.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",

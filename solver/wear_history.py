@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,9 @@ from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
-from solver.settings import TARGETS, Scheme, SolverSettings, WearTarget
+from solver.settings import TARGETS, Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import friction_of_pairs
+from solver.wear.final_state.find import find_final_state
 from solver.wear.march import march_wear as march_from_start
 
 
@@ -27,12 +28,14 @@ def march_wear(
     wear_coefficient: float,
     cycles: ArrayLike,
     *,
-    scheme: Scheme = "adaptive",
+    scheme: Scheme | Literal["final"] = "adaptive",
     step: float | None = None,
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
     law: WearLaw = ARCHARD,
     until: WearTarget | None = None,
+    outputs: int = 101,
+    final_share: float = 1e-4,
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state on.
 
@@ -52,10 +55,11 @@ def march_wear(
         k_w of Eq. (2), 1/Pa; the energy wear coefficient with the law "energy".
     cycles
         Ascending cycle counts at which the history is reported, or the last one alone; the march ends there. It begins
-        at 0, which is put in front where it is missing.
+        at 0, which is put in front where it is missing. Or inf: until nothing wears any more, see `outputs`.
     scheme, step
         "adaptive" chooses its own steps, by `settings.rtol`; "implicit" and "explicit" take steps of `step` cycles,
-        Eqs. (23), (24).
+        Eqs. (23), (24). "final" finds the state at which nothing wears any more without slow time where it can; it
+        takes `cycles` = inf, and `final_method` of the history says how it was found.
     sweep
         How the unworn state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
     settings
@@ -64,6 +68,9 @@ def march_wear(
         What of the slip work wears, Archard's law if not given: `solver.contact.wear_law`.
     until
         Wear at which the march ends before the last of `cycles`; `cycles_to_target` of the history is that count.
+    outputs, final_share
+        Of a march to the end: the states that are reported, equally spaced in worn volume, at counts that the history
+        says; and the share of the largest wear rate of each pair that this has to fall below.
 
     Raises
     ------
@@ -76,20 +83,31 @@ def march_wear(
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     at = check_number("frequency", frequency, above=0.0)
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
-    counts = check_numbers("cycles", cycles, least=0.0)
+    to_the_end = np.ndim(cycles) == 0 and cycles == math.inf
+    counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
     if (np.diff(counts) <= 0.0).any():
         raise ValueError("cycles: give ascending counts")
-    check_word("scheme", scheme, get_args(Scheme))
-    if step is None and scheme != "adaptive":
+    check_word("scheme", scheme, (*get_args(Scheme), "final"))
+    if scheme == "final" and (not to_the_end or until is not None):
+        raise ValueError('scheme: "final" goes with cycles = inf and without until')
+    if step is None and scheme not in ("adaptive", "final"):
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
     counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
+    if to_the_end and scheme == "explicit":
+        raise ValueError(
+            'scheme: steps of the explicit scheme cannot grow: give "adaptive" or "implicit" with cycles inf'
+        )
+    if to_the_end and outputs < 2:
+        raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
+    check_number("final_share", final_share, above=0.0)
     if until is not None:
         check_word("until.quantity", until.quantity, TARGETS)
         check_number("until.value", until.value, above=0.0)
     # that the law is none of these pairs is the fault of the caller, not of the march
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
-    return march_from_start(
-        model, friction, start, per_pressure, length, scheme, counts, settings, law=law, until=until
-    )
+    if scheme == "final":
+        return find_final_state(model, friction, start, per_pressure, ToTheEnd(outputs, final_share), settings, law=law)
+    asked = ToTheEnd(outputs, final_share) if to_the_end else counts
+    return march_from_start(model, friction, start, per_pressure, length, scheme, asked, settings, law=law, until=until)

@@ -205,6 +205,9 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     for other in datasets:
         if other["outcome"].dims != axes:
             raise ValueError(f"The results have different axes: {axes} and {other['outcome'].dims}.")
+        own = "cycle_count" in first
+        if ("cycle_count" in other) != own or (own and other.sizes["cycle"] != first.sizes["cycle"]):
+            raise ValueError("A result with slow_time.cycles = inf joins only those, and with as many outputs.")
         for each in _PAIRS:
             if not np.array_equal(other[each].values, first[each].values, equal_nan=first[each].dtype.kind == "f"):
                 raise ValueError(f"The results have different contact pairs: see {each}.")

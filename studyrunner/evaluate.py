@@ -15,7 +15,7 @@ from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution
+from solver.settings import Resolution, ToTheEnd
 from studyrunner.plan.places import describe_reach, known_to, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -29,6 +29,7 @@ from studyrunner.system.machine_faults import (
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
+_METHODS = KEPT["final_method"].flags
 
 
 def build_evaluator(model: ReducedModel, friction_coefficient: float | None, law: WearLaw = ARCHARD) -> Evaluate:
@@ -123,20 +124,41 @@ def _solve(
     keep: Keep | None = None,
 ) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
+    from solver.wear.final_state.find import find_final_state
     from solver.wear.march import march_wear
 
     start = None if task.start is None else unpack(task.start)
     if not isinstance(start, StartState):
         raise TypeError(f"task without a start state: {task}")
-    # The march begins at cycle 0, whether that count is kept or not.
-    counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
+    counts: NDArray[np.float64] | ToTheEnd
+    if task.to_the_end is not None and not task.held:
+        counts = task.to_the_end
+    else:
+        # The march begins at cycle 0, whether that count is kept or not.
+        counts = np.unique(np.concatenate([[0.0], *(task.counts(scaled) for scaled in task.histories)]))
+    if task.scheme == "final" and isinstance(counts, ToTheEnd):
+        history = find_final_state(
+            model,
+            friction_coefficient,
+            start,
+            task.wear_coefficient,
+            counts,
+            task.settings,
+            loops=task.loops,
+            keep=keep,
+            resume=task.resume,
+            law=law,
+        )
+        _raise_fault(history)
+        return history
+    scheme = "adaptive" if task.scheme == "final" else task.scheme
     history = march_wear(
         model,
         friction_coefficient,
         start,
         task.wear_coefficient,
         task.step,
-        cast("Literal['explicit', 'implicit', 'adaptive']", task.scheme),
+        cast("Literal['explicit', 'implicit', 'adaptive']", scheme),
         counts,
         task.settings,
         largest_depth=task.largest_depth,
@@ -164,20 +186,25 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     """
     scaled, own = task.histories[place], task.histories[0]
     slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
-    counts = np.array(task.counts(scaled))
-    rows = np.searchsorted(history.cycles, counts)
+    endless = task.to_the_end is not None and not task.held
+    counts = history.cycles if endless else np.array(task.counts(scaled))
+    rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
+    if endless and history.final_method == "active_set":
+        reached = np.isfinite(history.worn_volume)
     known = rows[reached]
     jump = history.jump_cycle
     if place:
-        jump = jump / slower if jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
+        jump = jump / slower if endless or jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
     target = history.cycles_to_target / slower
     if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
         # another history of the march goes farther
         target = math.nan
-    outcome = scaled_outcome(task, history, known, place, whole=bool(reached.all()))
-    last = task.cycles[-1]
-    if not reached.all():
+    outcome = history.outcome if endless else scaled_outcome(task, history, known, place, whole=bool(reached.all()))
+    last = 0.0 if task.to_the_end is not None else task.cycles[-1]
+    if endless:
+        last = history.last_cycle / slower
+    elif not reached.all():
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
@@ -191,7 +218,8 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
-        "message": message or _missed(task, history, known, target),
+        "final_method": _METHODS.index(history.final_method or "none"),
+        "message": message or _of_target(task, history, known, target, whole=bool(reached.all())),
     }
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
@@ -248,8 +276,10 @@ def _message(
     if said or outcome is Outcome.CONVERGED or not known.size:
         return said
     worn = float(history.worn_volume_error[known[-1]])
+    if outcome is Outcome.NO_FINAL_STATE:
+        return f"at cycle {show_count(last)} the joint wears on at {slower * history.wear_rate[-1]:.6g} m3 a cycle"
     if not outcome.complete:
-        return describe_reach(last, task.cycles[-1], worn)
+        return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
     if outcome is Outcome.SENSITIVE:
         return f"the worn volume {known_to(worn)}"
     above = np.flatnonzero(_state_errors(history, known) > task.settings.rtol)
@@ -262,10 +292,15 @@ def _message(
     return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
 
 
-def _missed(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float) -> str:
-    """That the target of a history was not reached; empty where it was, or where there is none."""
-    if task.until is None or not known.size or not math.isnan(target):
+def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, *, whole: bool) -> str:
+    """That the target of a history was not reached, or that the counts behind it are not computed; else empty.
+
+    known, whole: as in `scaled_outcome`.
+    """
+    if task.until is None or not known.size:
         return ""
+    if not math.isnan(target):
+        return "" if whole else f"at its target at cycle {show_count(target)}: later counts are not computed"
     deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
     value, unit = (deepest, "m") if task.until.quantity == "wear_depth" else (volume, "m3")
     return f"{task.until.quantity} stays below {task.until.value:g} {unit}: it is {value:.3g} {unit} at the last count"
@@ -285,6 +320,8 @@ def _variable(
         values = np.angle(history.response)
     elif name == "wear_rate":
         values = slower * history.wear_rate
+    elif name == "cycle_count":
+        values = history.cycles / slower
     else:
         values = getattr(history, name)
     found = values[np.minimum(rows, len(values) - 1)]

@@ -202,6 +202,16 @@ LOOPS = {
 }
 """Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
 
+COUNTS = {
+    "cycle_count": Variable(
+        ("cycle",),
+        "1",
+        "number of vibration cycles of the output",
+        comment="Of each point its own: its outputs are equally spaced in worn volume.",
+    )
+}
+"""That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
+
 LOOP_PHASES = 128
 """Phases of a loop, equally spaced over a period from 0: those that the solver has."""
 
@@ -258,7 +268,8 @@ KEPT = {
         (),
         "1",
         "cycle count up to which the point was computed",
-        comment="Values after it are NaN, or 0 where a variable is a whole number; NaN where there is no state at all.",
+        comment="Values after it are NaN, or 0 where a variable is a whole number; NaN where there is no state at all."
+        " A point that reaches slow_time.until ends, as converged, with the step that does so.",
     ),
     "largest_wear_depth": Variable(
         (),
@@ -286,6 +297,16 @@ KEPT = {
         "int8",
         ("steady", "oscillating"),
         comment="Only the explicit scheme is watched.",
+    ),
+    "final_method": Variable(
+        (),
+        "1",
+        "how the scheme final has found the final state",
+        "int8",
+        ("none", "active_set", "march"),
+        comment="none with the other schemes. active_set: without slow time, tested to be what a march comes to;"
+        " outputs between the unworn and the final state are NaN, or 0 where a variable is a whole number, and"
+        " last_cycle is infinite. march: message says why.",
     ),
     "message": Variable(
         (),

@@ -84,6 +84,8 @@ class WearHistory:
     step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf where
         there is none.
     oscillates: the wear rate went up and down from step to step without calming, as in an unstable explicit scheme.
+    final_method: "active_set" or "march", how the scheme "final" has found the final state; empty with the others. A
+        final state of an active set has the count inf, and nothing is known between the unworn one and it.
     message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
         longer and the error reached; empty where there is nothing to add.
     """
@@ -122,4 +124,5 @@ class WearHistory:
     fold_frequency: float = math.nan
     step_limit: float = math.inf
     oscillates: bool = False
+    final_method: str = ""
     message: str = ""

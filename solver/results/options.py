@@ -40,6 +40,12 @@ class ResultOptions:
     target_resolution: float = 1e-12
     """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""
 
+    trail_steps: int = 8
+    """Steps of a march to the end that are kept for each of its outputs, at most; half as many after those that wear
+    least were left out."""
+    trail_outputs: int = 50
+    """Outputs that such steps are kept for at least, however few are wanted."""
+
     def companion_safety(self, scheme: Scheme) -> float:
         """Error of a history over its difference to the companion."""
         factors = {"implicit": self.implicit_safety, "explicit": self.explicit_safety, "adaptive": self.adaptive_safety}

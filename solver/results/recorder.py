@@ -61,6 +61,7 @@ class Recorder:
     they close, stay within the friction cone and have the mean pressure that is reported at the same count.
 
     target: wear whose count is looked for between the steps in the same way; reached: that count, NaN until then.
+    compared (n_output, n_contact): m, depths of the coarser history, once it has finished.
     """
 
     model: ReducedModel
@@ -76,6 +77,7 @@ class Recorder:
     local: float = field(init=False, default=0.0, repr=False)
     truncation: float = field(init=False, default=0.0, repr=False)
     pair_truncation: FloatArray = field(init=False, repr=False)
+    compared: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         n_output, n_contact = self.cycles.size, self.model.contact.n_contact
@@ -160,6 +162,9 @@ class Recorder:
         self.kept["pair_truncation"][wanted] = self.pair_truncation
         self.last = (cycle, report, rate)
 
+    def compare(self, difference: FloatArray | None) -> None:
+        """The coarser history says by itself what its depths are at the counts."""
+
     def _look_for_target(
         self, before: float, cycle: float, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray]
     ) -> None:
@@ -222,6 +227,7 @@ class Recorder:
             With the errors of volume and depths.
         """
         kept, area = dict(self.kept), self.model.contact.area
+        self.compared = companion
         local, truncation, of_pairs = (kept.pop(name) for name in ("local", "truncation", "pair_truncation"))
         difference = _held(np.abs(kept["wear_depth"] - companion)) * RESULTS.companion_safety(self.scheme)
         volume = kept["wear_depth"] @ area
@@ -300,6 +306,14 @@ def depth_within(
     grown = after[0] - before[0]
     if not smooth or length <= 0.0:
         return np.asarray(before[0] + s * grown)
-    slopes = [np.minimum(rate * length, 3.0 * grown) for _, rate in (before, after)]
+    slopes = bent_within(grown, length, before[1], after[1])
     bent = (1.0 - s) ** 2 * s * slopes[0] - s**2 * (1.0 - s) * slopes[1]
     return np.asarray(before[0] + s**2 * (3.0 - 2.0 * s) * grown + bent)
+
+
+def bent_within(grown: FloatArray, length: float, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Slopes of the depth at both ends of a step of `length` cycles, over the step, m; none so steep that it falls.
+
+    grown: depth that the step wears, m. first, last: wear rates at its ends, m per cycle. All (n_contact,).
+    """
+    return np.minimum(first * length, 3.0 * grown), np.minimum(last * length, 3.0 * grown)

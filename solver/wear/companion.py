@@ -117,11 +117,14 @@ class Companion:
             self.steps = AdaptiveSteps(self.trajectory, 1.0)
             self.steps.load_state(state["steps"])
 
-    def follow(self, at_once: bool = False) -> None:
-        """The history has taken a step. at_once: it is not known whether another one follows."""
+    def follow(self, at_once: bool = False) -> FloatArray | None:
+        """The history has taken a step. at_once: it is not known whether another one follows.
+
+        Its depths less those of the history (n_contact,), m, where it has come to it; None where it waits.
+        """
         self.waiting += 1
         if self.waiting < 2 and not at_once:
-            return
+            return None
         self.waiting = 0
         self.effort.deadline = self.main.effort.deadline
         # one that has spent more is lost between jumps; behind them it may be found again
@@ -132,8 +135,9 @@ class Companion:
         if lost or not self._catch_up():
             self._begin_anew()
         area, depth = self.main.joint.contact.area, self.main.point.evaluation.wear_depth
-        differs = np.abs(self.offset + self.trajectory.point.evaluation.wear_depth - depth)
-        self.met.append((self.main.cycle, float(differs @ area)))
+        differs = self.offset + self.trajectory.point.evaluation.wear_depth - depth
+        self.met.append((self.main.cycle, float(np.abs(differs) @ area)))
+        return np.asarray(differs)
 
     def _catch_up(self) -> bool:
         """Steps to the count of the history; False where it does not come to it."""

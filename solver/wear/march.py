@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
-from solver.settings import Scheme, SolverSettings, WearTarget
+from solver.results.trail import TrailRecorder
+from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import build_case
 from solver.wear.bdf2 import AdaptiveSteps
 from solver.wear.companion import Companion
+from solver.wear.final_state.end import EndWatch
 from solver.wear.options import WEAR
 from solver.wear.step_limit import StepTooLongError
 from solver.wear.trajectory import Trajectory
@@ -31,7 +33,7 @@ def march_wear(
     wear_coefficient: float,
     step: float,
     scheme: Scheme,
-    cycles: FloatArray,
+    cycles: FloatArray | ToTheEnd,
     settings: SolverSettings,
     largest_depth: float | None = None,
     loops: tuple[int, ...] = (),
@@ -54,7 +56,9 @@ def march_wear(
         "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.bdf2`).
     cycles
         (n_output,), ascending counts to report, the first 0. Between two steps they are interpolated, and the last step
-        is shortened to end on the last of them.
+        is shortened to end on the last of them. Or a march to the end, whose counts are found on the way: then steps
+        grow without bound, those of the implicit scheme so that each wears as much as the first one did. The explicit
+        scheme, whose steps must not grow, takes no such march.
     settings
         Harmonics, samples, tolerances, limit of time.
     largest_depth
@@ -77,17 +81,22 @@ def march_wear(
         As far as it was computed; its outcome says how it ended. No error is raised for a march that fails.
     """
     started = computing_time()
-    recorder = Recorder(model, cycles, start.newton_iterations, start.run_time, scheme, len(loops), until)
+    endless = isinstance(cycles, ToTheEnd)
+    counts = np.zeros(cycles.n_outputs) if isinstance(cycles, ToTheEnd) else cycles
+    end = float("inf") if endless else float(counts[-1])
+    kind = TrailRecorder if endless else Recorder
+    recorder = kind(model, counts, start.newton_iterations, start.run_time, scheme, len(loops), until)
     if start.state is None:
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     march = Trajectory(case, start, wear_coefficient, scheme, loops, law)
-    companion = Companion(march, start, cycles)
+    companion = Companion(march, start, counts)
+    watch = EndWatch(march, cycles.final_share if isinstance(cycles, ToTheEnd) else None)
     spent_before, message = 0.0, ""
     march.effort.deadline = started + settings.time_limit
     try:
-        outcome, n_steps, end = Outcome.CONVERGED, 0, float(cycles[-1])
+        outcome, n_steps = Outcome.CONVERGED, 0
         if resume is None:
             outcome = march.begin()
             if outcome is Outcome.CONVERGED:
@@ -98,6 +107,7 @@ def march_wear(
             march.load_state(states[0])
             recorder.load_state(states[1])
             companion.load_state(states[3])
+            watch.load_state(states[4])
             march.effort.deadline -= spent_before
         steps: AdaptiveSteps | FixedSteps = (
             AdaptiveSteps(march, settings.rtol) if scheme == "adaptive" else FixedSteps(march, end, step, largest_depth)
@@ -105,9 +115,13 @@ def march_wear(
         if resume is not None:
             steps.load_state(states[2])
         refreshed = march.effort.iterations
-        while outcome is Outcome.CONVERGED and march.cycle < end and np.isnan(recorder.reached):
+        while outcome is Outcome.CONVERGED and march.cycle < end and np.isnan(recorder.reached) and not watch.ended():
             if not march.wears():
-                recorder.add(end, march.report(), wear_coefficient)
+                if not endless:
+                    recorder.add(end, march.report(), wear_coefficient)
+                break
+            if message := watch.goes_on(n_steps):
+                outcome = Outcome.NO_FINAL_STATE
                 break
             n_steps += 1
             if march.effort.iterations > WEAR.march_iterations + WEAR.step_iterations * n_steps:
@@ -130,10 +144,12 @@ def march_wear(
             if outcome is not Outcome.CONVERGED:
                 break
             recorder.add(march.cycle, march.report(), wear_coefficient, steps.error)
-            companion.follow(at_once=march.cycle >= end or not np.isnan(recorder.reached))
+            watch.note()
+            at_once = march.cycle >= end or not np.isnan(recorder.reached) or watch.ended()
+            recorder.compare(companion.follow(at_once))
             if march.effort.iterations >= refreshed + WEAR.iterations_per_save:
                 spent = spent_before + computing_time() - started
-                parts = (march, recorder, steps, companion)
+                parts = (march, recorder, steps, companion, watch)
                 progress = pack([n_steps, spent, *(part.state_dict() for part in parts)])
                 # with or without anybody who keeps it, so that all marches go on from the same numbers
                 for part, state in zip(parts, unpack(progress)[2:], strict=True):
@@ -154,13 +170,13 @@ def march_wear(
         outcome, message = Outcome.EXCEPTION, describe_error(error)
     spent = spent_before + computing_time() - started
     # adaptive steps go beyond the end
-    jump_cycle = march.jump_cycle if march.jump_cycle <= cycles[-1] else float("nan")
+    jump_cycle = march.jump_cycle if march.jump_cycle <= end else float("nan")
     n_iterations = march.effort.iterations + companion.effort.iterations
     history = recorder.finish(
         outcome, jump_cycle, n_iterations, spent, companion.kept, companion.met, companion.start_error
     )
     if outcome is Outcome.CONVERGED:
-        outcome, message = _judge(march, history, companion)
+        outcome, message = _judge(march, history, recorder.compared)
     return replace(
         history,
         outcome=outcome,
@@ -173,12 +189,12 @@ def march_wear(
     )
 
 
-def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tuple[Outcome, str]:
-    """Outcome of a history that has come to its end, and what it does not say by itself."""
+def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tuple[Outcome, str]:
+    """Outcome of a history that has come to its end, and what it does not say by itself; compared: its companion."""
     if history.error_estimate > SENSITIVE_ERROR:
         # one that has reached its target has no last count
         area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.wear_depth).all(axis=1))[-1])
-        volume, other = (1e9 * float(depth[last] @ area) for depth in (history.wear_depth, companion.kept))
+        volume, other = (1e9 * float(depth[last] @ area) for depth in (history.wear_depth, compared))
         known = "not known" if history.error_estimate >= 1.0 else f"known to {100 * history.error_estimate:.2g} % only"
         coarser = "steps twice as long from the start state of a coarser sweep"
         if not np.isfinite(other):
@@ -203,7 +219,8 @@ def _judge(march: Trajectory, history: WearHistory, companion: Companion) -> tup
 class FixedSteps:
     """Explicit or implicit Euler steps of a given length, or explicit ones by the largest-depth rule, Eq. (22).
 
-    end: last cycle count. step: h, cycles. largest_depth: m, None where the step is given.
+    end: last cycle count; inf: implicit steps grow so that each wears as much as the first one, at most to twice the
+    last one. step: h, cycles. largest_depth: m, None where the step is given.
     error: None; that of an Euler step shows in the wear rates at its ends.
     """
 
@@ -212,23 +229,32 @@ class FixedSteps:
     step: float
     largest_depth: float | None
     error: None = None
+    length: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.length = self.step
 
     def advance(self) -> tuple[bool, float]:
         """One step: whether the branch goes on, and the length of the step in cycles."""
         before = self.trajectory.cycle
         planned = self.step
+        if self.end == np.inf:
+            rates = self.trajectory.rates
+            slower = float(rates.largest[-1] / rates.value[-1])
+            planned = self.length = min(WEAR.largest_step_ratio * self.length, self.step * slower)
         if self.largest_depth is not None and self.trajectory.scheme == "explicit":
             planned = self.largest_depth / float(self.trajectory.rate().max())
         # a remainder below round-off of the count is no step of its own
         reach = self.end if before + planned >= self.end * (1.0 - 1e-12) else before + planned
         return self.trajectory.advance(reach), reach - before
 
-    def state_dict(self) -> dict[str, object]:
-        """Nothing goes on from step to step."""
-        return {}
+    def state_dict(self) -> dict[str, float]:
+        """What goes on from step to step, to be packed."""
+        return {"length": self.length}
 
-    def load_state(self, state: dict[str, object]) -> None:
-        """Nothing to go on from."""
+    def load_state(self, state: dict[str, float]) -> None:
+        """Go on from the state of another one."""
+        self.length = state["length"]
 
     def restart(self) -> None:
         """Euler steps know nothing of those before."""

@@ -54,6 +54,38 @@ class WearOptions:
     no_wear: float = 1e-12
     """Of the same: a joint that wears less sticks."""
 
+    # marches to the end
+    steady_rate: float = 0.01
+    """Relative change of the wear rate of a joint that slips everywhere, over the last nine tenths of its worn volume,
+    below which it has become steady and does not end."""
+    acted_back: float = 100.0
+    """Of the normal force of a pair: what its depth would move by itself, all others held, before a rate counts as
+    steady: less may not have acted back on the joint yet. Long waves of n pairs are about n times as soft."""
+    bears: float = 1e-9
+    """Of the largest normal force: a pair with less does not bear the joint."""
+    steps_to_the_end: int = 20_000
+    """Of a march that comes to no end; a joint takes 2 to 10 steps a pair."""
+    longest_march: float = 1e25
+    """Cycles, the same."""
+
+    # final state without slow time
+    off_margin: float = 10.0
+    """Of the overlap of all pairs, each as if it alone gave way: how far a pair is taken off, so that it stays open
+    while others are taken off; what comes out does not depend on it."""
+    off_tolerance: float = 1e-3
+    """Of the tolerance of a state: depths are read from this one, which takes an iteration more (a sphere: 3e-6 of its
+    depth off without it)."""
+    off_attempts: int = 4
+    """With ten times the margin each."""
+    loss_of_rate: float = 0.5
+    """Of what its own wear changes of the wear rate of a pair, that the wear of the others may take of it: more, and it
+    may stick again. A cylinder in partial slip: they add 0.4 to 0.9; a sphere: they take 0.2 at the edge of the stick
+    zone unworn, and add later."""
+    same_depth: float = 1e-3
+    """Of the deepest pair, by how much the final depths may differ with the friction that another way leaves."""
+    tested_states: int = 3
+    """Between the unworn and the final state, the first included, at which this is tested."""
+
     # loss of a branch
     fold_resolution: float = 0.01
     """Of the cycle count: how exactly the end of a branch is found."""

@@ -13,7 +13,7 @@ from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import march_variables
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
@@ -34,7 +34,7 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     for name in march_variables(study):
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
-        entry = LOOPS.get(name) or ASKED[name]
+        entry = {**ASKED, **LOOPS, **COUNTS}[name]
         fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
     return np.dtype(fields)
 

@@ -35,6 +35,14 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
     return found
 
 
+def coordinate_entry(study: Study, name: str) -> Variable:
+    """What a coordinate of this study is."""
+    if name == "cycle" and study.to_the_end:
+        comment = "Equally spaced in worn volume, from none to the last; cycle_count has the counts of each point."
+        return Variable((), "1", "number of the output", comment=comment)
+    return COORDINATES[name]
+
+
 def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
     """Coordinates of the file: name, dimension, values."""
     found: dict[str, tuple[str, NDArray[np.generic]]] = {

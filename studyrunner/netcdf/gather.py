@@ -22,7 +22,7 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.records import empty_record, variable_sizes
 from studyrunner.checkpoint.store import Store
-from studyrunner.netcdf.attributes import attributes, coordinates
+from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
@@ -32,7 +32,7 @@ from studyrunner.summary.certificates import CertificateTable
 from studyrunner.summary.findings import Findings
 from studyrunner.system.files import replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, Variable
+from studyrunner.variables import ASKED, COORDINATES, COUNTS, KEPT, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment
@@ -192,6 +192,7 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
     sizes = variable_sizes(study, facts)
     asked = [name for name in ASKED if name in study.outputs.variables]
     variables = {**{name: ASKED[name] for name in asked}, **(LOOPS if study.outputs.loops else {}), **KEPT}
+    variables |= COUNTS if study.to_the_end else {}
     for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
         file.createDimension(name, size)
     slab = _slab_shape(shape, store.kind.itemsize)
@@ -316,7 +317,7 @@ def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Se
 
 def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -> None:
     for name, (dimension, values) in coordinates(study, facts).items():
-        _write_whole(file, name, (dimension,), values, COORDINATES[name])
+        _write_whole(file, name, (dimension,), values, coordinate_entry(study, name))
 
 
 def _write_whole(

@@ -22,6 +22,12 @@ ITERATIONS_A_STEP = 3
 ADAPTIVE_STEPS = 40
 """Of a march by the adaptive scheme, whatever `step` says."""
 
+STEPS_TO_THE_END = 100
+"""Of a march with growing steps, until nothing wears any more (20 pairs: 50 to 110)."""
+
+ITERATIONS_TO_A_FINAL_STATE = 50
+"""Of the scheme "final" where it needs no march (4 to 35 pairs: 15 to 60)."""
+
 ITERATIONS_AN_ADAPTIVE_STEP = 8
 """For one of them, steps that are refused and the coarser history included (48 pairs: 11, 336 pairs: 23 beside the
 resonance, 3 away from it)."""
@@ -50,9 +56,11 @@ def seconds_an_iteration(n_unknowns: int) -> float:
 
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
     """Newton iterations of a march over so many cycles where the joint wears."""
+    if cycles > 0.0 and scheme == "final":
+        return ITERATIONS_TO_A_FINAL_STATE
     if cycles > 0.0 and scheme == "adaptive":
         return ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
-    return ITERATIONS_A_STEP * max(1, math.ceil(cycles / step))
+    return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:

@@ -52,7 +52,8 @@ class Identities:
         """Of the histories of a march, one after the other."""
         start = self.of_starts(branch)[march.position]
         own = (*self._wear(march, march.histories[0]), march.scheme if not march.held else "", march.held)
-        kept = march.cycles, march.loops, None if march.until is None else astuple(march.until)
+        ends = [None if each is None else astuple(each) for each in (march.until, march.to_the_end)]
+        kept = march.cycles, march.loops, tuple(ends)
         if kept not in self._kept:
             self._kept[kept] = _digest(self._kind, kept)
         base = ("history", start, self._kept[kept], own, march.largest_depth, self._law)
@@ -71,7 +72,7 @@ class Identities:
     @staticmethod
     def _wear(march: MarchTask, scaled: ScaledHistory) -> tuple[float, float | None]:
         """Wear coefficient and, where it matters, step."""
-        of_its_own = march.held or march.scheme == "adaptive"
+        of_its_own = march.held or march.scheme in ("adaptive", "final")
         of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
         return scaled.wear_coefficient, None if of_its_own else scaled.step
 

@@ -24,8 +24,11 @@ def known_to(error: float) -> str:
 
 
 def describe_reach(last: float, end: float, error: float) -> str:
-    """How far a history was computed that ends early, and the relative error of the last worn volume that is known."""
-    reached = f"computed up to cycle {show_count(last)} of {show_count(end)}"
+    """How far a history was computed that ends early, and the relative error of the last worn volume that is known.
+
+    end: count that was asked for, inf where there is none.
+    """
+    reached = f"computed up to cycle {show_count(last)}" + (f" of {show_count(end)}" if end < math.inf else "")
     # before the first count that was asked for nothing has worn, and that is known exactly
     known = last > 0.0 and 0.0 < error < math.inf
     return f"{reached}, the worn volume there to {show_percent(error)}" if known else reached

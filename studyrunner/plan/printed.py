@@ -10,6 +10,7 @@ from studyrunner.plan.estimate import (
     COMPILE_SECONDS,
     ITERATIONS_A_STEP,
     ITERATIONS_AN_ADAPTIVE_STEP,
+    ITERATIONS_TO_A_FINAL_STATE,
     memory_a_rank,
     seconds_an_iteration,
 )
@@ -43,10 +44,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
-        (
-            "cycles",
-            f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept",
-        ),
+        ("cycles", _cycles(study)),
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
@@ -61,10 +59,19 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
     return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
 
 
+def _cycles(study: Study) -> str:
+    if study.to_the_end:
+        kept = f"{len(study.cycles_kept)} states are kept, equally spaced in worn volume"
+        return f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest; {kept}"
+    return f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept"
+
+
 def _assumed(study: Study, plan: TaskPlan) -> str:
     """What the time is estimated from."""
     milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
+    if "final" in study.axes.scheme:
+        said += f", final {ITERATIONS_TO_A_FINAL_STATE} in all where it needs no march"
     if "adaptive" in study.axes.scheme:
         said += f", adaptive {ADAPTIVE_STEPS} steps of {ITERATIONS_AN_ADAPTIVE_STEP}"
     return f"{said}, none where nothing slips; a first run compiles for {COMPILE_SECONDS} s more"
@@ -73,7 +80,7 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
 def _solver(study: Study, facts: SceneFacts) -> str:
     """How finely and how exactly, and how far automatic harmonics can go in this scene."""
     values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
-    if AUTO in (*study.harmonics, *study.samples) or "adaptive" in study.axes.scheme:
+    if AUTO in (*study.harmonics, *study.samples) or {"adaptive", "final"} & set(study.axes.scheme):
         values["rtol"] = study.rtol
     shown = [f"{key} {' or '.join(map(_setting, items))}" for key, items in values.items()]
     if AUTO in study.harmonics and facts.largest_harmonics is not None:

@@ -29,6 +29,8 @@ _REASONS = {
     "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
     "adaptive steps": "the adaptive scheme chooses its steps, whatever the step axis says",
     "adaptive wear": "the adaptive scheme takes the same steps for every wear_coefficient, at other cycle counts",
+    "final steps": 'the scheme "final" takes no step of a given length, whatever the step axis says',
+    "final wear": 'the scheme "final" comes to the same state for every wear_coefficient',
     "equal products": "wear_coefficient times step is that of another point: the same history at other cycle counts",
     "rtol": "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
 }
@@ -99,28 +101,29 @@ def share_histories(study: Study) -> Sharing:
             idle.setdefault(("cycles", wear), []).append(choice)
         elif proportional and axes.wear_coefficient[wear] == 0.0:
             idle.setdefault(("wear_coefficient", wear), []).append(choice)
-        elif scheme == "adaptive":
-            idle.setdefault(("adaptive steps", wear), []).append(choice)
+        elif scheme in ("adaptive", "final"):
+            idle.setdefault((f"{scheme} steps", wear), []).append(choice)
         elif scheme == "explicit" and slow_time.largest_depth is not None:
             # The last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories.
             idle.setdefault(("largest_depth", wear), []).append(choice)
         else:
             fixed.setdefault(place, []).append(choice)
-    adaptive: list[tuple[Choice, ...]] = []
+    free: dict[str, list[tuple[Choice, ...]]] = {"adaptive steps": [], "final steps": []}
     for (cause, _), members in idle.items():
         causes[cause] += len(members) - 1
-        if cause == "adaptive steps":
-            adaptive.append(tuple(members))
+        if cause in free:
+            free[cause].append(tuple(members))
         else:
             marches.append(Alike((tuple(members),), held=cause != "largest_depth"))
     if not proportional:
-        marches += [Alike((same,)) for same in adaptive]
+        marches += [Alike((same,)) for same in itertools.chain.from_iterable(free.values())]
         marches += [Alike(((choice,),)) for choice in itertools.chain.from_iterable(fixed.values())]
-        adaptive, fixed = [], {}
-    if adaptive:
-        farthest_first = sorted(adaptive, key=lambda members: -axes.wear_coefficient[members[0][0]])
-        marches.append(Alike(tuple(farthest_first)))
-        causes["adaptive wear"] += len(adaptive) - 1
+        free, fixed = {}, {}
+    for cause, lines in free.items():
+        if lines:
+            farthest_first = sorted(lines, key=lambda members: -axes.wear_coefficient[members[0][0]])
+            marches.append(Alike(tuple(farthest_first)))
+            causes[cause.replace("steps", "wear")] += len(lines) - 1
     for of_scheme in fixed.values():
         for same in _same_products(study, of_scheme):
             marches.append(Alike(tuple((choice,) for choice in same)))
@@ -131,7 +134,11 @@ def share_histories(study: Study) -> Sharing:
 
 def rtol_is_idle(study: Study, harmonics: int | Automatic, samples: int | Automatic) -> bool:
     """Whether `rtol` changes nothing with such harmonics and samples, so that its values share branch and histories."""
-    return study.solver.shortcuts and AUTO not in (harmonics, samples) and "adaptive" not in study.axes.scheme
+    return (
+        study.solver.shortcuts
+        and AUTO not in (harmonics, samples)
+        and not {"adaptive", "final"} & set(study.axes.scheme)
+    )
 
 
 def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Choice, ...]]:
@@ -153,7 +160,12 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
             groups.append([choice])
     for group in groups:
         farthest, *others = sorted(group, key=lambda choice: -wears[choice[0]])
-        whole = [choice for choice in others if _whole_number(study.cycles_kept[-1] / steps[choice[1]]) is not None]
+        # a march to the end has no last step that is shortened
+        whole = [
+            choice
+            for choice in others
+            if study.to_the_end or _whole_number(study.cycles_kept[-1] / steps[choice[1]]) is not None
+        ]
         yield (farthest, *whole)
         yield from ((choice,) for choice in others if choice not in whole)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from solver.packing import Packed
-from solver.settings import Automatic, SolverSettings, WearTarget
+from solver.settings import Automatic, SolverSettings, ToTheEnd, WearTarget
 from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
@@ -30,7 +30,7 @@ from studyrunner.plan.sharing import (
     share_histories,
 )
 from studyrunner.study.study import AUTO, SOLVER_AXES, Study
-from studyrunner.variables import ASKED, CERTIFICATE, LOOPS
+from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """First keys of the kin of tasks, see LearnedCosts."""
@@ -98,8 +98,9 @@ class MarchTask:
     branch, position: number of the branch and place of the frequency in it. histories: the one that goes
     farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
     cycle 0 holds for all cycles; step and scheme are then those of the first point.
-    cycles: output counts of every history. until: wear at which it ends before the last of them. variables: what is
-        handed back. loops: pairs whose fretting loops are in it.
+    cycles: output counts of every history. until: wear at which it ends before the last of them. to_the_end: where
+        given, cycles are numbers of the outputs, whose counts the march finds.
+    variables: what is handed back. loops: pairs whose fretting loops are in it.
     cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
         those planned for and something moves.
     start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
@@ -121,6 +122,7 @@ class MarchTask:
     n_unknowns: int
     moves: bool = True
     until: WearTarget | None = None
+    to_the_end: ToTheEnd | None = None
     start: Packed | None = field(default=None, compare=False, repr=False)
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
@@ -149,7 +151,7 @@ class MarchTask:
         """Cycle counts of the march that a history is read at, one for each of `cycles`."""
         if self.held:
             return (0.0,) * len(self.cycles)
-        return march_counts(self.cycles, scaled, self.histories[0], self.scheme != "adaptive")
+        return march_counts(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
 
     @property
     def opens_others(self) -> bool:
@@ -254,7 +256,7 @@ def _stretches(sweep: str, ascending: list[int]) -> Iterator[list[int]]:
 def march_variables(study: Study) -> tuple[str, ...]:
     """Variables that a march hands back: those asked for and those that the table at the end is made of."""
     asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
-    return (*asked, *(LOOPS if study.outputs.loops else ()))
+    return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 
 def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
@@ -302,7 +304,8 @@ def _marches(
     for alike in sharing.marches:
         histories = _histories(study, alike, frequency, lines)
         scheme = axes.scheme[alike.histories[0][0][2]]
-        cycles = 0.0 if alike.held else study.cycles_kept[-1]
+        cycles = 0.0 if alike.held else math.inf if study.to_the_end else study.cycles_kept[-1]
+        end = ToTheEnd(len(study.cycles_kept), study.slow_time.final_share) if study.to_the_end else None
         yield MarchTask(
             number=next(numbers),
             branch=branch[0],
@@ -318,6 +321,7 @@ def _marches(
             cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, histories[0].step),
             n_unknowns=n_unknowns,
             until=study.until,
+            to_the_end=end,
         )
 
 

@@ -17,6 +17,7 @@ from studies.fe_models.model_files import ModelFiles
 from studyrunner.study.archive import Archived
 from studyrunner.study.values import (
     Axis,
+    Cycles,
     Fraction,
     Harmonics,
     NotNegative,
@@ -121,9 +122,16 @@ class AxesSection(Section):
 class SlowTimeSection(Section):
     """[slow_time]: how far, and which cycle counts are kept."""
 
-    cycles: NotNegative = Field(100_000.0, description="cycles; 0 for the unworn states only")
+    cycles: Cycles = Field(
+        100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
+    )
+    final_share: Fraction = Field(
+        1e-4, description="of the largest wear rate of each pair: below it nothing wears any more, with cycles = inf"
+    )
     outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
-        101, description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts"
+        101,
+        description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts; with"
+        " cycles = inf their number, equally spaced in worn volume",
     )
     until: Annotated[dict[str, float] | None, BeforeValidator(_read_target)] = Field(
         None, description="wear at which a point ends, {wear_depth = m of the deepest pair} or {worn_volume = m3}"
@@ -252,11 +260,30 @@ class Study(Section):
     def _check_outputs(self) -> Study:
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if isinstance(outputs, tuple):
+            if self.to_the_end:
+                remedy = "give their number: with slow_time.cycles = inf they are equally spaced in worn volume"
+                raise WrongValueError(outputs, remedy, "slow_time.outputs")
             if outputs[-1] > cycles:
                 remedy = f"give cycle counts of at most slow_time.cycles = {cycles:g}"
                 raise WrongValueError(outputs[-1], remedy, "slow_time.outputs")
         elif outputs < 2 and cycles > 0.0:
             raise WrongValueError(outputs, "give at least 2: cycle 0 and the last one", "slow_time.outputs")
+        return self
+
+    @model_validator(mode="after")
+    def _check_end(self) -> Study:
+        if self.to_the_end and "explicit" in self.axes.scheme:
+            remedy = 'give "adaptive" or "implicit": explicit steps cannot grow, as slow_time.cycles = inf asks for'
+            raise WrongValueError("explicit", remedy, "axes.scheme")
+        if "final" in self.axes.scheme and not self.to_the_end:
+            remedy = 'give inf: the scheme "final" finds the state at which nothing wears any more'
+            raise WrongValueError(self.slow_time.cycles, remedy, "slow_time.cycles")
+        if "final" in self.axes.scheme and self.slow_time.until is not None:
+            remedy = 'leave it out: the scheme "final" has no way on which it could be reached'
+            raise WrongValueError(self.slow_time.until, remedy, "slow_time.until")
+        if self.to_the_end and "exact" in self.outputs.variables:
+            remedy = "leave it out: it is of given cycle counts, and slow_time.cycles = inf has none"
+            raise WrongValueError("exact", remedy, "outputs.variables")
         return self
 
     @property
@@ -286,12 +313,19 @@ class Study(Section):
                 return WearTarget(quantity, self.slow_time.until[quantity])
         return None
 
+    @property
+    def to_the_end(self) -> bool:
+        """Whether points are marched until nothing wears any more; their cycle counts are then their own."""
+        return self.slow_time.cycles == math.inf
+
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
-        """Cycle counts of the result, ascending."""
+        """Cycle counts of the result, ascending; numbers of its outputs where points have counts of their own."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if isinstance(outputs, tuple):
             return outputs
+        if self.to_the_end:
+            return tuple(float(number) for number in range(outputs))
         if cycles == 0.0:
             return (0.0,)
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)

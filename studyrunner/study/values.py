@@ -107,12 +107,15 @@ def once(values: Iterable[T]) -> tuple[T, ...]:
 Number = Annotated[float, Field(allow_inf_nan=False), told("give a finite number")]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), told("give a finite number above 0")]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), told("give a finite number that is 0 or more")]
+Cycles = Annotated[float, Field(ge=0, allow_inf_nan=True), told("give a number that is 0 or more, or inf")]
 Fraction = Annotated[float, Field(gt=0, lt=1), told("give a number between 0 and 1")]
 Switch = Annotated[bool, told("give true or false")]
 Text = Annotated[str, told("give a text in quotes")]
 Harmonics = Annotated[int | Automatic, whole(1, 1000, or_auto=True)]
 Samples = Annotated[int | Automatic, whole(4, 100_000, or_auto=True)]
-Scheme = Annotated[Literal["implicit", "explicit", "adaptive"], words("implicit", "explicit", "adaptive")]
+Scheme = Annotated[
+    Literal["implicit", "explicit", "adaptive", "final"], words("implicit", "explicit", "adaptive", "final")
+]
 Sweep = Annotated[Literal["up", "down", "ramp"], words("up", "down", "ramp")]
 Axis = Annotated[tuple[T, ...], BeforeValidator(_spread), AfterValidator(once)]
 """Values of an axis in the order in which they are given, at least one and each once."""

@@ -79,7 +79,9 @@ class CertificateTable:
             self._n_jumps += len(points[row])
         self._add_too_long(points, records["step_limit"])
         self._note("oscillating", points, records["oscillates"] != 0)
-        self._note("unstable", points, complete & ~np.all(records["stable"] != 0, axis=1))
+        # a point that reached its target, or its final state directly, has counts without a state
+        there = ~np.isnan(records["residual"])
+        self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
 
     def format(self) -> str:
         """Table in lines: how well the worn volume is known, whether wear is small, outcomes where loads and wear vary;
@@ -185,5 +187,5 @@ def _where(study: Study, place: _Place) -> str:
             shown = value if isinstance(value, str) else f"{value:.8g}"
             texts.append(f"{name} {shown}" + (f" {units}" if units != "1" else ""))
     if place.cycle is not None and len(study.cycles_kept) > 1:
-        texts.append(f"cycle {study.cycles_kept[place.cycle]:.8g}")
+        texts.append(f"{'output' if study.to_the_end else 'cycle'} {study.cycles_kept[place.cycle]:.8g}")
     return ", ".join(texts)

@@ -74,7 +74,7 @@ class Findings:
             return message
         if math.isnan(last):
             return message or "no state was found"
-        end = self._study.cycles_kept[-1]
+        end = math.inf if self._study.to_the_end else self._study.cycles_kept[-1]
         return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
 
     def _remark(self, number: int) -> str:

@@ -71,7 +71,7 @@ class WornVolumes:
         if of_states and AUTO not in study.harmonics:
             return 'harmonics = "auto"'
         scheme = study.axes.scheme[point[names.index("scheme")]]
-        if scheme == "adaptive":
+        if scheme in ("adaptive", "final"):
             return "a smaller rtol"
         shorter = "a smaller step"
         if scheme == "explicit" and study.slow_time.largest_depth is not None:

@@ -237,8 +237,7 @@ def test_a_sensitive_volume_is_told_with_what_differs(other: float, error: float
     area = np.array([2.0])
     march: Any = SimpleNamespace(joint=SimpleNamespace(contact=SimpleNamespace(area=area)))
     history: Any = SimpleNamespace(error_estimate=error, wear_depth=np.array([[0.0], [0.5e-9]]))
-    companion: Any = SimpleNamespace(kept=np.array([[0.0], [0.5e-9 * other]]))
-    outcome, message = march_module._judge(march, history, companion)
+    outcome, message = march_module._judge(march, history, np.array([[0.0], [0.5e-9 * other]]))
     assert outcome is Outcome.SENSITIVE
     assert message.startswith(said)
 

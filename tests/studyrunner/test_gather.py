@@ -81,6 +81,7 @@ CONTRACT = {
     "outcome": ((), "1"),
     "jump_cycle": ((), "1"),
     "cycles_to_target": ((), "1"),
+    "final_method": ((), "1"),
     "newton_iterations": ((), "1"),
     "run_time": ((), "s"),
     "error_estimate": ((), "1"),
@@ -198,6 +199,7 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "period_doubled",
             "sensitive",
             "step_too_long",
+            "no_final_state",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:

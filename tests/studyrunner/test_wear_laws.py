@@ -94,11 +94,15 @@ def test_points_end_at_their_target_each_at_its_own_count(tmp_path: Path) -> Non
     assert counts[1] == pytest.approx(2.0 * counts[0], rel=1e-9)
     assert np.isnan(counts[2])
     assert result.outcome.values.tolist() == [0, 0, 0]
-    assert result.message.values.tolist()[:2] == ["", ""]
+    for message, count in zip(result.message.values.tolist()[:2], counts[:2], strict=True):
+        assert message.startswith("at its target at cycle ")
+        assert float(message.split()[5].rstrip(":")) == pytest.approx(count, rel=1e-5)
+        assert message.endswith(": later counts are not computed")
     assert result.message.values[2].startswith("wear_depth stays below 1e-05 m: it is ")
     assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]
     depth = result.wear_depth.isel(contact=0)
     assert float(depth.isel(wear_coefficient=0).interp(cycle=counts[0])) == pytest.approx(1e-5, rel=1e-3)
+    assert "unstable states                     none" in whole.attrs["certificate_summary"]
     assert (result.last_cycle[:2] >= result.cycles_to_target[:2]).all()
     # nothing wears, nothing is reached
     still = run_study(study_with("axes.wear_coefficient=0", "slow_time.until={worn_volume = 1e-12}"), tmp_path / "o.nc")

@@ -77,7 +77,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     ends: list[str] = []
     early: list[str] = []
     exact_drawn: list[NDArray[np.float64]] = []
-    highest = 0.0
+    highest = latest = 0.0
     for number, (point, label) in enumerate(choice):
         full = {**shown, **point}
         worn = result.at("worn_volume", full).values
@@ -85,14 +85,16 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
             continue
         highest = max(highest, float(np.nanmax(worn)))
         style = line_style(number, worn.size)
-        panel.plot(cycles(result.cycles), scale(worn), label=label or "computed", **style)
+        counts = result.counts(full)
+        latest = max(latest, float(counts[-1]))
+        panel.plot(cycles(counts), scale(worn), label=label or "computed", **style)
         highest = max(highest, draw_band(result, panel, full, cycles, scale, style["color"]))
         early.append(mark_end(result, panel, full, cycles, scale, style["color"]))
         amount = f"{scale.show(float(worn[-1]), 4)}{tell_error(result, full)}"
         ends += [f"{amount} ({label})" if label else amount] if np.isfinite(worn[-1]) else []
         jump = float(result.at("jump_cycle", full).values) if result.has("jump_cycle") else np.nan
         if np.isfinite(jump):
-            height = np.interp(jump, result.cycles, worn)
+            height = np.interp(jump, counts, worn)
             label_once = (
                 "branch lost, jump" if not any("jump" in end for end in panel.get_legend_handles_labels()[1]) else None
             )
@@ -113,7 +115,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
                 highest = max(highest, float(np.nanmax(exact)))
     panel.set_xlabel(cycles.label("vibration cycles"))
     panel.set_ylabel(scale.label("worn volume"))
-    panel.set_xlim(0.0, cycles(result.cycles[-1]).item())
+    panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
     set_from_zero(panel, scale(highest).item() if highest > NO_VOLUME else 0.0)
     if len(panel.get_lines()) > 1:
         panel.legend()
@@ -165,6 +167,9 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         f"{text.capitalize()} over {course.name} and cycles",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
         "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
+        "Cycles of the shown point: the outputs of each are equally spaced in worn volume"
+        if result.has("cycle_count")
+        else "",
         choice.sentence,
         f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
     )

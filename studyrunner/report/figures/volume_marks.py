@@ -29,7 +29,7 @@ def draw_band(result: Result, panel: Axes, point: Mapping[str, int], cycles: Sca
         return 0.0
     low, high = np.maximum(worn - wrong, 0.0)[told], (worn + wrong)[told]
     options: dict[str, Any] = {"color": colour, "alpha": _BAND, "linewidth": 0.0, "gid": "error"}
-    panel.fill_between(cycles(result.cycles[told]), scale(low), scale(high), **options)
+    panel.fill_between(cycles(result.counts(point)[told]), scale(low), scale(high), **options)
     # a band that leaves the others too little room is cut
     return float(min(high.max(), 2.0 * np.nanmax(worn)))
 
@@ -41,7 +41,7 @@ def mark_end(result: Result, panel: Axes, point: Mapping[str, int], cycles: Scal
     told = np.flatnonzero(np.isfinite(worn))
     if result.computed[place] or not told.size:
         return ""
-    at, last = float(result.cycles[told[-1]]), float(result.last_cycle[place])
+    at, last = float(result.counts(point)[told[-1]]), float(result.last_cycle[place])
     panel.plot(cycles(at), scale(worn[told[-1]]), "X", color=colour, markersize=9, label="ended early")
     ending = result.endings[int(result.dataset["outcome"].values[place])]
     return f"Ended early, at {show_cycles(last)}: {ending.word.replace('_', ' ')}"

@@ -96,6 +96,10 @@ def build_page_data(result: Result, limit: float) -> PageData:
         note = f"The study has {n_points} points, more than the {MOST_POINTS} that can be picked here."
         return PageData(None, (note,))
     notes: list[str] = []
+    if result.has("cycle_count"):
+        notes.append(
+            "Cycle counts are those of the point shown first: the outputs of a point are equally spaced in worn volume."
+        )
     floats = limit / _CHARACTERS_A_FLOAT
     points, last = _point_numbers(result), result.last_cycle
     remarks = {str(place): text for place, text in _remarks(result)}
@@ -120,7 +124,10 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "outcome": result.dataset["outcome"].values.ravel().tolist(),
         "without": np.flatnonzero(~result.held).tolist(),
         "ends": {
-            str(place): float(last.flat[place]) for place in np.flatnonzero(result.held & ~result.computed).tolist()
+            str(place): float(last.flat[place])
+            for place in np.flatnonzero(result.held & (~result.computed | (last < result.cycles[-1]))).tolist()
+            # of counts of their own all are known
+            if not result.has("cycle_count")
         },
         "remarks": remarks,
         "endings": {str(number): ending.sentence for number, ending in result.endings.items()},

@@ -17,6 +17,7 @@ OF_TIME = ("scheme", "step", "rtol")
 
 AUTO = "auto"
 ADAPTIVE = "adaptive"
+FINAL = "final"
 EXPLICIT = "explicit"
 
 
@@ -71,13 +72,13 @@ def list_settings(result: Result) -> dict[Setting, int]:
     for place, given in enumerate(itertools.product(*axes)):
         values: dict[str, object] = dict(zip(keys, given, strict=True))
         scheme = values.get("scheme")
-        if scheme == ADAPTIVE or (scheme == EXPLICIT and by_depth):
+        if scheme in (ADAPTIVE, FINAL) or (scheme == EXPLICIT and by_depth):
             values["step"] = None
         if result.cycles[-1] == 0.0:
             # only unworn states: no scheme takes a step
             scheme = values["scheme"] = values["step"] = None
         automatic = AUTO in [values.get(key, solver.get(key, AUTO)) for key in ("harmonics", "samples")]
-        if scheme != ADAPTIVE and not automatic:
+        if scheme not in (ADAPTIVE, FINAL) and not automatic:
             values["rtol"] = None
         found.setdefault(Setting(**values), place)  # type: ignore[arg-type]
     return found

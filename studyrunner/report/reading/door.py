@@ -15,7 +15,7 @@ import xarray as xr
 
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
-from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, KEPT, LOOPS, SCENE, Variable
+from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, COUNTS, KEPT, LOOPS, SCENE, Variable
 
 MOST_POINTS = 10**6
 """As many as a study may have."""
@@ -23,7 +23,7 @@ MOST_POINTS = 10**6
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", *CERTIFICATE)
+_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "last_cycle", "cycle_count", *CERTIFICATE)
 _MOST_NAMES = 2**20  # values along any dimension
 _LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
 _DEEPEST = 3  # of what is nested in a study
@@ -31,7 +31,7 @@ _INTEGERS = 2.0**63
 _REMEDY = "give a result file of run-study that is whole"
 
 _WITHOUT_AXES = {name: entry for table in ("mesh", "natural_frequency") for name, entry in SCENE[table].items()}
-_WITH_AXES = ASKED | KEPT | LOOPS | SCENE["exact"]
+_WITH_AXES = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _ATTRIBUTES = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": _LONGEST_TEXT}
 _TEXTS = ("scheme", "sweep", "response", "component")

@@ -92,12 +92,12 @@ class Result:
         """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
         last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
         # points of an older file, or of one that was joined to this
-        return np.where(self.computed & np.isnan(last), self.cycles[-1], last)
+        return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
         """Which points hold values, be it of the first cycles only; in the shape of the axes."""
-        return np.asarray(self.computed | (self.last_cycle >= self.cycles[0]))
+        return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
 
     @cached_property
     def errors(self) -> NDArray[np.float64]:
@@ -132,8 +132,16 @@ class Result:
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
-        """Cycle counts that the file holds."""
-        return np.asarray(self.dataset["cycle"].values, dtype=float)
+        """Cycle counts that the file holds; where each point has its own those of the shown point."""
+        return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
+
+    def counts(self, point: Point) -> NDArray[np.float64]:
+        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend."""
+        numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
+        if not self.has("cycle_count"):
+            return numbers
+        own = np.asarray(self.at("cycle_count", point).values, dtype=float)
+        return own if np.isfinite(own).all() and (np.diff(own) > 0.0).all() else numbers
 
     @cached_property
     def title(self) -> str:
@@ -190,6 +198,8 @@ class Result:
         """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
         values = self.dataset[name]
         if values.dtype.kind in "iu" and "cycle" in values.dims:
+            if self.has("cycle_count"):
+                return values.where(self.dataset["cycle_count"].notnull())
             last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
             return values.where(self.dataset["cycle"] <= last)
         return values

@@ -1,0 +1,137 @@
+"""The final state of a joint without slow time: pairs that slip under pressure are worn off until none is left.
+
+In the final state no pair slips, or carries a force while it slips. Many depths are such a state. Where wear at a pair
+only raises the wear rates of the others (`dg_i/dW_j >= 0`, cooperative), a march from the unworn joint comes to the
+least of them, whatever its wear law and its rates: a pair that slips under pressure goes on to do so however deep the
+others are worn, until it carries nothing. So all pairs that slip under pressure are taken off, the state without them
+is solved for, and so on while others begin to slip; none comes back. Their depth is that at which they just graze: the
+largest closing displacement over a period less the gap. At most as many rounds are needed as there are pairs.
+
+Whether the joint is cooperative is tested at states between the unworn and the final one (`cooperation`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.contact.coulomb import SEPARATED
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.model import BoolArray, FloatArray
+from solver.newton.solve_balance import solve_balance
+from solver.structure.joint import Joint
+from solver.wear.euler import held_wear
+from solver.wear.options import WEAR
+from solver.wear.trajectory import Trajectory
+
+
+class NoActiveSetError(Exception):
+    """The construction has come to no state; its text says why."""
+
+
+@dataclass(frozen=True)
+class WornOff:
+    """The joint without its worn pairs.
+
+    point: state in which they just graze. off (n_contact,): those pairs. n_rounds: how often pairs were taken off.
+    """
+
+    point: PathPoint
+    off: BoolArray
+    n_rounds: int
+
+
+def least_rate(trajectory: Trajectory, share: float) -> float:
+    """Wear rate of a pair, m3 per cycle, that counts as none: as `EndWatch` and `Trajectory.wears` have it."""
+    largest = float(trajectory.rates.largest[:-1].max(initial=0.0))
+    return max(share**2 * largest, WEAR.no_wear * trajectory.largest_rate)
+
+
+def wear_off(trajectory: Trajectory, unworn: FloatArray, off: BoolArray, share: float) -> WornOff:
+    """Take off pairs that slip under pressure until none is left.
+
+    Parameters
+    ----------
+    trajectory
+        At the unworn state, or at that without some pairs; it is at the final one afterwards.
+    unworn
+        (n_contact,), m, depth to begin with.
+    off
+        (n_contact,), pairs that are off already, where their depth is to be found anew.
+    share
+        `settings.ToTheEnd.final_share`: a wear rate below its square of the largest is none.
+
+    Raises
+    ------
+    NoActiveSetError
+        Where pairs have a constant normal force, or a state without the pairs is not found.
+    """
+    off, n_rounds = off.copy(), 0
+    for _ in range(unworn.size + 2):
+        begin = (trajectory.rates.value[:-1] > least_rate(trajectory, share)) & ~off
+        if not begin.any() and (n_rounds > 0 or not off.any()):
+            return WornOff(trajectory.point, off, n_rounds)
+        if not trajectory.joint.has_normal[begin].all():
+            raise NoActiveSetError("pairs slip whose normal force no wear changes")
+        off, n_rounds = off | begin, n_rounds + 1
+        point = without(trajectory, unworn, off)
+        depth = grazing_depth(trajectory.joint, point.evaluation, unworn, off)
+        held = Balance.frozen(trajectory.joint, point.evaluation.history, depth)
+        grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
+        trajectory.accept(PathPoint(0.0, grazing, final_history(held, grazing)), 0.0)
+        trajectory.last_change = None
+    raise NoActiveSetError("pairs begin to slip without end")
+
+
+def grazing_depth(joint: Joint, at: Evaluation, unworn: FloatArray, off: BoolArray) -> FloatArray:
+    """Depth (n_contact,), m: that at which the pairs that are off just graze, `unworn` of the others."""
+    return np.where(off, np.maximum(closing(joint, at), unworn), unworn)
+
+
+def closing(joint: Joint, at: Evaluation) -> FloatArray:
+    """Depth (n_contact,), m, at which pairs just graze: largest closing displacement at a sample, less the gap."""
+    return np.asarray((at.displacement_h[:, 0] @ joint.basis.synthesis).max(axis=1) - joint.contact.gap)
+
+
+def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathPoint:
+    """State in which the pairs that are off are open all period long. Raises NoActiveSetError."""
+    joint, last = trajectory.joint, trajectory.point
+    rows = np.flatnonzero(joint.component_index % 3 == 0)
+    stiffness = np.zeros(unworn.size)
+    stiffness[joint.component_index[rows] // 3] = joint.structure.static_stiffness[rows, rows]
+    forces = last.evaluation.force_h[:, 0, 0]
+    overlap = np.divide(forces, stiffness, out=np.zeros_like(forces), where=stiffness > 0.0)
+    margin = WEAR.off_margin * unworn.size * float(overlap.max())
+    force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
+    for _ in range(WEAR.off_attempts):
+        depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
+        balance = Balance.frozen(joint, last.history, depth)
+        start = balance.predict(last.evaluation.displacement_h, force_h)
+        tolerance = trajectory.case.settings.tolerance
+        found = solve_balance(balance, start, trajectory.solver, tolerance, trajectory.effort)
+        point = PathPoint(0.0, found.evaluation, last.history)
+        if not found.converged:
+            before = last.evaluation.wear_depth
+            balance_at = held_wear(joint, before, np.where(off, np.maximum(depth - margin, before), before))
+            near, arrived = follow_naturally(
+                balance_at,
+                PathPoint(0.0, last.evaluation, last.history),
+                1.0,
+                trajectory.solver,
+                tolerance,
+                trajectory.effort,
+                keep_history=True,
+            )
+            if not arrived:
+                raise NoActiveSetError("without the pairs that slip under pressure no state was found")
+            last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
+            continue
+        if (point.evaluation.status_t[off] == SEPARATED).all():
+            finer = WEAR.off_tolerance * tolerance
+            exact = solve_balance(balance, found.evaluation.predicted_h, trajectory.solver, finer, trajectory.effort)
+            return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
+        margin *= 10.0
+    raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")

@@ -1,0 +1,104 @@
+"""Whether wear at a pair lets the others wear on: what the final state of an active set relies on.
+
+Tested are states between the unworn and the final one, at fractions of the final depths. At each of them
+
+- no pair wears that the final state leaves unworn;
+- every pair that the final state takes off slips where it is pressed;
+- by the exact derivatives the wear of the others, at the rates that they have, raises the wear rate of each pair, or
+  takes less of it than a part of what the wear of the pair itself changes:
+
+      sum over j != i of dg_i/dW_j g_j  >=  - `loss_of_rate` |dg_i/dW_i| g_i.
+
+At the end the walk has to arrive where nothing wears, and from there, with the friction that the walk has left in the
+joint, the pairs that are off have to graze at the same depths.
+
+All `dg_i/dW_j >= 0` would be more than is needed: beside a stick zone the pressure that a pair takes over from others
+makes it slip less at first, and it wears off all the same. This is a test of some states, not of all of them.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+
+from solver.contact.alternating_frequency_time import law_tangent
+from solver.contact.wear_law import WearingWork
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.model import FloatArray, IntArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.structure.joint import Joint
+from solver.wear.euler import held_wear
+from solver.wear.final_state.active_set import WornOff, grazing_depth, least_rate, without
+from solver.wear.options import WEAR
+from solver.wear.trajectory import Trajectory
+
+
+def work_slopes(
+    joint: Joint, at: Evaluation, wearing: WearingWork, solver: JacobianSolver, pairs: IntArray
+) -> FloatArray:
+    """Derivatives (n_contact, n_pairs), J/m, of the wearing work of all pairs to the depths of some.
+
+    With `R(p, W) = 0` of the balance the predicted force follows a depth as `dp = -J^-1 Z E dW`, E the static normal
+    displacements; how a table itself depends on the depth is left out.
+    """
+    tangent = Balance.frozen(joint, at.history, at.wear_depth).linearise(at)
+    force_tangent, slip_work_tangent = law_tangent(joint, at)
+    by_work, by_force, _ = wearing.slopes(*worn_by(at))
+    row = by_work[:, None] * slip_work_tangent + by_force[:, None] * force_tangent[:, 0, :]
+    found = np.zeros((joint.contact.n_contact, pairs.size))
+    for place, pair in enumerate(pairs):
+        moved = np.zeros_like(at.displacement_h)
+        moved[pair, 0, 0] = 1.0
+        step = solver.solve(tangent, -joint.structure.apply(joint.to_relative(moved)))
+        found[:, place] = (row * joint.to_pairs(step).reshape(joint.contact.n_contact, -1)).sum(axis=1)
+    return found
+
+
+def failure(trajectory: Trajectory, unworn: PathPoint, final: WornOff, share: float) -> str:
+    """Why the final state of an active set is not that of a march as far as the tests say; empty where they hold.
+
+    trajectory: of the joint, whose state is not used. unworn: state that a march begins at.
+    """
+    joint, tolerance, solver = trajectory.joint, trajectory.case.settings.tolerance, JacobianSolver()
+    before, after = unworn.evaluation.wear_depth, final.point.evaluation.wear_depth
+    balance_at, point = held_wear(joint, before, after), unworn
+    largest = np.zeros(before.size)
+    for place in range(WEAR.tested_states + 1):
+        fraction = place / WEAR.tested_states
+        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, trajectory.effort)
+        if not arrived:
+            return f"the vibration does not go on to {100 * fraction:.0f} % of the final depths"
+        at = point.evaluation
+        # m3 per cycle of each pair
+        rate = trajectory.wear_coefficient * trajectory.wearing.work(*worn_by(at))
+        largest = np.maximum(largest, rate)
+        floor = max(least_rate(trajectory, share), share**2 * float(largest.max(initial=0.0)))
+        if fraction == 1.0:
+            if (rate > np.maximum(share * largest, floor)).any():
+                return "pairs still wear at the final depths, which the vibration comes to in another state"
+            there = copy(trajectory)
+            there.point, there.solver = point, solver
+            free = without(there, before, final.off)
+            apart = float(np.abs(grazing_depth(joint, free.evaluation, before, final.off) - after).max(initial=0.0))
+            if apart > WEAR.same_depth * float(after.max(initial=0.0)):
+                return f"residual shear makes the depths depend on the way to them, by {apart:.2g} m or more"
+            return ""
+        wears = rate > floor
+        where = f"at {100 * fraction:.0f} % of the final depths"
+        if (wears & ~final.off).any():
+            return f"{where} pairs wear that do not in the end"
+        normal = at.force_h[:, 0, 0]
+        pressed = normal > share * float(normal.max(initial=0.0))
+        if (final.off & pressed & ~wears).any():
+            return f"{where} pairs stick under pressure that wear before"
+        pairs = np.flatnonzero(wears)
+        slopes = work_slopes(joint, at, trajectory.wearing, solver, pairs)[pairs]
+        depth_rate = rate[pairs] / joint.contact.area[pairs]
+        own = np.abs(np.diagonal(slopes)) * depth_rate
+        np.fill_diagonal(slopes, 0.0)
+        if (slopes @ depth_rate < -WEAR.loss_of_rate * own).any():
+            return f"{where} the wear of some pairs takes that of others"
+    return ""

@@ -1,0 +1,216 @@
+"""The final state without slow time: where an active set has it, and where only the march does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from solver import march_wear
+from solver.contact.wear_law import WearLaw
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.start_states import follow_branch
+from solver.model import ReducedModel
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.outcome import Outcome
+from solver.results.history import StartState, WearHistory
+from solver.settings import SolverSettings, ToTheEnd
+from solver.structure.joint import build_case
+from solver.wear.final_state.active_set import NoActiveSetError, wear_off
+from solver.wear.final_state.cooperation import failure, work_slopes
+from solver.wear.final_state.find import find_final_state
+from solver.wear.march import march_wear as march_from_start
+from solver.wear.options import WEAR
+from solver.wear.trajectory import Trajectory
+from studies import build_scene
+from tests.studies.half_space_twin import limit_depth
+
+COARSE = SolverSettings(harmonics=3, samples=64)
+END = ToTheEnd(4)
+CASES: dict[str, tuple[str, dict[str, float], float, float, float, float]] = {
+    # scene, parameters, friction, Hz, N, 1/Pa
+    "cylinder": ("cylinder_on_flat", {"strips": 24}, 0.6, 20.0, 1.0, 1e-13),
+    "much slip": ("cylinder_on_flat", {"strips": 24, "Q": 6e4}, 0.6, 20.0, 1.0, 1e-13),
+    "sphere": ("sphere_on_flat", {"patches": 8}, 0.6, 20.0, 1.0, 1e-13),
+    "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
+    "constant load": ("sdof_slider", {"normal_stiffness": 0.0}, 0.5, 160.0, 10.0, 1.1e-11),
+    "at rest": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
+    "some slip": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
+    "beside resonance": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
+}
+
+SLOW = [pytest.param("sphere", marks=pytest.mark.slow), pytest.param("much slip", marks=pytest.mark.slow)]
+
+
+@cache
+def unworn(case: str) -> tuple[ReducedModel, StartState]:
+    scene, parameters, friction, frequency, force, _ = CASES[case]
+    model = build_scene(scene, **parameters)
+    ((_, start),) = follow_branch(model, friction, force, np.array([frequency]), "ramp", COARSE)
+    return model, start
+
+
+@cache
+def found(case: str) -> WearHistory:
+    model, start = unworn(case)
+    return find_final_state(model, CASES[case][2], start, CASES[case][5], END, COARSE)
+
+
+@cache
+def marched(case: str) -> WearHistory:
+    model, start = unworn(case)
+    return march_from_start(model, CASES[case][2], start, CASES[case][5], 1.0, "adaptive", END, COARSE)
+
+
+def trajectory_of(case: str) -> Trajectory:
+    model, start = unworn(case)
+    built = build_case(model, CASES[case][2], start.penalty_omega, COARSE, start.resolution)
+    trajectory = Trajectory(built, start, CASES[case][5], "implicit")
+    assert trajectory.begin() is Outcome.CONVERGED
+    return trajectory
+
+
+@pytest.mark.parametrize("case", ["cylinder", "slider", *SLOW])
+def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -> None:
+    direct, march = found(case), marched(case)
+    assert direct.final_method == "active_set"
+    assert march.final_method == ""
+    assert direct.outcome is Outcome.CONVERGED
+    depth, there = direct.wear_depth[-1], march.wear_depth[-1]
+    assert np.array_equal(depth > 1e-6 * depth.max(), there > 1e-6 * there.max())
+    assert np.abs(depth - there).max() < 1e-4 * depth.max()
+    start = unworn(case)[1].newton_iterations
+    assert 5 * (direct.newton_iterations - start) < march.newton_iterations - start
+    # nothing wears in it, and nothing lies between it and the unworn state
+    assert direct.wear_rate[-1] < 1e-6 * direct.wear_rate[0]
+    assert np.isnan(direct.worn_volume).tolist() == [False, True, True, False]
+    assert direct.cycles[0] == 0.0
+    assert direct.cycles[-1] == direct.last_cycle == np.inf
+    assert direct.residual[-1] < 1e-8
+    assert direct.error_estimate < 1e-3
+    for name in ("response", "mean_pressure"):
+        one, others = getattr(direct, name)[-1], getattr(march, name)
+        assert one == pytest.approx(others[-1], abs=2e-3 * np.abs(others).max()), name
+
+
+@pytest.mark.parametrize("case", ["cylinder", *SLOW])
+def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
+    direct = found(case)
+    limit = limit_depth(unworn(case)[0], direct.slip_range[-1] == 0.0)
+    assert np.abs(direct.wear_depth[-1] - limit).max() < 1e-6 * limit.max()
+
+
+def test_a_spring_that_presses_is_relaxed_to_round_off() -> None:
+    assert found("slider").wear_depth[-1, 0] == pytest.approx(10.0 / 1e5, rel=1e-10)
+
+
+def test_no_wear_law_matters() -> None:
+    model, start = unworn("cylinder")
+    other = find_final_state(model, 0.6, start, 3e-14, END, COARSE, law=WearLaw("energy"))
+    assert other.wear_depth[-1] == pytest.approx(found("cylinder").wear_depth[-1], rel=1e-6, abs=1e-15)
+    assert other.wear_rate[0] == pytest.approx(0.6 * 0.3 * found("cylinder").wear_rate[0])
+
+
+def test_a_joint_at_rest_is_in_its_final_state() -> None:
+    still = found("at rest")
+    assert still.final_method == "active_set"
+    assert not still.wear_depth[-1].any()
+    assert marched("at rest").worn_volume[-1] == 0.0
+
+
+@pytest.mark.slow
+def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
+    direct, march = found("beside resonance"), marched("beside resonance")
+    assert direct.final_method == "march"
+    assert np.array_equal(direct.wear_depth, march.wear_depth)
+    assert np.array_equal(direct.cycles, march.cycles)
+    assert "takes that of others; it has 2" in direct.message
+    assert f"the march {1e9 * march.worn_volume[-1]:.4g} mm3, depths differ by" in direct.message
+
+
+@pytest.mark.slow
+def test_where_residual_shear_matters_the_march_is_taken() -> None:
+    # the same pairs wear off; the friction that is left in the others depends on how fast
+    direct = found("some slip")
+    assert direct.final_method == "march"
+    assert "residual shear makes the depths depend on the way" in direct.message
+    trajectory = trajectory_of("some slip")
+    unworn_depth = trajectory.point.evaluation.wear_depth
+    final = wear_off(trajectory, unworn_depth, np.zeros(unworn_depth.size, bool), 1e-4)
+    worn = direct.wear_depth[-1]
+    assert np.array_equal(final.off, worn > 1e-2 * worn.max())
+    apart = np.abs(final.point.evaluation.wear_depth - worn).max() / worn.max()
+    assert 1e-3 < apart < 5e-2
+
+
+def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:
+    endless = found("constant load")
+    assert endless.outcome is Outcome.NO_FINAL_STATE
+    assert endless.final_method == "march"
+    assert "no active set: pairs slip whose normal force no wear changes" in endless.message
+    trajectory = trajectory_of("constant load")
+    with pytest.raises(NoActiveSetError):
+        wear_off(trajectory, np.zeros(1), np.zeros(1, bool), 1e-4)
+
+
+@pytest.mark.parametrize("case", ["cylinder", pytest.param("beside resonance", marks=pytest.mark.slow)])
+def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -> None:
+    trajectory = trajectory_of(case)
+    joint, at = trajectory.joint, trajectory.point.evaluation
+    pairs = np.argsort(-at.slip_work)[:3]
+    slopes = work_slopes(joint, at, trajectory.wearing, JacobianSolver(), pairs)
+    step = 1e-5 * float(at.slip_work.max() / np.abs(slopes).max())
+    for place, pair in enumerate(pairs):
+        works = []
+        for sign in (1.0, -1.0):
+            depth = at.wear_depth.copy()
+            depth[pair] += sign * step
+            balance = Balance.frozen(joint, at.history, depth)
+            solved = solve_balance(balance, at.predicted_h, JacobianSolver(), 1e-13, Effort())
+            works.append(solved.evaluation.slip_work)
+        wanted = (works[0] - works[1]) / (2.0 * step)
+        assert slopes[:, place] == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
+
+
+def test_the_tests_of_cooperation_refuse_other_final_states() -> None:
+    trajectory = trajectory_of("cylinder")
+    before = trajectory.point
+    none = np.zeros(before.evaluation.wear_depth.size, bool)
+    final = wear_off(trajectory, before.evaluation.wear_depth, none, 1e-4)
+    assert failure(trajectory, before, final, 1e-4) == ""
+    # pairs that slip are left out of the set
+    fewer = final.off.copy()
+    fewer[np.flatnonzero(final.off)[0]] = False
+    assert "wear that do not in the end" in failure(trajectory, before, replace(final, off=fewer), 1e-4)
+    # pairs that stick are taken off
+    more = np.ones_like(final.off)
+    assert "stick under pressure" in failure(trajectory, before, replace(final, off=more), 1e-4)
+    # it stops short of the end
+    half = replace(final.point.evaluation, wear_depth=0.5 * final.point.evaluation.wear_depth)
+    short = replace(final, point=PathPoint(0.0, half, final.point.history))
+    assert "still wear" in failure(trajectory, before, short, 1e-4)
+
+
+def test_what_others_take_of_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    trajectory = trajectory_of("cylinder")
+    before = trajectory.point
+    none = np.zeros(before.evaluation.wear_depth.size, bool)
+    final = wear_off(trajectory, before.evaluation.wear_depth, none, 1e-4)
+    # at least so much they would have to add
+    monkeypatch.setattr("solver.wear.final_state.cooperation.WEAR", replace(WEAR, loss_of_rate=-10.0))
+    assert "takes that of others" in failure(trajectory, before, final, 1e-4)
+
+
+def test_the_front_door_takes_it_to_the_end_only() -> None:
+    model = build_scene("sdof_slider")
+    with pytest.raises(ValueError, match="goes with cycles = inf"):
+        march_wear(model, 160.0, 10.0, 0.5, 1e-11, 1e5, scheme="final")
+    history = march_wear(
+        model, 160.0, 10.0, 0.5, 1e-11, np.inf, scheme="final", sweep="ramp", settings=COARSE, outputs=2
+    )
+    assert history.final_method == "active_set"
+    assert history.wear_depth[-1, 0] == pytest.approx(1e-4)

@@ -1,0 +1,185 @@
+"""Marches until nothing wears any more: where they end, what they keep, and joints that wear without end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import march_wear as march_from_model
+from solver.loading_history.start_states import follow_branch
+from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.results.history import StartState, WearHistory
+from solver.results.trail import TrailRecorder
+from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
+from solver.wear.final_state.find import find_final_state
+from solver.wear.march import march_wear
+from solver.wear.options import WEAR
+from studies import build_scene
+from tests.studies.half_space_twin import limit_depth
+
+COARSE = SolverSettings(harmonics=3, samples=64)
+STRIPS, PER_PRESSURE = 12, 1e-13
+
+
+@cache
+def unworn() -> tuple[ReducedModel, StartState]:
+    """A cylinder in partial slip."""
+    model = build_scene("cylinder_on_flat", strips=STRIPS)
+    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
+    return model, start
+
+
+def worn(cycles: FloatArray | ToTheEnd, scheme: Scheme = "adaptive", **more: Any) -> WearHistory:
+    model, start = unworn()
+    return march_wear(model, 0.6, start, PER_PRESSURE, 1000.0, scheme, cycles, COARSE, **more)
+
+
+@pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
+def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> None:
+    found = worn(ToTheEnd(9), scheme)
+    assert found.outcome is Outcome.CONVERGED
+    limit = limit_depth(unworn()[0], found.slip_range[0] == 0.0)
+    assert limit.max() > 0.0
+    assert np.abs(found.wear_depth[-1] - limit).max() < 2e-4 * limit.max()
+    assert found.wear_rate[-1] < 1e-4 * found.wear_rate.max()
+    assert found.last_cycle == found.cycles[-1]
+    # equal volumes from one output to the next, at counts that are farther and farther apart in the end
+    assert np.diff(found.worn_volume) == pytest.approx(found.worn_volume[-1] / 8, rel=1e-6)
+    assert found.cycles[0] == 0.0
+    assert (np.diff(found.cycles) > 0.0).all()
+    assert np.diff(found.cycles)[-1] > 3.0 * np.diff(found.cycles)[-2]
+
+
+@pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
+def test_the_rows_are_those_of_a_march_to_the_same_counts(scheme: Scheme) -> None:
+    # implicit steps to a given count do not grow: as long as the wear rate rises they are the same
+    found = worn(ToTheEnd(101), scheme)
+    counts = found.cycles if scheme == "adaptive" else found.cycles[found.cycles < 4000.0]
+    read = worn(counts if scheme == "adaptive" else np.append(counts, 4000.0), scheme)
+    n = read.cycles.size
+    assert n > 5
+    for name in ("wear_depth", "mean_pressure", "response", "wear_rate", "slip_range", "residual", "harmonics_used"):
+        there = getattr(found, name)[:n]
+        assert getattr(read, name)[:-1] == pytest.approx(there[:-1], rel=1e-2, abs=1e-6 * np.abs(there).max()), name
+    assert read.wear_depth[1:-1] == pytest.approx(found.wear_depth[1 : n - 1], rel=1e-3, abs=1e-12)
+    assert read.worn_volume_error[1:-1] == pytest.approx(found.worn_volume_error[1 : n - 1], rel=0.5, abs=1e-3)
+
+
+def test_a_smaller_share_goes_nearer_to_the_end() -> None:
+    shares = (1e-1, 1e-2, 1e-3)
+    found = [worn(ToTheEnd(2, share)) for share in shares]
+    limit = limit_depth(unworn()[0], found[0].slip_range[0] == 0.0)
+    left = [np.abs(each.wear_depth[-1] - limit).max() / limit.max() for each in found]
+    assert all(later < 0.5 * earlier for earlier, later in pairwise(left))
+    assert left[0] < 0.1
+
+
+def test_what_is_left_out_of_many_steps_changes_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = worn(ToTheEnd(9))
+    monkeypatch.setattr(TrailRecorder, "_most", 24)
+    lengths: list[int] = []
+    thin: Callable[[TrailRecorder], None] = TrailRecorder._thin
+
+    def count(recorder: TrailRecorder) -> None:
+        thin(recorder)
+        lengths.append(len(recorder.steps))
+
+    monkeypatch.setattr(TrailRecorder, "_thin", count)
+    thinned = worn(ToTheEnd(9))
+    assert lengths
+    assert max(lengths) < 24
+    assert thinned.cycles[-1] == whole.cycles[-1]
+    assert thinned.cycles[1:] == pytest.approx(whole.cycles[1:], rel=1e-2)
+    assert thinned.wear_depth == pytest.approx(whole.wear_depth, abs=2e-3 * whole.wear_depth.max())
+    assert thinned.worn_volume_error == pytest.approx(whole.worn_volume_error, rel=0.5, abs=2e-3)
+
+
+@pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
+def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solver.wear.march.WEAR", replace(WEAR, iterations_per_save=30))
+    kept: list[Packed] = []
+    whole = worn(ToTheEnd(9), scheme, keep=kept.append)
+    assert kept
+    again = worn(ToTheEnd(9), scheme, resume=kept[-1])
+    for name in ("cycles", "wear_depth", "worn_volume_error", "response", "newton_iterations"):
+        assert np.array_equal(getattr(again, name), getattr(whole, name)), name
+
+
+def test_a_target_ends_it_at_its_count() -> None:
+    half = WearTarget("worn_volume", 0.5 * float(worn(ToTheEnd(2)).worn_volume[-1]))
+    found = worn(ToTheEnd(5), until=half)
+    assert found.outcome is Outcome.CONVERGED
+    assert found.cycles[-1] == found.cycles_to_target
+    assert found.worn_volume[-1] == pytest.approx(half.value, rel=1e-6)
+
+
+def slider(**parameters: float) -> WearHistory:
+    model = build_scene("sdof_slider", **parameters)
+    settings = SolverSettings(harmonics=3, samples=64)
+    return march_from_model(model, 160.0, 10.0, 0.5, 1.1e-11, np.inf, settings=settings, outputs=4)
+
+
+def test_a_spring_that_presses_wears_until_it_is_relaxed() -> None:
+    found = slider()
+    assert found.outcome is Outcome.CONVERGED
+    assert found.wear_depth[-1, 0] == pytest.approx(10.0 / 1e5, rel=1e-3)
+
+
+def test_a_constant_load_wears_without_end_at_the_rate_of_its_path() -> None:
+    found = slider(normal_stiffness=0.0)
+    assert found.outcome is Outcome.NO_FINAL_STATE
+    assert not found.outcome.complete
+    path = 2.0 * found.slip_range[-1, 0]
+    assert found.wear_rate[-1] == pytest.approx(1.1e-11 * 10.0 * path, rel=1e-2)
+    assert f"{found.wear_rate[-1]:.6g} m3 a cycle" in found.message
+    assert np.isfinite(found.worn_volume).all()
+
+
+def test_gross_slip_of_a_pressed_body_has_no_end() -> None:
+    # shallow enough to be worn flat: every strip bears, and all wear alike
+    model = build_scene("cylinder_on_flat", strips=8, P=18.5e3, stroke=25e-6, half_width=0.15e-3)
+    found = march_from_model(
+        model, 20.0, 1.0, 0.9, 2.9e-14, np.inf, sweep="ramp", settings=SolverSettings(harmonics=5, samples=64)
+    )
+    assert found.outcome is Outcome.NO_FINAL_STATE
+    steady = found.wear_rate[-1]
+    assert found.wear_rate[found.worn_volume > 0.2 * found.worn_volume[-1]] == pytest.approx(steady, rel=0.02)
+    # k_w times force times path, but for what the bodies bend
+    assert steady == pytest.approx(2.9e-14 * 185.0 * 4.0 * 25e-6, rel=0.05)
+
+
+def test_what_cannot_be_marched_to_the_end_is_told() -> None:
+    model = build_scene("sdof_slider")
+    with pytest.raises(ValueError, match="explicit scheme cannot grow"):
+        march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, scheme="explicit", step=10.0)
+    with pytest.raises(ValueError, match="outputs = 1: give at least 2"):
+        march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, outputs=1)
+
+
+def test_a_joint_at_rest_is_at_its_end() -> None:
+    model, start = unworn()
+    still = march_wear(model, 0.6, start, 0.0, 1000.0, "adaptive", ToTheEnd(3), COARSE)
+    assert still.outcome is Outcome.CONVERGED
+    assert not still.cycles.any()
+    assert not still.worn_volume.any()
+
+
+def test_without_a_start_state_there_is_nothing() -> None:
+    model, start = unworn()
+    failed = replace(start, outcome=Outcome.START_FAILED, state=None)
+    for found in (
+        march_wear(model, 0.6, failed, PER_PRESSURE, 1000.0, "adaptive", ToTheEnd(3), COARSE),
+        find_final_state(model, 0.6, failed, PER_PRESSURE, ToTheEnd(3), COARSE),
+    ):
+        assert found.outcome is Outcome.START_FAILED
+        assert found.worn_volume.shape == (3,)
+        assert np.isnan(found.worn_volume).all()
+        assert np.isnan(found.last_cycle)

@@ -1,0 +1,192 @@
+"""slow_time.cycles = inf, from the study file to the report."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver.settings import ToTheEnd
+from studyrunner import UserError, open_result, run_study
+from studyrunner.accessor import join_results
+from studyrunner.netcdf.attributes import attributes, coordinate_entry
+from studyrunner.plan.identity import Identities
+from studyrunner.plan.printed import format_plan
+from studyrunner.plan.tasks import build_tasks
+from studyrunner.report.reading.door import check_numbers
+from studyrunner.report.reading.result import open_for_report
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import format_study, read_study
+from tests.studyrunner.fakes import FACTS
+
+END = (
+    "axes.frequency=160",
+    "axes.sweep=ramp",
+    "slow_time.cycles=inf",
+    "slow_time.outputs=6",
+    "solver.harmonics=3",
+    "solver.samples=64",
+)
+
+
+def study_with(*overrides: str) -> Study:
+    return read_study("sdof_slider", (*END, "axes.scheme=adaptive", *overrides))
+
+
+def test_the_effective_study_is_to_the_end_too(tmp_path: Path) -> None:
+    study = study_with("slow_time.final_share=1e-3")
+    (tmp_path / "again.toml").write_text(format_study(study))
+    again = read_study(tmp_path / "again.toml")
+    assert again.to_the_end
+    assert again.slow_time == study.slow_time
+    assert again.cycles_kept == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
+    assert build_tasks(again, 2).marches[0][0].to_the_end == ToTheEnd(6, 1e-3)
+    assert not read_study("sdof_slider").to_the_end
+
+
+@pytest.mark.parametrize(
+    ("override", "key", "remedy"),
+    [
+        ("axes.scheme=[adaptive, explicit]", "axes.scheme", 'give "adaptive" or "implicit"'),
+        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "equally spaced in worn volume"),
+        ("slow_time.outputs=1", "slow_time.outputs", "at least 2"),
+        ("slow_time.cycles=nan", "slow_time.cycles", "or inf"),
+        ("slow_time.cycles=-inf", "slow_time.cycles", "or inf"),
+        ("slow_time.final_share=1", "slow_time.final_share", "between 0 and 1"),
+        ("axes.scheme=final", "slow_time.cycles", "give inf"),
+        ("slow_time.until={wear_depth = 1e-5}", "slow_time.until", "has no way"),
+        ('outputs.variables=["default", "exact"]', "outputs.variables", "given cycle counts"),
+    ],
+)
+def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remedy: str) -> None:
+    override = override.replace("[adaptive, explicit]", '["adaptive", "explicit"]')
+    others = {
+        "slow_time.until={wear_depth = 1e-5}": ("axes.scheme=final",),
+        "axes.scheme=final": ("slow_time.cycles=5",),
+    }
+    with pytest.raises(UserError) as caught:
+        study_with(override, *others.get(override, ()))
+    assert caught.value.key == key
+    assert remedy in caught.value.remedy
+
+
+def test_the_plan_says_how_far_it_goes() -> None:
+    study = study_with()
+    text = format_plan(study, FACTS, build_tasks(study, FACTS.n_displacements), 0.0)
+    assert "until the wear rate of every pair is below 0.0001 of its largest; 6 states are kept" in text
+
+
+def test_a_history_is_known_by_how_it_ends() -> None:
+    keys = []
+    for overrides in ((), ("slow_time.final_share=1e-3",), ("slow_time.outputs=7",), ("slow_time.cycles=5",)):
+        study = study_with(*overrides)
+        plan, of = build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
+        keys.append(of.of_histories(plan.branches[0], plan.marches[0][0]))
+    assert len(set(keys)) == 4
+
+
+def test_the_coordinate_is_a_number_of_outputs_there_only() -> None:
+    ended, counted = study_with(), read_study("sdof_slider")
+    assert "number of the output" in attributes("cycle", coordinate_entry(ended, "cycle"))["long_name"]  # type: ignore[operator]
+    assert "vibration cycles" in attributes("cycle", coordinate_entry(counted, "cycle"))["long_name"]  # type: ignore[operator]
+
+
+@pytest.mark.slow
+def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Path) -> None:
+    wears = "axes.wear_coefficient=[1.1e-11, 2.2e-12, 0.0]"
+    study = study_with(wears, 'axes.scheme=["adaptive", "implicit"]', "axes.step=2000", "outputs.loops=[0]")
+    with run_study(study, tmp_path / "end.nc") as opened:
+        result = opened.load()
+    one = result.squeeze([name for name in result.outcome.dims if result.sizes[name] == 1], drop=True)
+    assert one.outcome.values.tolist() == [[0, 0]] * 3
+    assert one.cycle.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert one.cycle_count.dims == ("wear_coefficient", "scheme", "cycle")
+    counts, volumes = one.cycle_count.values, one.worn_volume.values
+    assert not counts[:, :, 0].any()
+    assert (np.diff(counts[:2], axis=-1) > 0.0).all()
+    assert np.diff(volumes[:2], axis=-1) == pytest.approx(1e-4 * 1e-4 / 5, rel=1e-3)
+    # the same history of both coefficients, five times as slow; nothing wears without one
+    assert counts[1, 0] == pytest.approx(5.0 * counts[0, 0])
+    assert one.wear_rate.values[1, 0] == pytest.approx(one.wear_rate.values[0, 0] / 5.0)
+    assert one.last_cycle.values[:2] == pytest.approx(counts[:2, :, -1])
+    assert not counts[2].any()
+    assert not volumes[2].any()
+    # another march where the step is five times as short in wear
+    assert volumes[1, 1, -1] == pytest.approx(volumes[0, 1, -1], rel=1e-4)
+    again = run_study(tmp_path / "end.nc", tmp_path / "again.nc").load()
+    xr.testing.assert_identical(again.drop_vars("run_time"), result.drop_vars("run_time").assign_attrs(again.attrs))
+    with open_result(tmp_path / "end.nc") as opened:
+        assert np.array_equal(opened.cycle_count.values, result.cycle_count.values)
+    shown = open_for_report(tmp_path / "end.nc")
+    assert np.array_equal(shown.cycles, shown.counts(shown.shown_point()))
+    assert shown.cycles[-1] in counts[:, :, -1]
+    assert np.isfinite(shown.read("harmonics_used")).all()
+    shown.close()
+    with pytest.raises(ValueError, match="joins only those"):
+        join_results([result, result.drop_vars("cycle_count")])
+
+
+@pytest.mark.slow
+def test_the_report_draws_it(tmp_path: Path) -> None:
+    from studyrunner.report.figures.volume import draw_history
+    from studyrunner.report.page.data import build_page_data
+    from studyrunner.report.reading.units import scale_for
+
+    with run_study(study_with('axes.scheme=["adaptive", "implicit"]', "axes.step=500"), tmp_path / "end.nc"):
+        pass
+    result = open_for_report(tmp_path / "end.nc")
+    with warnings.catch_warnings():
+        drawing = draw_history(result, scale_for("m3", 1e-8), 1e-8)
+    lines = drawing.figure.axes[0].get_lines()
+    last = [float(line.get_xdata()[-1]) for line in lines]  # type: ignore[index, arg-type]
+    ends = result.dataset.cycle_count.isel(cycle=-1).values.ravel()
+    assert np.array(last) / np.array(ends) == pytest.approx(last[0] / ends[0])
+    assert any("equally spaced in worn volume" in note for note in build_page_data(result, 1e6).notes)
+    result.close()
+
+
+@pytest.mark.slow
+def test_gross_slip_is_told_with_its_rate_for_every_coefficient(tmp_path: Path) -> None:
+    study = study_with("scene.normal_stiffness=0", "axes.wear_coefficient=[1e-11, 1e-12]")
+    with run_study(study, tmp_path / "end.nc") as opened:
+        result = opened.squeeze(drop=True).load()
+    words = dict(zip(result.outcome.attrs["flag_values"], result.outcome.attrs["flag_meanings"].split(), strict=True))
+    assert [words[number] for number in result.outcome.values] == ["no_final_state"] * 2
+    rates = result.wear_rate.isel(cycle=-1).values
+    assert rates[0] == pytest.approx(10.0 * rates[1])
+    for message, rate in zip(result.message.values, rates, strict=True):
+        assert f"at {rate:.6g} m3 a cycle" in message or f"rate of {rate:.6g} m3 a cycle" in message
+
+
+@pytest.mark.slow
+def test_the_scheme_final_is_computed_once_and_says_how(tmp_path: Path) -> None:
+    overrides = ("axes.wear_coefficient=[1.1e-11, 1e-12]", 'axes.scheme=["adaptive", "final"]', "axes.step=[10, 100]")
+    study = study_with(*overrides)
+    plan = build_tasks(study, 2)
+    assert [len(line) for line in plan.marches] == [2]
+    assert any("comes to the same state for every wear_coefficient" in item.reason for item in plan.left_out)
+    with run_study(study, tmp_path / "final.nc") as opened:
+        result = opened.squeeze(drop=True).load()
+    direct = result.sel(scheme="final")
+    assert result.final_method.attrs["flag_meanings"].split() == ["none", "active_set", "march"]
+    assert (direct.final_method == 1).all()
+    assert (result.sel(scheme="adaptive").final_method == 0).all()
+    assert (direct.outcome == 0).all()
+    assert np.isinf(direct.cycle_count.isel(cycle=-1)).all()
+    assert direct.worn_volume.isel(cycle=slice(1, -1)).isnull().all()
+    assert not direct.harmonics_used.isel(cycle=slice(1, -1)).any()
+    assert direct.worn_volume.isel(cycle=-1).values == pytest.approx(1e-8)
+    rates = direct.wear_rate.isel(cycle=0, step=0).values
+    assert rates[0] == pytest.approx(11.0 * rates[1])
+    shown = open_for_report(tmp_path / "final.nc")
+    check_numbers(shown.dataset, "final.nc")
+    assert np.isfinite(shown.worn).all()
+    assert len(shown.cycles) == 6
+    # states that there are not are neither unstable nor of no harmonics
+    assert "unstable states                     none" in result.attrs["certificate_summary"]
+    used = shown.read("harmonics_used").sel(scheme="final").values.reshape(-1, 6)
+    assert np.isnan(used[0]).tolist() == [False, True, True, True, True, False]
+    shown.close()
