@@ -15,7 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.page import data as page_data
-from studyrunner.report.page.data import COURSES, LOOPS, MAPS, PageData, build_page_data, encode_floats, thin_out
+from studyrunner.report.page.data import COURSES, LOOPS, MAPS, PageData, build_page_data, thin_out
+from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import MOST_PANELS, build_panels
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.page_cases import AXES, FAILED, SENTENCES, build_file, flank_positions
