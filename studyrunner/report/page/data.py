@@ -35,7 +35,7 @@ COURSES = (
 )
 """Variables that the page holds for every point at every cycle."""
 
-MAPS = ("mean_pressure", "wear_depth", "slip_range", "open_fraction")
+MAPS = ("mean_pressure", "wear_depth", "open_fraction", "slip_range")
 """Variables of the contact pairs that the page draws as maps."""
 
 LOOPS = ("loop_displacement", "loop_force")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.surface import RootSurface
 
 _TRIES = 24
@@ -15,8 +16,8 @@ _TRIES = 24
 def simplify(surface: RootSurface, most_faces: int) -> RootSurface:
     """The surface with at most so many faces, those in contact not counted, as they are all kept.
 
-    Nodes of one body in one cell of a cubic grid become one at their mean; faces without area are left out. The size of
-    the cells is halved between one that is too large and one that is too small.
+    Nodes of one body in one cell of a cubic grid become one at their mean, if they look the same way: both sides of a
+    thin blade stay apart. Faces without area are left out. The size of the cells is found by bisection.
     """
     n_contact = int(np.count_nonzero(surface.contact.flank >= 0))
     if len(surface.faces) <= most_faces + n_contact:
@@ -42,7 +43,8 @@ def _merge(surface: RootSurface, size: float) -> RootSurface:
     cells = np.floor((surface.nodes - surface.nodes.min(axis=0)) / size).astype(np.int64)
     own = np.full(len(cells), -1)
     own[surface.contact.nodes] = surface.contact.nodes
-    _, merged = np.unique(np.column_stack([cells, body_of_node, own]), axis=0, return_inverse=True)
+    keys = np.column_stack([cells, body_of_node, own, _looks(surface)])
+    _, merged = np.unique(keys, axis=0, return_inverse=True)
     merged = merged.ravel()
     count = np.bincount(merged)
     nodes = np.stack([np.bincount(merged, weights=column) / count for column in surface.nodes.T], axis=1)
@@ -56,6 +58,14 @@ def _merge(surface: RootSurface, size: float) -> RootSurface:
     return replace(
         surface, nodes=nodes[used], faces=places.reshape(faces.shape), body=surface.body[kept], contact=contact
     )
+
+
+def _looks(surface: RootSurface) -> NDArray[np.int64]:
+    """Which of the six directions along an axis the surface looks to at each node (n_nodes,), nearly."""
+    normals = np.zeros_like(surface.nodes)
+    np.add.at(normals, surface.faces, face_normals(surface.nodes, surface.faces)[:, None, :])
+    axis = np.argmax(np.abs(normals), axis=1)
+    return 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0.0)
 
 
 def _distinct(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

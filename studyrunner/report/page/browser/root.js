@@ -4,6 +4,7 @@
 const GREY_EDGE = "#555";
 const DISTANCE = 1.45; // of the eye, over the longest side of what is seen
 const MARGIN = 0.04;
+const WHAT = root && root.mesh ? "The root" : "The contact pairs";
 const LIT = { ambient: 0.65, diffuse: 0.5, specular: 0.05, roughness: 0.9, fresnel: 0.05, facenormalsepsilon: 0 };
 
 if (root) {
@@ -105,7 +106,7 @@ function drawRoot() {
   if (!root || byId("root-plot").hidden) return;
   const entry = maps.variables[state.colour];
   const found = held(maps, state.point, state.cycle);
-  const title = `The root at ${cycleText(found ? found.cycle : state.cycle)}`;
+  const title = `${WHAT} at ${cycleText(found ? found.cycle : state.cycle)}`;
   if (!found || !known(state.point, state.cycle)) {
     byId("root-title").textContent = title;
     byId("root-plot").dataset.factor = "";
@@ -180,7 +181,7 @@ function prepareRoot() {
   state.colour = names.includes("wear_depth") ? "wear_depth" : names[0];
   if (!hasWebGl()) {
     byId("root-plot").hidden = true;
-    byId("root-title").textContent = "The root";
+    byId("root-title").textContent = WHAT;
     byId("root-hint").textContent = "This browser does not draw in three dimensions (no WebGL); the figures below show the root.";
     return;
   }
