@@ -107,7 +107,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
     courses = {name: _variable(result, name, kept) for name in COURSES if result.has(name)}
     floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
-    root = build_root_numbers(result, notes) if _has_maps(result) else None
+    root = build_root_numbers(result, limit, notes) if _has_maps(result) else None
     floats -= len(json.dumps(root)) / _CHARACTERS_A_FLOAT
     loops, used = _loops(result, kept.cycles, _FRACTION_OF_LOOPS * floats, notes)
     maps = _maps(result, kept.cycles, floats - used, notes)

@@ -8,10 +8,12 @@ from studyrunner.report.drawing import Drawing, new_figure
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.painting import body_colours, paint_faces, rgb
+from studyrunner.report.root.simplified import simplify
 from studyrunner.report.root.surface import RootSurface
 from studyrunner.report.root.views import View
 
-_MOST_FACES = 400_000
+_MOST_FACES = 150_000
+_MOST_SECTORS = 500
 _FEWEST_SECTORS = 3
 _TO_EYE = np.array([0.35, 0.25, 1.0])
 _FADED = 0.45
@@ -26,8 +28,9 @@ def build_disk(result: Result, surface: RootSurface) -> Drawing | None:
     number = scene.get("n_sectors")
     if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or not surface.is_mesh:
         return None
-    if number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_FACES:
+    if not _FEWEST_SECTORS <= number <= _MOST_SECTORS:
         return None
+    surface = simplify(surface, _MOST_FACES // number)
     to_eye = _TO_EYE / np.linalg.norm(_TO_EYE)
     view = View("", np.ones(1, np.bool_), to_eye, np.array([1.0, 0.0, 0.0]), -1, -1)
     own = rgb(body_colours(surface.bodies), surface.body)

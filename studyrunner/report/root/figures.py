@@ -19,20 +19,27 @@ from studyrunner.report.reading.units import Scale, scale_for, show_number
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.disk import build_disk
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
+from studyrunner.report.root.simplified import simplify
 from studyrunner.report.root.surface import RootSurface, read_root
 from studyrunner.report.root.views import View, find_views
 
 _MOST_CLOSE_UPS = 2
 _MOST_NUMBERS = 120
+_MOST_PAIRS = 20_000
+_MOST_FACES = 60_000
 NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
 
 def draw_root(result: Result) -> Iterator[Drawing | Missing]:
-    """Worn shape of the shown point, numbers of the pairs, and the whole disk; nothing where there are no positions."""
-    surface = read_root(result)
+    """Worn shape of the shown point, numbers of the pairs, and the whole disk.
+
+    Nothing where there are no positions, or more pairs than can be told from each other.
+    """
+    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
     if surface is None:
         return
+    surface = simplify(surface, _MOST_FACES)
     views = find_views(result, surface)
     state = _find_state(result)
     if state is not None:

@@ -65,7 +65,7 @@ def _looks(surface: RootSurface) -> NDArray[np.int64]:
     normals = np.zeros_like(surface.nodes)
     np.add.at(normals, surface.faces, face_normals(surface.nodes, surface.faces)[:, None, :])
     axis = np.argmax(np.abs(normals), axis=1)
-    return 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0.0)
+    return np.asarray(2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0.0))
 
 
 def _distinct(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

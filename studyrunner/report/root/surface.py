@@ -19,6 +19,7 @@ MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
 
 _DEEPEST = 0.04  # worn depth as it is drawn, over the size of the contact surfaces
 _STRAIGHT = 1e-6
+_CORNERS = 4
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,13 @@ def read_root(result: Result) -> RootSurface | None:
         labels = coordinates["contact_surface"].values.astype(str)
     flanks = tuple(dict.fromkeys(labels.tolist()))
     flank = np.array([flanks.index(label) for label in labels.tolist()])
-    if result.has(*MESH):
+    if result.has(*MESH) and len(result.dataset["mesh_quad"]) and result.dataset["mesh_quad"].shape[1] == _CORNERS:
         surface = _of_mesh(result, positions, flank, flanks)
         if len(surface.contact.nodes):
             return surface
-    if "contact_area" not in coordinates:
-        return None
-    return _of_patches(positions, np.asarray(coordinates["contact_area"].values, float), flank, flanks)
+    area = np.asarray(coordinates["contact_area"].values if "contact_area" in coordinates else np.nan, dtype=float)
+    # what is no area has no sides: NaN is none
+    return _of_patches(positions, area, flank, flanks) if (area > 0.0).all() else None
 
 
 def _of_mesh(

@@ -93,7 +93,7 @@ def _close_up(
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
     low, high = inside.min(axis=0) - _AROUND * size, inside.max(axis=0) + _AROUND * size
     centre = surface.nodes[surface.faces].mean(axis=1)
-    near = ((centre >= low) & (centre <= high)).all(axis=1)
+    near = ((surface.nodes >= low) & (surface.nodes <= high)).all(axis=1)[surface.faces].any(axis=1)
     on_it = surface.nodes[np.unique(surface.faces[looked_at])]
     behind = centre @ normal <= float((on_it @ normal).max()) + _BEFORE * size
     edge = None

@@ -194,6 +194,33 @@ def test_without_positions_nothing_is_drawn(tmp_path: Path, positions: np.ndarra
     assert list(draw_root(result)) == []
 
 
+@pytest.mark.parametrize("area", [0.0, -1e-6, math.nan, None])
+def test_without_areas_nothing_is_drawn(tmp_path: Path, area: float | None) -> None:
+    dataset = build_file(positions=flank_positions())
+    if area is None:
+        dataset = dataset.drop_vars("contact_area")
+    else:
+        dataset["contact_area"].values[3] = area
+    assert read_root(as_result(dataset, tmp_path / "file.nc")) is None
+
+
+@pytest.mark.parametrize("wrong", ["no faces", "three corners", "elsewhere", "all in one place"])
+def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -> None:
+    dataset = dovetail_file()
+    if wrong == "no faces":
+        dataset = dataset.isel(mesh_quad_index=slice(0, 0))
+    elif wrong == "three corners":
+        dataset = dataset.isel(mesh_corner=slice(0, 3))
+    elif wrong == "elsewhere":
+        dataset["mesh_x"] = dataset["mesh_x"] + 1.0
+    else:
+        dataset["mesh_quad"] = 0 * dataset["mesh_quad"]
+    surface = read_root(as_result(dataset, tmp_path / "file.nc"))
+    assert surface is not None
+    assert not surface.is_mesh
+    assert len(surface.faces) == 16
+
+
 def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None:
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     assert surface is not None

@@ -96,7 +96,8 @@ def pixels(page: Any) -> bytes:
 
 def test_the_root_begins_as_the_shown_point_after_wear(page: Any, dataset: xr.Dataset) -> None:
     assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 4)
-    assert trace(page, "leading")["z"][0] == pytest.approx(1e3 * dataset["contact_z"].values.min())
+    # beside the pairs at z < 0
+    assert 1.2 < trace(page, "leading")["z"][0] / (1e3 * dataset["contact_z"].values.min()) < 1.4
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,10 @@ function facesOf(view) {
         }
       }
     }
+    (root.views[view].leading || []).forEach((metres, axis) => {
+      low[axis] = Math.min(low[axis], metres * 1e3);
+      high[axis] = Math.max(high[axis], metres * 1e3);
+    });
     // around the shape as it is before wear, so that nothing jumps from cycle to cycle
     const longest = Math.max(...high.map((each, axis) => each - low[axis]));
     const box = low.map((each, axis) => [each - MARGIN * longest, high[axis] + MARGIN * longest]);
@@ -148,8 +152,8 @@ function drawRoot() {
   }];
   const mark = view.leading ? view.leading.map((each) => [each * 1e3]) : [[null], [null], [null]];
   traces.push({
-    type: "scatter3d", mode: "markers+text", x: mark[0], y: mark[1], z: mark[2], text: ["leading edge"], hoverinfo: "skip",
-    textposition: "bottom center", textfont: FONT, marker: { size: 3, color: "#000" }, showlegend: false, meta: "leading",
+    type: "scatter3d", mode: "text", x: mark[0], y: mark[1], z: mark[2], text: ["leading edge"], hoverinfo: "skip",
+    textposition: "middle center", textfont: FONT, showlegend: false, meta: "leading",
   });
   parts.others.forEach((faces, body) => traces.push({
     type: "mesh3d", x, y, z, ...faces, color: root.colours[body], flatshading: true, hoverinfo: "skip", lighting: LIT, lightposition,
