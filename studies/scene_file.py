@@ -5,6 +5,11 @@ them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or var
 following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
 other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
 of mass and stiffness.
+
+For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
+`mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
+`mesh/part` (n_faces,), labels. Bodies are told apart by sharing no node. Faces whose corners all stand where contact
+pairs of one surface are (`contact/position`) are drawn in contact, as are faces of other bodies that lie on these.
 """
 
 from __future__ import annotations

@@ -36,6 +36,7 @@ _EPILOG = """\
 examples:
   study-report dovetail.nc                    -> dovetail-report/index.html and the figures beside it
   study-report results/worn.nc -o figures     the same into the folder figures
+  study-report dovetail.nc --vtu              also dovetail-report/root.pvd, the worn root for ParaView
 
 exit status:
   0  the report was written
@@ -45,10 +46,11 @@ exit status:
 
 @dataclass(frozen=True)
 class Options:
-    """The command line. folder: where the report goes."""
+    """The command line. folder: where the report goes. vtu: whether files for ParaView are written, too."""
 
     result: Path
     folder: Path
+    vtu: bool = False
 
 
 class _Parser(argparse.ArgumentParser):
@@ -77,9 +79,12 @@ def parse_options(arguments: Sequence[str]) -> Options:
     )
     parser.add_argument("result", metavar="OUT.nc", help="result file of run-study")
     parser.add_argument("-o", dest="folder", metavar="FOLDER", help="where to write (default: OUT-report, here)")
+    parser.add_argument(
+        "--vtu", action="store_true", help="also the root as VTU files over the cycles, for ParaView (extra meshio)"
+    )
     found = parser.parse_args(list(arguments))
     result = Path(found.result)
-    return Options(result, Path(f"{result.stem}-report" if found.folder is None else found.folder))
+    return Options(result, Path(f"{result.stem}-report" if found.folder is None else found.folder), found.vtu)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -140,17 +145,22 @@ def _report(options: Options) -> int:
         from studyrunner.report.page.page import write_page
         from studyrunner.report.reading.door import check_numbers, reading_errors
         from studyrunner.report.reading.result import open_for_report
+        from studyrunner.report.root.vtu import find_writer
         from studyrunner.system.progress import count, format_seconds
 
         result = open_for_report(options.result)
         with result.dataset, reading_errors(str(options.result)):
             check_numbers(result.dataset, str(options.result))
+            write_series = find_writer(result) if options.vtu else None
             _make_folder(options.folder)
             page = options.folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)
+            series = write_series(options.folder) if write_series else None
     shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
     seconds = format_seconds(time.monotonic() - began)
     print(f"{page}: {shown}, {summary.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
+    if series is not None:
+        print(f"{series.path}: time series of {count(series.n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
 
 

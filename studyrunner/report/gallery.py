@@ -14,6 +14,7 @@ from studyrunner.report.figures.volume import draw_volumes
 from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.reading.result import Result
+from studyrunner.report.root.figures import draw_root
 
 Item = Drawing | Missing | Table
 _Part = Callable[[Result], Iterator[Item]]
@@ -24,7 +25,7 @@ def draw_report(result: Result) -> Iterator[Item]:
 
     Where no point holds a state, the results are left out with a single sentence.
     """
-    of_results: tuple[_Part, ...] = (draw_responses, draw_volumes, draw_flanks, draw_loops)
+    of_results: tuple[_Part, ...] = (draw_responses, draw_volumes, draw_root, draw_flanks, draw_loops)
     if not result.held.any():
         of_results = (_tell_nothing,)
     parts = (

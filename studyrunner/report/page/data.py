@@ -6,7 +6,6 @@ multiplies them by `factor` where it shows them.
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -14,10 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS
+from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
+from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.reading.result import CONVERGED, Result
 from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE
@@ -34,7 +35,7 @@ COURSES = (
 )
 """Variables that the page holds for every point at every cycle."""
 
-MAPS = ("mean_pressure", "wear_depth", "open_fraction")
+MAPS = ("mean_pressure", "wear_depth", "open_fraction", "slip_range")
 """Variables of the contact pairs that the page draws as maps."""
 
 LOOPS = ("loop_displacement", "loop_force")
@@ -110,6 +111,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
         return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
     courses = {name: _variable(result, name, kept) for name in COURSES if result.has(name)}
     floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
+    root = build_root_numbers(result, limit, notes) if _has_maps(result) else None
+    floats -= len(json.dumps(root)) / _CHARACTERS_A_FLOAT
     loops, used = _loops(result, kept.cycles, _FRACTION_OF_LOOPS * floats, notes)
     maps = _maps(result, kept.cycles, floats - used, notes)
     shown = [result.shown_point()[name] for name in result.axes]
@@ -135,6 +138,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "courses": courses,
         "maps": maps,
         "loops": loops,
+        "root": root if maps else None,
     }
     return PageData(content, tuple(notes))
 
@@ -149,11 +153,6 @@ def _remarks(result: Result) -> Iterator[tuple[int, str]]:
         texts = (message, f"Its worn volume is known to {100.0 * error:.2g} %" if above else "")
         if any(texts):
             yield place, ". ".join(filter(None, texts))
-
-
-def encode_floats(values: ArrayLike) -> str:
-    """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def thin_out(count: int, keep: int) -> NDArray[np.int64]:
@@ -200,10 +199,15 @@ def _most_worn_first(result: Result, points: NDArray[np.int64]) -> NDArray[np.in
     return points[np.argsort(-np.nan_to_num(result.worn.ravel()[points]), kind="stable")]
 
 
+def _has_maps(result: Result) -> bool:
+    """Whether there is anything to draw at the contact pairs."""
+    return bool(result.held.any()) and any(map(result.has, MAPS))
+
+
 def _maps(result: Result, cycles: NDArray[np.int64], floats: float, notes: list[str]) -> dict[str, object] | None:
     """Values of the contact pairs; None where the file or the page holds none."""
     names = [name for name in MAPS if result.has(name)]
-    if not names or not result.held.any():
+    if not _has_maps(result):
         return None
     kept = _fit_points(result, cycles, len(names) * result.dataset.sizes["contact"], floats, _FEWEST_MAP_CYCLES)
     _say_what_is_kept("Maps", kept, cycles, result, notes)

@@ -31,6 +31,8 @@ ALL_DRAWINGS = [
     "worn_volume_map",
     "wear_rate_map",
     "final_worn_volume",
+    "worn_root",
+    "pair_numbers",
     "wear_depth",
     "mean_pressure",
     "worn_profile",

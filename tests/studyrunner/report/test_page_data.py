@@ -15,10 +15,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.page import data as page_data
-from studyrunner.report.page.data import COURSES, LOOPS, MAPS, PageData, build_page_data, encode_floats, thin_out
+from studyrunner.report.page.data import COURSES, LOOPS, MAPS, PageData, build_page_data, thin_out
+from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import MOST_PANELS, build_panels
 from studyrunner.report.reading.result import Result
+from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.views import find_views
 from tests.studyrunner.report.page_cases import AXES, FAILED, SENTENCES, build_file, flank_positions
+from tests.studyrunner.report.root_cases import dovetail_file
 
 PLENTY = 4e6
 
@@ -61,6 +65,26 @@ def test_the_page_holds_the_numbers_of_the_file() -> None:
         expected = dataset[name].values.reshape(n_points, 5, 24, 16, 3)[good][:, :, [2, 5]].astype("f4")
         assert np.isfinite(expected).all()
         np.testing.assert_array_equal(decode(content["loops"]["variables"][name], *expected.shape), expected)
+
+
+def test_the_root_is_there_with_a_quarter_of_the_room_at_most() -> None:
+    dataset = dovetail_file(density=4)
+    result = Result(Path("some.nc"), dataset)
+    surface = read_root(result)
+    assert surface is not None
+    data = build_page_data(result, PLENTY)
+    root = content_of(data)["root"]
+    np.testing.assert_array_equal(decode({"data": root["nodes"]}, -1, 3), surface.nodes.astype("f4"))
+    np.testing.assert_array_equal(decode({"data": root["faces"]}, -1, 4), surface.faces)
+    np.testing.assert_array_equal(decode({"data": root["contact"]["pairs"]}, -1, 1), surface.contact.pairs)
+    assert [view["title"] for view in root["views"]] == [view.title for view in find_views(result, surface)]
+    assert not any("faces" in note for note in data.notes)
+    limit = 1e6
+    data = build_page_data(result, limit)
+    root = content_of(data)["root"]
+    assert len(json.dumps(root)) < 0.35 * limit
+    assert any(f"of its {len(surface.faces)} faces" in note for note in data.notes)
+    assert content_of(data)["maps"] is not None
 
 
 def test_numbers_of_points() -> None:

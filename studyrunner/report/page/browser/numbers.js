@@ -3,9 +3,9 @@
 
 const data = JSON.parse(document.getElementById("page-data").textContent);
 const byId = (id) => document.getElementById(id);
-const { axes, cycles, courses, maps, loops } = data;
+const { axes, cycles, courses, maps, loops, root } = data;
 const sizes = axes.map((axis) => axis.values.length);
-const state = { point: data.shown, cycle: cycles.length - 1, response: 0, map: null, loop: 0, component: 0 };
+const state = { point: data.shown, cycle: cycles.length - 1, response: 0, map: null, loop: 0, component: 0, colour: null, view: 0, exaggerated: true };
 
 // ---- numbers
 

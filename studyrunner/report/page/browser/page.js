@@ -1,6 +1,9 @@
 // What a reader picks, and the list of its numbers; the last of the scripts of the page.
 "use strict";
 
+const MOST_FRAMES = 50;
+const FRAME = 150; // ms
+
 function readout() {
   const { point, cycle, response } = state;
   const found = places(point);
@@ -54,6 +57,7 @@ function pick(point) {
   drawCourse();
   drawMaps();
   drawLoop();
+  drawRoot();
   readout();
 }
 
@@ -64,6 +68,28 @@ function turnTo(cycle) {
   byId("cycle-count").textContent = text;
   byId("cycle").setAttribute("aria-valuetext", text);
   pick(state.point);
+}
+
+// ---- playing
+
+let playing = 0;
+
+function play(on) {
+  clearTimeout(playing);
+  playing = 0;
+  byId("play").textContent = on ? "Pause" : "Play";
+  byId("play").setAttribute("aria-pressed", String(on));
+  if (!on) return;
+  const last = cycles.length - 1;
+  if (state.cycle === last) turnTo(0);
+  const step = Math.ceil(last / MOST_FRAMES);
+  // the next frame waits until this one is drawn, however slow the machine is
+  const advance = () => {
+    turnTo(Math.min(state.cycle + step, last));
+    if (state.cycle === last) play(false);
+    else playing = setTimeout(() => requestAnimationFrame(advance), FRAME);
+  };
+  playing = setTimeout(advance, FRAME);
 }
 
 function prepare() {
@@ -77,6 +103,7 @@ function prepare() {
   } else {
     byId("map-plot").parentElement.hidden = true;
   }
+  prepareRoot();
   if (loops) {
     state.component = Math.max(loops.components.indexOf("tangent_1"), 0);
     addChoice("loop-choice", "pair", "pair", loops.contacts.map(String), 0, (i) => { state.loop = i; drawLoop(); });
@@ -88,6 +115,9 @@ function prepare() {
   const slider = byId("cycle");
   slider.max = String(cycles.length - 1);
   slider.hidden = cycles.length < 2;
+  byId("play").hidden = cycles.length < 2;
+  byId("play").addEventListener("click", () => play(!playing));
+  slider.addEventListener("pointerdown", () => play(false));
   let waiting = false;
   slider.addEventListener("input", () => {
     if (waiting) return;

@@ -1,0 +1,114 @@
+"""The root as files for ParaView: one VTU file a cycle count, and a PVD file that makes a time series of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.report.reading.result import Result
+from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.user_error import UserError, Verbatim
+
+FIELDS = ("wear_depth", "mean_pressure", "slip_range", "open_fraction")
+"""Variables of the contact pairs that the files hold at the nodes in contact, where the result has them."""
+
+_FOLDER = "vtu"
+
+
+@dataclass(frozen=True)
+class Series:
+    """A time series that was written: its PVD file, and how many VTU files belong to it."""
+
+    path: Path
+    n_files: int
+
+
+def find_writer(result: Result) -> Callable[[Path], Series]:
+    """What writes the series into a folder; all that can be wrong with it is found before anything is written.
+
+    Raises
+    ------
+    UserError
+        Where the library is missing, or the result has nothing to draw.
+    """
+    if find_spec("meshio") is None:
+        remedy = "install the project with its extra: pip install 'fretwear[meshio]'"
+        raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
+    surface = read_root(result)
+    if surface is None:
+        remedy = "leave out --vtu: the result holds no positions of its contact pairs"
+        raise UserError("command line", "--vtu", Verbatim("nothing to draw"), remedy)
+    return lambda folder: write_series(result, surface, folder)
+
+
+def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
+    """Writes `root.pvd` and `vtu/root_<number>.vtu`, one for each cycle count at which the shown point holds values.
+
+    Points are those of the mesh before wear, m. At the points: `FIELDS` in the units of the result, NaN where there is
+    no contact; `worn_displacement` (3), m, from there to the worn surface, which ParaView's filter "Warp By Vector"
+    exaggerates. Of the cells: `body` and `contact_surface`, numbers as told in a comment of the PVD file, -1 where
+    there is no contact. The time of the series is the cycle count.
+
+    Raises OSError where a file cannot be written.
+    """
+    import meshio
+
+    shown = result.shown_point()
+    fields = {name: result.at(name, shown).values for name in FIELDS if result.has(name)}
+    held = np.ones(len(result.cycles), dtype=np.bool_)
+    for values in fields.values():
+        held &= np.isfinite(values).all(axis=1)
+    numbers = np.flatnonzero(held).tolist()
+    triangle = surface.faces[:, 2] == surface.faces[:, 3]
+    # a block without cells would be one of no type
+    chosen = [rows for rows in (np.flatnonzero(triangle), np.flatnonzero(~triangle)) if len(rows)]
+    cells = [
+        ("triangle", surface.faces[rows, :3]) if triangle[rows[0]] else ("quad", surface.faces[rows]) for rows in chosen
+    ]
+    of_cells = {"body": surface.body, "contact_surface": surface.contact.flank}
+    (folder / _FOLDER).mkdir(exist_ok=True)
+    for old in (folder / _FOLDER).glob("root_*.vtu"):
+        old.unlink()
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    root.append(ElementTree.Comment(_tell(result, surface)))
+    collection = ElementTree.SubElement(root, "Collection")
+    for place, number in enumerate(numbers):
+        name = f"{_FOLDER}/root_{place:04d}.vtu"
+        mesh = meshio.Mesh(
+            surface.nodes,
+            cells,
+            point_data=_at_points(surface, {field: values[number] for field, values in fields.items()}),
+            cell_data={key: [values[rows] for rows in chosen] for key, values in of_cells.items()},
+        )
+        meshio.vtu.write(folder / name, mesh)
+        cycle = repr(float(result.cycles[number]))
+        ElementTree.SubElement(collection, "DataSet", timestep=cycle, group="", part="0", file=name)
+    ElementTree.indent(root)
+    path = folder / "root.pvd"
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    return Series(path, len(numbers))
+
+
+def _at_points(surface: RootSurface, fields: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Fields (n_nodes,) of values of pairs (n_contact,), and the way to the worn surface (n_nodes, 3)."""
+    found = {}
+    for name, values in fields.items():
+        found[name] = np.full(len(surface.nodes), np.nan)
+        found[name][surface.contact.nodes] = surface.contact.values(values)
+    if "wear_depth" in fields:
+        found["worn_displacement"] = surface.worn(fields["wear_depth"], 1.0) - surface.nodes
+    return found
+
+
+def _tell(result: Result, surface: RootSurface) -> str:
+    """What the series is, in a line of XML comment, in which two hyphens must not meet."""
+    bodies = ", ".join(f"{number} {name}" for number, name in enumerate(surface.bodies))
+    flanks = ", ".join(f"{number} {name}" for number, name in enumerate(surface.flanks))
+    text = f"{result.title}; {result.describe(result.shown_point(), result.axes)}; time: cycles"
+    return f" {text}; body: {bodies}; contact_surface: {flanks} ".replace("--", "- -")

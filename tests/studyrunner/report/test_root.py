@@ -1,0 +1,258 @@
+"""The root in three dimensions: which faces are in contact, the worn shape, views, patches, fewer faces, figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.fe_models.joint.pairing import build_contact_pairs
+from studies.fe_models.joint.surfaces import describe_mesh as describe_fe_mesh
+from studyrunner.report.reading.result import Result
+from studyrunner.report.root.contact_faces import face_normals, find_contact_faces
+from studyrunner.report.root.figures import draw_root
+from studyrunner.report.root.simplified import simplify
+from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.report.root.views import find_views
+from tests.studies.fe_models.sectors import Sector
+from tests.studyrunner.report.page_cases import as_result, build_file, flank_positions
+from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume, with_mesh
+
+
+@pytest.fixture(scope="module")
+def dovetail(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return as_result(dovetail_file(), tmp_path_factory.mktemp("root") / "dovetail.nc")
+
+
+@pytest.fixture(scope="module")
+def surface(dovetail: Result) -> RootSurface:
+    found = read_root(dovetail)
+    assert found is not None
+    return found
+
+
+def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(surface: RootSurface) -> None:
+    pairs = dovetail_pairs()
+    assert surface.bodies == ("disk", "blade")
+    assert surface.flanks == ("intrados", "extrados")
+    areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)
+    half = len(pairs.area) // 2
+    for body, outwards in ((0, -1.0), (1, 1.0)):
+        for flank, own in ((0, slice(None, half)), (1, slice(half, None))):
+            chosen = (surface.body == body) & (surface.contact.flank == flank)
+            assert areas[chosen].sum() == pytest.approx(pairs.area[own].sum(), rel=1e-9)
+            at = np.isin(surface.contact.nodes, surface.faces[chosen])
+            found = surface.contact.pairs[at, 0]
+            assert sorted(found) == list(range(len(pairs.area)))[own]
+            places = surface.nodes[surface.contact.nodes[at]]
+            np.testing.assert_allclose(places, pairs.position[found], atol=1e-12)
+            # normals of pairs point out of the moving body, the blade
+            normals = outwards * surface.contact.normals[at]
+            np.testing.assert_allclose(normals, pairs.frames[found, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("body", [0, 1])
+def test_the_worn_shape_loses_the_worn_volume(surface: RootSurface, body: int) -> None:
+    """To first order a depth h of the pairs takes sum(h alpha) off a body: alpha is the integral of shape functions."""
+    pairs = dovetail_pairs()
+    depth = np.random.default_rng(3).uniform(0.5, 1.0, len(pairs.area)) * 1e-9
+    own = surface.faces[surface.body == body]
+    before = volume(surface.nodes, own)
+    assert before > 0.0
+    lost = (before - volume(surface.worn(depth, 50.0), own)) / 50.0
+    # neighbours of the flanks are not perpendicular to them everywhere: second order
+    assert lost == pytest.approx(float(depth @ pairs.area), rel=1e-4)
+
+
+@pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D10", "C3D8"), ("C3D8", "C3D20R"), ("C3D4", "C3D4")])
+def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds: tuple[str, str], tmp_path: Path) -> None:
+    """A blade on a disk, one of them meshed coarser: the pairing of the model knows the faces."""
+    sector = Sector(*kinds, disk=(2, 6, 5), blade=(3, 5, 4))
+    pairs = build_contact_pairs(
+        sector.mesh.coordinates, sector.mesh.numbers, sector.joint().contacts, np.array([0.0, 0.0, 1.0])
+    )
+    dataset = with_mesh(build_file(positions=pairs.position), describe_fe_mesh(sector.mesh))
+    dataset = dataset.assign_coords(contact_surface=("contact", ["root"] * pairs.n_contact))
+    surface = read_root(as_result(dataset, tmp_path / "fe.nc"))
+    assert surface is not None
+    assert surface.is_mesh
+    names = np.array(surface.bodies)[surface.body[surface.contact.flank >= 0]]
+    areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)[surface.contact.flank >= 0]
+    moving = sector.surfaces[0] if pairs.moving_name == ("BLADES",) else sector.surfaces[1]
+    assert areas[names == "blade"].sum() == pytest.approx(moving.areas_and_normals(sector.mesh.coordinates)[0].sum())
+    # all in contact lies on the plane of the joint, and looks at the other body
+    at = surface.nodes[surface.faces[surface.contact.flank >= 0]]
+    np.testing.assert_allclose(at[..., 0], 0.2, atol=1e-9)
+    outwards = face_normals(surface.nodes, surface.faces)[surface.contact.flank >= 0]
+    assert (outwards[names == "blade"][:, 0] < 0.0).all()
+    assert (outwards[names == "disk"][:, 0] > 0.0).all()
+    assert (names == "disk").any()
+    # a field that is linear in place comes out between its neighbours, and exactly where a pair stands
+    values = surface.contact.values(pairs.position[:, 1])
+    assert np.abs(values - surface.nodes[surface.contact.nodes, 1]).max() < np.sqrt(areas.mean())
+
+
+def test_faces_opposite_that_look_away_are_not_in_contact() -> None:
+    """The far side of a thin plate lies as near to the pairs as the near one."""
+    side = 6
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2)
+    lower = np.column_stack([grid, np.zeros(len(grid))]).astype(float)
+    shifted = lower + [0.37, 0.41, 0.0]
+    thin = shifted + [0.0, 0.0, 0.05]
+    number = np.arange(side * side).reshape(side, side)
+    quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    nodes = np.concatenate([lower, shifted, thin])
+    faces = np.concatenate([quads, quads[:, ::-1] + side**2, quads + 2 * side**2])
+    body = np.repeat([0, 1, 1], len(quads))
+    found = find_contact_faces(nodes, faces, body, lower, np.zeros(len(lower), dtype=int))
+    assert (found.flank[body == 0] == 0).all()
+    assert (found.flank[len(quads) : 2 * len(quads)] == 0).sum() > 0.5 * len(quads)
+    assert (found.flank[2 * len(quads) :] == -1).all()
+    np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
+
+
+@pytest.mark.parametrize("deepest", [1e-9, 3e-7, 1.07e-5, 2e-3, 0.2])
+def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface: RootSurface, deepest: float) -> None:
+    factor = surface.exaggeration(deepest)
+    head = factor / 10.0 ** math.floor(math.log10(factor) + 1e-9)
+    assert min(abs(head - each) for each in (1.0, 2.0, 5.0)) < 1e-9
+    assert 0.4 * surface.well_seen <= factor * deepest <= surface.well_seen * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("deepest", [0.0, math.nan, math.inf])
+def test_nothing_is_exaggerated_where_nothing_is_worn(surface: RootSurface, deepest: float) -> None:
+    assert surface.exaggeration(deepest) == 1.0
+
+
+def test_close_ups_look_at_the_flank_of_one_body_and_nothing_stands_before_it(
+    dovetail: Result, surface: RootSurface
+) -> None:
+    *closer, whole = find_views(dovetail, surface)
+    titles = ["blade: intrados", "blade: extrados", "disk: intrados", "disk: extrados"]
+    assert [view.title for view in closer] == titles
+    assert whole.faces.all()
+    centres = surface.nodes[surface.faces].mean(axis=1)
+    normals = face_normals(surface.nodes, surface.faces)
+    for view in closer:
+        assert set(surface.body[view.faces]) == {view.body}
+        flank = (surface.contact.flank == view.flank) & (surface.body == view.body)
+        assert view.faces[flank].all()
+        # seen from outside, from the front rather than from a side
+        assert (normals[flank] @ view.to_eye > 0.5 * np.linalg.norm(normals[flank], axis=1)).all()
+        right, up, _ = view.frame
+        # no other face is met on the way from the middle of a face of the flank to the eye
+        others = np.flatnonzero(view.faces & ~flank)
+        for centre in centres[flank]:
+            before = others[(centres[others] - centre) @ view.to_eye > 1e-6]
+            seen = np.stack([(surface.nodes[surface.faces[before]] - centre) @ each for each in (right, up)], axis=-1)
+            x, y = seen[..., 0], seen[..., 1]
+            turn = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
+            assert not ((turn > 0.0).all(axis=1) | (turn < 0.0).all(axis=1)).any()
+        # the leading edge is at z < 0, on the flank
+        assert view.leading is not None
+        assert view.leading[2] == pytest.approx(surface.nodes[surface.faces[flank]][..., 2].min())
+
+
+def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path: Path) -> None:
+    positions = flank_positions(n_along=9, n_across=4)
+    result = as_result(build_file(positions=positions), tmp_path / "patches.nc")
+    surface = read_root(result)
+    assert surface is not None
+    assert not surface.is_mesh
+    np.testing.assert_allclose(surface.nodes[surface.faces].mean(axis=1), positions, atol=1e-12)
+    sides = np.linalg.norm(np.diff(surface.nodes[surface.faces], axis=1), axis=2)
+    apart = np.linalg.norm(positions[:, None] - positions, axis=2) + np.eye(len(positions))
+    assert sides.max() <= apart.min() + 1e-12
+    normals = face_normals(surface.nodes, surface.faces)
+    # in the planes of the flanks, which stand at 45 degrees and lie along z
+    flank = 0.5 * np.sqrt(2.0) * np.linalg.norm(normals, axis=1)
+    np.testing.assert_allclose(np.abs(normals[:, 0]), flank, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(normals[:, 1]), flank, rtol=1e-9)
+    depth = np.linspace(0.0, 1e-6, len(positions))
+    moved = (surface.worn(depth, 10.0) - surface.nodes)[surface.faces].mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 10.0 * depth, atol=1e-15)
+
+
+def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path: Path) -> None:
+    positions = np.column_stack([np.linspace(-2e-4, 2e-4, 9), np.zeros(9), np.zeros(9)])
+    surface = read_root(as_result(build_file(positions=positions, surfaces=["line"] * 9), tmp_path / "line.nc"))
+    assert surface is not None
+    assert np.ptp(surface.nodes[:, 0]) == pytest.approx(9 * 5e-5)
+    np.testing.assert_allclose(surface.nodes[:, 2], 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("positions", [np.full((3, 3), np.nan), None])
+def test_without_positions_nothing_is_drawn(tmp_path: Path, positions: np.ndarray | None) -> None:
+    dataset = build_file(positions=np.zeros((3, 3)) if positions is None else positions)
+    if positions is None:
+        dataset = dataset.drop_vars(["contact_x"])
+    result = as_result(dataset, tmp_path / "nowhere.nc")
+    assert read_root(result) is None
+    assert list(draw_root(result)) == []
+
+
+@pytest.mark.parametrize("area", [0.0, -1e-6, math.nan, None])
+def test_without_areas_nothing_is_drawn(tmp_path: Path, area: float | None) -> None:
+    dataset = build_file(positions=flank_positions())
+    if area is None:
+        dataset = dataset.drop_vars("contact_area")
+    else:
+        dataset["contact_area"].values[3] = area
+    assert read_root(as_result(dataset, tmp_path / "file.nc")) is None
+
+
+@pytest.mark.parametrize("wrong", ["no faces", "three corners", "elsewhere", "all in one place"])
+def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -> None:
+    dataset = dovetail_file()
+    if wrong == "no faces":
+        dataset = dataset.isel(mesh_quad_index=slice(0, 0))
+    elif wrong == "three corners":
+        dataset = dataset.isel(mesh_corner=slice(0, 3))
+    elif wrong == "elsewhere":
+        dataset["mesh_x"] = dataset["mesh_x"] + 1.0
+    else:
+        dataset["mesh_quad"] = 0 * dataset["mesh_quad"]
+    surface = read_root(as_result(dataset, tmp_path / "file.nc"))
+    assert surface is not None
+    assert not surface.is_mesh
+    assert len(surface.faces) == 16
+
+
+def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None:
+    surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
+    assert surface is not None
+    in_contact = int((surface.contact.flank >= 0).sum())
+    fewer = simplify(surface, 3000)
+    assert 2500 < len(fewer.faces) - in_contact <= 3000 < len(surface.faces) - in_contact
+    assert int((fewer.contact.flank >= 0).sum()) == in_contact
+    np.testing.assert_array_equal(fewer.nodes[fewer.contact.nodes], surface.nodes[surface.contact.nodes])
+    np.testing.assert_array_equal(fewer.contact.pairs, surface.contact.pairs)
+    for body in (0, 1):
+        before, after = (volume(each.nodes, each.faces[each.body == body]) for each in (surface, fewer))
+        assert after == pytest.approx(before, rel=0.03)
+    assert simplify(surface, len(surface.faces)) is surface
+
+
+def test_the_figures_of_the_dovetail(dovetail: Result) -> None:
+    worn, numbers, disk = list(draw_root(dovetail))
+    assert [worn.name, numbers.name, disk.name] == ["worn_root", "pair_numbers", "whole_disk"]
+    depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
+    root = read_root(dovetail)
+    assert root is not None
+    assert f"at pair {int(np.argmax(depth))}." in worn.caption
+    assert f"{root.exaggeration(float(depth.max())):g} times exaggerated" in worn.caption.replace("\u00a0", "")
+    panels = numbers.figure.axes
+    written = [text.get_text() for panel in panels for text in panel.texts]
+    assert sorted(int(text) for text in written if text.isdigit()) == list(range(16))
+    assert written.count("leading edge") == 2
+    assert "47 sectors" in disk.caption
+
+
+def test_without_wear_the_pressure_is_shown(dovetail: Result) -> None:
+    dataset = dovetail.dataset.assign(wear_depth=0.0 * dovetail.dataset["wear_depth"])
+    drawing = next(iter(draw_root(replace(dovetail, dataset=dataset))))
+    assert drawing.title == "The root"
+    assert drawing.caption.startswith("Mean pressure after")

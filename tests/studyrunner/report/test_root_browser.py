@@ -1,0 +1,215 @@
+"""The root in three dimensions in a headless browser: colours, worn shape, view, rotation, slider, points, play."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
+from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
+    CHROMIUM,
+    DRIVER,
+    FACTORS,
+    PATIENCE,
+    browser,
+    choose,
+    load,
+    messages,
+    press,
+    shown_point,
+    write,
+)
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
+]
+
+PLOT = "document.getElementById('root-plot')"
+CAMERA = f"return {PLOT}._fullLayout.scene._scene.getCamera()"
+
+
+@pytest.fixture(scope="module")
+def dataset() -> xr.Dataset:
+    return dovetail_file(failed=[5])
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Any:  # noqa: F811
+    load(browser, write(dataset, tmp_path_factory.mktemp("root")))
+    return browser
+
+
+@pytest.fixture(autouse=True)
+def clean(page: Any) -> Any:
+    from selenium.webdriver.common.keys import Keys
+
+    for name in ("root colour", "root view", "root shape"):
+        choose(page, name, 1 if name == "root colour" else 0)
+    press(page, Keys.END)
+    yield
+    assert messages(page) == []
+
+
+def trace(page: Any, meta: str) -> dict[str, Any]:
+    script = f"""
+    const found = {PLOT}.data.find((each) => each.meta === arguments[0]);
+    const lists = ["x", "y", "z", "i", "j", "k", "intensity"].map((name) => [name, Array.from(found[name] || [])]);
+    return {{ ...Object.fromEntries(lists), opacity: found.opacity, visible: found.visible }};
+    """
+    found: dict[str, Any] = page.execute_script(script, meta)
+    return found
+
+
+def assert_root_is(page: Any, dataset: xr.Dataset, name: str, point: int, cycle: int) -> None:
+    """Colours and worn shape are those of the file at a point and a cycle; the factor is the one that is told."""
+    contact, pairs = trace(page, "contact"), dovetail_pairs()
+    unit = page.execute_script(f"return {PLOT}.layout.coloraxis.colorbar.title.text")
+    nodes = np.stack([dataset[f"mesh_{axis}"].values for axis in "xyz"], axis=1)
+    at = [int(each) for each in np.unique([contact["i"], contact["j"], contact["k"]])]
+    way = np.linalg.norm(nodes[at][:, None] - pairs.position, axis=2)
+    assert way.min(axis=1).max() < 1e-9
+    pair = way.argmin(axis=1)
+    values = dataset[name].values.reshape(16, 5, -1)[point, cycle, pair]
+    np.testing.assert_allclose(np.array(contact["intensity"])[at], values * FACTORS[unit], rtol=1e-5)
+    factor = float(page.execute_script(f"return {PLOT}.dataset.factor"))
+    depth = dataset["wear_depth"].values.reshape(16, 5, -1)[point, cycle, pair]
+    places = np.stack([np.array(contact[axis])[at] for axis in "xyz"], axis=1) * 1e-3
+    way_in = np.einsum("ij,ij->i", nodes[at] - places, pairs.frames[pair, 0])
+    np.testing.assert_allclose(np.abs(way_in), factor * depth, rtol=1e-2, atol=2e-8)  # of 32 bit places
+    title = page.execute_script("return document.getElementById('root-title').textContent")
+    assert f"exaggerated {factor:g} times" in title.replace("\u00a0", "")
+
+
+def pixels(page: Any) -> bytes:
+    from selenium.webdriver.common.by import By
+
+    picture: bytes = page.find_element(By.ID, "root-plot").screenshot_as_png
+    return picture
+
+
+def test_the_root_begins_as_the_shown_point_after_wear(page: Any, dataset: xr.Dataset) -> None:
+    assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 4)
+    # beside the pairs at z < 0
+    assert 1.2 < trace(page, "leading")["z"][0] / (1e3 * dataset["contact_z"].values.min()) < 1.4
+
+
+@pytest.mark.parametrize(
+    ("place", "name"), list(enumerate(["mean_pressure", "wear_depth", "open_fraction", "slip_range"]))
+)
+def test_the_menu_changes_what_colours_the_root(page: Any, dataset: xr.Dataset, place: int, name: str) -> None:
+    choose(page, "root colour", place)
+    assert_root_is(page, dataset, name, shown_point(dataset), 4)
+
+
+def test_the_slider_and_the_lists_turn_the_root_as_well(page: Any, dataset: xr.Dataset) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    press(page, Keys.ARROW_LEFT)
+    assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 3)
+    choose(page, "axis frequency", 0)
+    choose(page, "axis wear coefficient", 0)
+    choose(page, "axis scheme", 1)
+    assert_root_is(page, dataset, "wear_depth", 1, 3)
+    index = np.unravel_index(5, dataset["outcome"].shape)
+    for name, place in zip(("frequency", "wear coefficient", "scheme"), (index[0], index[1], index[4]), strict=True):
+        choose(page, f"axis {name}", int(place))
+    assert page.execute_script(f"return {PLOT}.data.length") == 0
+    index = np.unravel_index(shown_point(dataset), dataset["outcome"].shape)
+    for name, place in zip(("frequency", "wear coefficient", "scheme"), (index[0], index[1], index[4]), strict=True):
+        choose(page, f"axis {name}", int(place))
+    assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 3)
+
+
+def test_the_worn_shape_can_be_seen_as_it_is(page: Any, dataset: xr.Dataset) -> None:
+    choose(page, "root shape", 1)
+    assert float(page.execute_script(f"return {PLOT}.dataset.factor")) == 1.0
+    assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 4)
+
+
+def test_the_views_show_one_body_from_close_by_or_all(page: Any, dataset: xr.Dataset) -> None:
+    extent = []
+    for view, (body, opacity) in enumerate([("blade", 1), ("blade", 1), ("disk", 1), ("disk", 1), ("all", 0.3)]):
+        choose(page, "root view", view)
+        seen = {number: trace(page, f"body {number}") for number in (0, 1)}
+        shown = {name for name, number in (("disk", 0), ("blade", 1)) if seen[number]["visible"]}
+        assert shown == ({"disk", "blade"} if body == "all" else {body})
+        assert seen[0]["opacity"] == opacity
+        x = page.execute_script(f"return {PLOT}.layout.scene.xaxis.range")
+        extent.append(x[1] - x[0])
+    assert max(extent[:4]) < 60.0 < 300.0 < extent[4]
+
+
+def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page: Any) -> None:
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    plot = page.find_element(By.ID, "root-plot")
+    page.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", plot)
+    page.execute_async_script("setTimeout(arguments[0], 300)")
+    before, picture = page.execute_script(CAMERA), pixels(page)
+    mouse = ActionChains(page).move_to_element(plot).click_and_hold()
+    for _ in range(6):
+        mouse = mouse.move_by_offset(30, 8).pause(0.05)
+    mouse.release().perform()
+    page.execute_async_script("setTimeout(arguments[0], 500)")
+    after = page.execute_script(CAMERA)
+    eyes = [np.array([camera["eye"][axis] for axis in "xyz"]) for camera in (before, after)]
+    assert np.linalg.norm(eyes[1] - eyes[0]) > 0.3
+    # turned, not zoomed
+    assert np.linalg.norm(eyes[1]) == pytest.approx(np.linalg.norm(eyes[0]), rel=0.02)
+    assert pixels(page) != picture
+    press(page, Keys.ARROW_LEFT)
+    kept = page.execute_script(CAMERA)
+    assert [kept["eye"][axis] for axis in "xyz"] == pytest.approx(eyes[1].tolist(), abs=1e-3)
+
+
+def test_play_runs_through_the_cycles_and_stops_at_the_last(page: Any) -> None:
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    page.execute_script(
+        """
+        window.turned = [];
+        const count = document.getElementById("cycle-count");
+        new MutationObserver(() => window.turned.push(state.cycle)).observe(count, { childList: true });
+        """
+    )
+    button = page.find_element(By.ID, "play")
+    assert button.text == "Play"
+    button.click()
+    assert button.text == "Pause"
+    WebDriverWait(page, PATIENCE, poll_frequency=0.1).until(lambda _: button.text == "Play")
+    assert page.execute_script("return window.turned") == [0, 1, 2, 3, 4]
+    button.click()
+    button.click()
+    assert button.text == "Play"
+    stopped = page.execute_script("return state.cycle")
+    page.execute_async_script("setTimeout(arguments[0], 600)")
+    assert page.execute_script("return state.cycle") == stopped
+
+
+def test_a_browser_without_webgl_says_so(browser: Any, tmp_path: Path) -> None:  # noqa: F811
+    address = browser.current_url
+    patch = """
+    const getContext = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+      return kind.includes("webgl") ? null : getContext.call(this, kind, ...more);
+    };
+    """
+    done = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": patch})
+    try:
+        load(browser, write(build_file(), tmp_path))
+        assert "no WebGL" in browser.execute_script("return document.getElementById('root-hint').textContent")
+        assert browser.execute_script(f"return {PLOT}.hidden")
+        assert browser.execute_script("return document.getElementById('map-plot').data.length") > 0
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", done)
+        load(browser, address)

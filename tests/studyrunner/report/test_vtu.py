@@ -1,0 +1,124 @@
+"""The root as VTU files: read again they hold the numbers of the result, at the cycle counts of the PVD file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.report import gallery
+from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
+from studyrunner.report.root import vtu
+from tests.studyrunner.report.page_cases import as_result, build_file
+from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
+
+TITLE = "wear --> after -- a title"
+
+
+@pytest.fixture(scope="module")
+def dataset() -> xr.Dataset:
+    dataset = dovetail_file()
+    dataset.attrs["title"] = TITLE
+    return dataset
+
+
+@pytest.fixture(scope="module")
+def folder(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("vtu")
+    (folder / "vtu").mkdir()
+    (folder / "vtu" / "root_9999.vtu").touch()  # of an older, longer series
+    series = vtu.find_writer(as_result(dataset, folder / "some.nc"))(folder)
+    assert series.path == folder / "root.pvd"
+    assert series.n_files == 5
+    return folder
+
+
+def test_the_series_names_a_file_for_each_cycle_count(folder: Path, dataset: xr.Dataset) -> None:
+    sets = ElementTree.parse(folder / "root.pvd").findall("Collection/DataSet")
+    assert [float(each.attrib["timestep"]) for each in sets] == dataset["cycle"].values.tolist()
+    named = [each.attrib["file"] for each in sets]
+    assert sorted(named) == sorted(f"vtu/{path.name}" for path in (folder / "vtu").iterdir())
+
+
+def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Dataset) -> None:
+    point = int(np.nanargmax(dataset["worn_volume"].values.reshape(16, 5)[:, -1]))
+    pairs = dovetail_pairs()
+    for cycle in (0, 4):
+        mesh = meshio.read(folder / "vtu" / f"root_{cycle:04d}.vtu")
+        np.testing.assert_array_equal(mesh.points, np.stack([dataset[f"mesh_{axis}"] for axis in "xyz"], axis=1))
+        np.testing.assert_array_equal(mesh.cells_dict["quad"], dataset["mesh_quad"])
+        held = np.isfinite(mesh.point_data["wear_depth"])
+        assert held.sum() == 2 * len(pairs.area)
+        way = np.linalg.norm(mesh.points[held][:, None] - pairs.position, axis=2)
+        assert way.min(axis=1).max() < 1e-12
+        for name in vtu.FIELDS:
+            values = dataset[name].values.reshape(16, 5, -1)[point, cycle]
+            np.testing.assert_array_equal(mesh.point_data[name][held], values[way.argmin(axis=1)])
+        depth = mesh.point_data["wear_depth"][held]
+        # into the blade on one side of the joint, into the disk on the other
+        moved = np.einsum("ij,ij->i", mesh.point_data["worn_displacement"][held], pairs.frames[way.argmin(axis=1), 0])
+        np.testing.assert_allclose(np.sort(moved), np.sort(np.where(moved > 0.0, depth, -depth)), rtol=1e-9)
+        assert (moved > 0.0).sum() == len(pairs.area)
+        assert (mesh.point_data["worn_displacement"][~held] == 0.0).all()
+        body, surface = (np.concatenate(mesh.cell_data[name]) for name in ("body", "contact_surface"))
+        assert set(body) == {0, 1}
+        assert (np.bincount(surface + 1)[1:] == 2 * 3).all()
+
+
+def test_equal_results_give_equal_files(folder: Path, dataset: xr.Dataset, tmp_path: Path) -> None:
+    vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path)
+    for path in (Path("root.pvd"), *(Path("vtu") / f"root_{number:04d}.vtu" for number in range(5))):
+        assert (tmp_path / path).read_bytes() == (folder / path).read_bytes()
+
+
+def test_triangles_are_cells_of_their_own(tmp_path: Path) -> None:
+    dataset = dovetail_file()
+    quads = dataset["mesh_quad"].values.copy()
+    corner = np.flatnonzero(quads[:, 0] == quads[-1, 0])[0]
+    quads[corner, 3] = quads[corner, 2]
+    dataset["mesh_quad"] = (dataset["mesh_quad"].dims, quads)
+    vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path)
+    mesh = meshio.read(tmp_path / "vtu" / "root_0000.vtu")
+    assert mesh.cells_dict["triangle"].tolist() == [quads[corner, :3].tolist()]
+    assert len(mesh.cells_dict["quad"]) == len(quads) - 1
+    assert [len(each) for each in mesh.cell_data["body"]] == [1, len(quads) - 1]
+
+
+def test_a_point_that_ended_early_has_files_up_to_there(tmp_path: Path) -> None:
+    dataset = dovetail_file(axes={"frequency": (190.0,), "scheme": ("implicit",), "sweep": ("up",)})
+    dataset["outcome"].values[:], dataset["last_cycle"].values[:] = 4, 250.0
+    for values in dataset.data_vars.values():
+        if "cycle" in values.dims and values.dtype.kind == "f":
+            values.values[..., 3:, :] = np.nan if "contact" in values.dims else values.values[..., 3:, :]
+    assert vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path).n_files == 3
+
+
+def test_the_command_writes_the_series_beside_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], dataset: xr.Dataset
+) -> None:
+    monkeypatch.setattr(gallery, "draw_report", lambda _: iter(()))
+    monkeypatch.chdir(tmp_path)
+    dataset.to_netcdf("some.nc")
+    assert main(["some.nc", "--vtu"]) == WRITTEN
+    assert (tmp_path / "some-report" / "root.pvd").is_file()
+    assert "some-report/root.pvd: time series of 5 VTU files" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("wrong", ["no library", "no positions"])
+def test_what_stands_in_the_way_is_said_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], wrong: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    build_file(positions=np.full((2, 3), np.nan)).to_netcdf("some.nc")
+    if wrong == "no library":
+        monkeypatch.setattr(vtu, "find_spec", lambda _: None)
+    assert main(["some.nc", "--vtu"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "--vtu" in said
+    assert ("pip install 'fretwear[meshio]'" if wrong == "no library" else "no positions") in said
+    assert [path.name for path in tmp_path.iterdir()] == ["some.nc"]
