@@ -38,7 +38,7 @@ _LARGEST_CHUNK = 2**25
 _OF_NETCDF = ("_NCProperties", "_nc3_strict")
 _MOST_CHUNKS = 100_000
 _MOST_OBJECTS = 2000
-_DEEPEST = 4  # groups above a dataset: nd/<k>/load/static
+_DEEPEST = 5  # of groups and datasets within each other: in a result scene/nd/<k>/load/static
 _LONGEST_NAME = 100
 _FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF)
 
