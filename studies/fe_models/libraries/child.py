@@ -46,6 +46,10 @@ def main(arguments: list[str]) -> NoReturn:
     except SceneError as error:
         print(f"\n{json.dumps([error.value, error.remedy])}", end="", flush=True)
         os._exit(REFUSED)
+    except ImportError as error:
+        found = f"the library that reads {path.name} does not load: {error}"
+        print(f"\n{json.dumps([found, 'install it again, with what it needs'])}", end="", flush=True)
+        os._exit(REFUSED)
     # the libraries raise anything for a damaged file, and some of them end the process; the status says it all
     except (Exception, SystemExit):
         os._exit(1)

@@ -182,6 +182,13 @@ def test_missing_library(tmp_path, monkeypatch):
         read_matrices(tmp_path / "job")
 
 
+def test_library_that_does_not_load(tmp_path, monkeypatch):
+    (tmp_path / "meshio.py").write_text("import no_such_module_at_all")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SceneError, match="reads mesh.msh does not load: No module named 'no_such_module_at_all'"):
+        read_library_mesh(write(tmp_path, GMSH_22))
+
+
 def test_process_that_ends_badly(tmp_path, monkeypatch):
     path = write(tmp_path, GMSH_22)
     monkeypatch.setattr(process, "_is_installed", lambda _: True)
