@@ -185,7 +185,7 @@ def test_missing_library(tmp_path, monkeypatch):
 def test_library_that_does_not_load(tmp_path, monkeypatch):
     (tmp_path / "meshio.py").write_text("import no_such_module_at_all")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(SceneError, match="reads mesh.msh does not load: No module named 'no_such_module_at_all'"):
+    with pytest.raises(SceneError, match=r"reads mesh\.msh does not load: No module named 'no_such_module_at_all'"):
         read_library_mesh(write(tmp_path, GMSH_22))
 
 
