@@ -106,7 +106,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         check_units(deck, mass_of(deck, matrices), units)
         _check_export(deck, matrices, mesh, surfaces, units)
         if rotation is not None:
-            held_speed = _check_rotation(deck, matrices, rotation, parameters)
+            held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
         nodal = order_by_nodes(
             sparse.csr_matrix(matrices.stiffness * units.stiffness),
             sparse.csr_matrix(matrices.mass * units.mass),
@@ -178,10 +178,12 @@ def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> 
     check_nodes_have_dofs(matrices, mesh.numbers[~held.astype(bool)], "the mesh without its clamps")
 
 
-def _check_rotation(deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters) -> float | None:
+def _check_rotation(
+    deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters, units: Units
+) -> float | None:
     """Square of the speed that the matrices hold; it must be that of the rotation."""
     if parameters.rotation_speed is None:
-        check_speed(deck, matrices)
+        check_speed(deck, matrices, units)
     held = omega_squared_of(deck, matrices, rotation.axis)
     if held is not None and abs(held - rotation.omega_squared) > 2.0 * _SPEED_AGREES * rotation.omega_squared:
         found = f"{parameters.rotation_speed:g} rpm, the stiffness holds {30.0 * np.sqrt(held) / np.pi:.6g} rpm"
