@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from studies.fe_models import checks
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
-from tests.studies.fe_models.matrix_files import write_abaqus, write_nastran
+from tests.studies.fe_models.matrix_files import write_abaqus, write_calculix, write_nastran
 from tests.studies.fe_models.plates import Plates, component
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
@@ -179,6 +180,18 @@ def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, folder):
     (folder / "lap.med").write_text("")
     write_abaqus(folder, system=Plates().system())
     assert expected in message(*overrides)
+
+
+def test_calculix(folder):
+    """Whole, and of cyclic modes: a real matrix of twice the size."""
+    stiffness, mass, node, direction = Plates().system()
+    write_calculix(folder, system=(stiffness, mass, node, direction))
+    check_same(scene_of("scene.matrices=job"), scene_of())
+    twice = [block_diag(each, each) for each in (stiffness, mass)]
+    write_calculix(folder, "twice", system=(*twice, np.tile(node, 2), np.tile(direction, 2)))
+    (folder / "twice.dof").write_bytes((folder / "job.dof").read_bytes())
+    assert "144 rows for 72 dofs" in message("scene.matrices=twice")
+    assert "export without *SELECT CYCLIC SYMMETRY MODES" in message("scene.matrices=twice")
 
 
 def test_active_boundary_conditions_are_found(folder):

@@ -42,8 +42,10 @@ def entries(matrix: np.ndarray, lower: bool = False, both: bool = False) -> list
     return [(r, c, v) for r, c, v in found if both or (r >= c if lower else r <= c)]
 
 
-def write_calculix(folder: Path, name: str = "job", nodes: tuple[int, ...] = (1, 2, 10)) -> Path:
-    stiffness, mass, node, direction = chain(nodes)
+def write_calculix(
+    folder: Path, name: str = "job", nodes: tuple[int, ...] = (1, 2, 10), system: System | None = None
+) -> Path:
+    stiffness, mass, node, direction = system or chain(nodes)
     for matrix, end in ((stiffness, "sti"), (mass, "mas")):
         lines = [f"{r + 1} {c + 1}  {v:.13e}" for r, c, v in entries(matrix)]
         (folder / f"{name}.{end}").write_text("\n".join(lines) + "\n")
