@@ -9,10 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
+from studyrunner.cli import main
+from studyrunner.scene.scene import build_study_scene
+from studyrunner.study.study_file import read_study
 from tests.studies.fe_models.blade_root import DECK, blade_root_deck
+from tests.studies.static_contact import solve_static_contact
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "studies" / "fe_models" / "README.md"
@@ -28,6 +33,11 @@ SMALL = {
     "outputs": "2",
     "excitation_amplitude": "2.0",
 }
+NEXT_TO_NOTHING = [
+    word
+    for each in ("axes.excitation_amplitude=1e-3", "slow_time.cycles=0", "slow_time.outputs=1")
+    for word in ("--set", each)
+]
 
 
 def paste(commands, folder):
@@ -88,3 +98,22 @@ def test_the_page_without_calculix(folder):
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_the_page_with_the_matrices_of_calculix(folder):
     check_printed(PRINTED[2], paste(COMMANDS[2], folder))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_static_forces_are_those_of_the_contact_of_calculix(tmp_path):
+    """Normal and shear force of a flank under the centrifugal load, with friction, before anything vibrates."""
+    asked = "*CONTACT PRINT,SLAVE=ROOT_A,MASTER=SLOT_A\nCF\n*END STEP\n"
+    (tmp_path / "job.inp").write_text(blade_root_deck().replace("*END STEP\n", asked, 1))
+    paste("ccx -i job", tmp_path)
+    printed = (tmp_path / "job.dat").read_text().split("normal force (+ = tension) and shear force (size)")[1]
+    _, normal, shear = map(float, printed.split()[:3])
+    force = solve_static_contact(build_study_scene(read_study("blade_root")), 0.4)
+    flank = force[:18].sum(axis=0)
+    assert flank[0] == pytest.approx(-normal, rel=2e-3)
+    assert np.hypot(*flank[1:]) == pytest.approx(shear, rel=3e-3)
+    assert main(["blade_root", "-o", str(tmp_path / "still.nc"), *NEXT_TO_NOTHING]) == 0
+    with xr.open_dataset(tmp_path / "still.nc") as result:
+        found = (result.mean_pressure * result.contact_area).values.reshape(2, 18).sum(axis=1)
+    assert found == pytest.approx(2 * [-normal], rel=3e-3)
