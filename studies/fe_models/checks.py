@@ -49,6 +49,9 @@ _ROUNDING = 1e-13
 _LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
 """kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
 
+_SOFTEST, _STIFFEST = 5e5, 2e12
+"""Young's moduli, Pa, from rubber to diamond. One of several materials may be stiffer, to stand for what is rigid."""
+
 
 def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
     """Every node of a surface or set has all three dofs in the matrices.
@@ -228,3 +231,17 @@ def check_units(deck: Deck, mass: float | None, units: Units) -> None:
         found = f"density {density:.3g} {units.label_of_mass}/{units.label_of_length}3"
     if not _LEAST_DENSITY <= density * units.density <= _LARGEST_DENSITY:
         raise SceneError("units", f"{found}: not {units.name}", 'give `units` that fit, "SI" or "mm-t-s"')
+    if mass is None:
+        _check_moduli(deck, units)
+
+
+def _check_moduli(deck: Deck, units: Units) -> None:
+    """Not all materials are stiffer than any, nor softer."""
+    moduli = [(material.young, name) for name, material in deck.materials.items() if material.young is not None]
+    if not moduli:
+        return
+    (softest, soft), (stiffest, stiff) = min(moduli), max(moduli)
+    if softest * units.stress > _STIFFEST or stiffest * units.stress < _SOFTEST:
+        young, name = (softest, soft) if softest * units.stress > _STIFFEST else (stiffest, stiff)
+        found = f"Young's modulus of {name} is {young * units.stress:.3g} Pa: not {units.name}"
+        raise SceneError("units", found, 'give `units` that fit, "SI" or "mm-t-s"')

@@ -245,6 +245,32 @@ def test_a_deck_that_is_cut_off(folder):
     assert all("\n" not in each and "lap.toml: scene." in each for each in said)
 
 
+def test_decks_as_editors_write_them(folder):
+    """Line ends of Windows, small letters, tabs and a byte order mark change nothing; another encoding is said."""
+    text = Plates().deck()
+    expected = scene_of()
+    for other in (text.replace("\n", "\r\n"), text.lower(), text.replace(", ", ",\t"), "\ufeff" + text):
+        (folder / "lap.inp").write_bytes(other.encode())
+        check_same(scene_of(), expected, 0.0)
+    (folder / "lap.inp").write_bytes(text.encode("utf-16"))
+    assert "lap.inp, line 1: no text" in message()
+
+
+@pytest.mark.parametrize(
+    ("units", "young", "density", "expected"),
+    [
+        ("SI", "210e9", "7.8e-9", "density 7.8e-09 kg/m3: not SI: give `units` that fit"),
+        ("SI", "210e3", "7800", "is 2.1e+05 Pa: not SI"),
+        ("mm-t-s", "210e9", "7.8e-9", "is 2.1e+17 Pa: not mm-t-s"),
+        ("mm-t-s", "210e3", "7.8e-6", "density 7.8e-06 t/mm3: not mm-t-s"),
+    ],
+)
+def test_materials_in_other_units_are_found(units, young, density, expected, folder):
+    text = Plates().deck().replace("210000000000.0", young).replace("7800.0", density)
+    (folder / "lap.inp").write_text(text)
+    assert expected in message(f"scene.units={units}")
+
+
 @pytest.mark.parametrize("end", ["_STIF1.mtx", "_MASS1.mtx"])
 def test_matrices_that_are_cut_off(end, folder):
     path = folder / f"job{end}"

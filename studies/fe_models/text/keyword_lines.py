@@ -12,6 +12,7 @@ from studies.fe_models.text.places import LARGEST_DECK, Place, check_file, shown
 _LONGEST_LINE = 10_000
 _MOST_INCLUDES = 1000
 _DEEPEST_INCLUDE = 10
+_BYTE_ORDER_MARK = "\xef\xbb\xbf"  # of UTF-8, which some editors write, in Latin-1
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET")
 _MOST_BLOCKS = 1_000_000
 _MOST_LINES = 6_000_000  # each takes a hundred bytes of memory and more
@@ -116,7 +117,7 @@ class _Cutter:
                 number += 1
                 if len(raw) > _LONGEST_LINE or "\0" in raw:
                     raise Place(name, number).wrong("no text, or a very long line", "give a deck of CalculiX or Abaqus")
-                text = raw.strip()
+                text = raw.removeprefix(_BYTE_ORDER_MARK).strip() if number == 1 else raw.strip()
                 if not text or text == "*" or text.startswith("**"):
                     continue
                 place = Place(name, number)
