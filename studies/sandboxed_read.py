@@ -3,21 +3,19 @@
 The HDF5 library was not made for bytes that somebody has tampered with: some crash it, some keep it busy for ever, and
 a few unpack to any size. The process that finds out has a limit of its time and memory, and its end is the answer:
 exit status 0 for a file that can be read, 3 with a reason for one that can not, anything else where it came to a bad
-end. It looks for modules where this one does, but never in the current folder.
+end.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import resource
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from studies.guards.search_path import search_path
+from studies.guards.limited_process import REFUSED, limit_this_process, run_limited
 from studies.scene_error import SceneError
 
 LARGEST_MEMORY = 2**31
@@ -27,13 +25,7 @@ LONGEST = 2
 """CPU seconds for reading a file, and one more for every _BYTES_A_SECOND that it has."""
 
 _BYTES_A_SECOND = 2**25
-_REFUSED = 3
 _WHOLE_RESULT = "*"
-_START = """\
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-from studies.sandboxed_read import main
-main(sys.argv[2:])"""
 _WALL_SECONDS = 60.0  # a folder on the network may be slow, which is no fault of the file
 
 
@@ -67,7 +59,7 @@ def check_result_readable(path: Path) -> None:
 
 def _check(path: Path, what: Sequence[str]) -> None:
     status, said = run_sandbox([str(path.absolute()), *what])
-    if status == _REFUSED:
+    if status == REFUSED:
         raise SceneError(*json.loads(said))
     if status != 0:
         found = f"{path.name} is damaged: it cannot be read in a reasonable time and {LARGEST_MEMORY / 2**30:g} GiB"
@@ -76,24 +68,7 @@ def _check(path: Path, what: Sequence[str]) -> None:
 
 def run_sandbox(arguments: Sequence[str]) -> tuple[int, str]:
     """Exit status of the process that reads a file, and what it says."""
-    # one thread: the memory that others set aside counts, too
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    # isolated: neither the current folder nor the environment says where its modules are, but for this list
-    path = [str(Path(__file__).parents[1]), *search_path()]
-    command = [sys.executable, "-I", "-c", _START, json.dumps(path), *arguments]
-    try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=_WALL_SECONDS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return -1, ""
-    return done.returncode, done.stdout.decode()
+    return run_limited(__name__, arguments, _WALL_SECONDS)
 
 
 def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
@@ -108,13 +83,7 @@ def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = 
     seconds = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime) + LONGEST
     if path.is_file():
         seconds += min(path.stat().st_size, 2**31) // _BYTES_A_SECOND
-    for what, limit in (
-        (resource.RLIMIT_AS, LARGEST_MEMORY),
-        (resource.RLIMIT_CPU, seconds),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        _, most = resource.getrlimit(what)
-        resource.setrlimit(what, (limit if most == resource.RLIM_INFINITY else min(limit, most), most))
+    limit_this_process(LARGEST_MEMORY, seconds)
     try:
         if group == _WHOLE_RESULT:
             read_result_through(path)
@@ -127,7 +96,7 @@ def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = 
                     return 0, ""
         read_through(path, group)
     except SceneError as error:
-        return _REFUSED, json.dumps([error.key, error.value, error.remedy])
+        return REFUSED, json.dumps([error.key, error.value, error.remedy])
     except OSError:
         # a missing file, which the process that asks finds as well
         return 0, ""

@@ -6,7 +6,6 @@ Each raises SceneError with one sentence where the mistake was made, and returns
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
+from studies.fe_models.elements.solid_mesh import Rotation
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.units import Units
 from studies.scene_error import SceneError
@@ -49,19 +49,8 @@ _ROUNDING = 1e-13
 _LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
 """kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
 
-
-@dataclass(frozen=True)
-class Rotation:
-    """omega_squared: rad2/s2. point (3,): on the axis, units of the file. axis (3,): unit vector."""
-
-    omega_squared: float
-    point: FloatArray
-    axis: FloatArray
-
-    @property
-    def speed(self) -> float:
-        """rad/s"""
-        return math.sqrt(self.omega_squared)
+_SOFTEST, _STIFFEST = 5e5, 2e12
+"""Young's moduli, Pa, from rubber to diamond. One of several materials may be stiffer, to stand for what is rigid."""
 
 
 def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
@@ -153,8 +142,8 @@ def check_mesh_is_of_matrices(deck: Deck, matrices: Matrices) -> None:
         raise SceneError("matrices", found, "give the mesh that the matrices were made of")
 
 
-def rotation_of_deck(deck: Deck) -> Rotation | None:
-    """The rotation that the last step with centrifugal loads has, None where no step has any.
+def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
+    """The rotation, SI, that the last step with centrifugal loads has, None where no step has any.
 
     Raises SceneError where parts of the model turn differently, or not at all.
     """
@@ -174,7 +163,7 @@ def rotation_of_deck(deck: Deck) -> Rotation | None:
     if turning.size and turning.size < elements.size:
         found = f"{deck.path}: {turning.size} of {elements.size} elements have a centrifugal load"
         raise SceneError("model", found, "give it to all of them")
-    return Rotation(loads[0].omega_squared, loads[0].point, loads[0].axis)
+    return Rotation(loads[0].omega_squared, loads[0].point * units.length, loads[0].axis)
 
 
 def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float | None:
@@ -199,18 +188,19 @@ def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float 
     return float(np.mean(found))
 
 
-def check_speed(deck: Deck, matrices: Matrices) -> Rotation | None:
-    """The stiffness was made at the speed of the deck; the rotation, None where there is none.
+def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None:
+    """The stiffness was made at the speed of the deck; the rotation, SI, None where there is none.
 
     Where the model is held in its matrices the speed cannot be read back from them, and the deck's is believed.
     """
-    rotation = rotation_of_deck(deck)
+    rotation = rotation_of_deck(deck, units)
     if rotation is None:
         return None
     held = omega_squared_of(deck, matrices, rotation.axis)
     if held is None or math.isclose(held, rotation.omega_squared, rel_tol=_SPEED_AGREES):
         return rotation
-    found = f"the deck spins at {rotation.speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
+    speed = math.sqrt(rotation.omega_squared)
+    found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
     raise SceneError("matrices", found, _KEEP_PRESTRESS[matrices.code] if held == 0 else "give the files of one run")
 
 
@@ -241,3 +231,17 @@ def check_units(deck: Deck, mass: float | None, units: Units) -> None:
         found = f"density {density:.3g} {units.label_of_mass}/{units.label_of_length}3"
     if not _LEAST_DENSITY <= density * units.density <= _LARGEST_DENSITY:
         raise SceneError("units", f"{found}: not {units.name}", 'give `units` that fit, "SI" or "mm-t-s"')
+    if mass is None:
+        _check_moduli(deck, units)
+
+
+def _check_moduli(deck: Deck, units: Units) -> None:
+    """Not all materials are stiffer than any, nor softer."""
+    moduli = [(material.young, name) for name, material in deck.materials.items() if material.young is not None]
+    if not moduli:
+        return
+    (softest, soft), (stiffest, stiff) = min(moduli), max(moduli)
+    if softest * units.stress > _STIFFEST or stiffest * units.stress < _SOFTEST:
+        young, name = (softest, soft) if softest * units.stress > _STIFFEST else (stiffest, stiff)
+        found = f"Young's modulus of {name} is {young * units.stress:.3g} Pa: not {units.name}"
+        raise SceneError("units", found, 'give `units` that fit, "SI" or "mm-t-s"')

@@ -19,12 +19,15 @@ class MeshModel:
     """A model whose matrices are assembled here.
 
     rotation: None where it stands still. prestress: whether the stress and the displacements of the glued structure
-    under the centrifugal load, and spin softening, are part of its stiffness.
+    under the centrifugal load, and spin softening, are part of its stiffness. preload (3 n_nodes,): constant forces
+    beside the centrifugal ones, N; they are no part of the prestress, as what presses on gaps and flanks does so
+    otherwise on a glued structure.
     """
 
     mesh: SolidMesh
     rotation: Rotation | None = None
     prestress: bool = True
+    preload: FloatArray | None = None
 
     @property
     def coordinates(self) -> FloatArray:
@@ -52,6 +55,7 @@ class MatrixModel:
     stiffness: sparse.csr_matrix
     mass: sparse.csr_matrix
     rotation: Rotation | None = None
+    preload: FloatArray | None = None
 
 
 @dataclass(frozen=True)

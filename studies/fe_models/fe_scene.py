@@ -25,6 +25,7 @@ from studies.fe_models.elements.assembly import (
     check_elements,
     spin_softening,
 )
+from studies.fe_models.elements.solid_mesh import Rotation
 from studies.fe_models.fe_model import (
     JointDefinition,
     MatrixModel,
@@ -94,10 +95,10 @@ def build_fe_scene(
     """Reduced model for the harmonics 0..n_harmonics.
 
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
-    first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation,
-    enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The damping is `loss_factor /
-    omega_1` times the stiffness without prestress where that is known, omega_1 the first frequency of the glued
-    structure, rad/s, at the nodal diameter of the excitation. Coriolis forces are left out.
+    first and second tangent; then modal coordinates of the glued structure. The static load, that of the
+    rotation and the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The
+    damping is `loss_factor / omega_1` times the stiffness without prestress where that is known, omega_1 the first
+    frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces are left out.
 
     Raises SceneError where the model describes no possible joint.
     """
@@ -177,7 +178,7 @@ def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progre
         return PreparedModel(still, load, None)
     progress("static state of the glued structure under the centrifugal load")
     try:
-        displacements = still.solve_static(load)
+        displacements = still.solve_static(_centrifugal_load(mass, model.coordinates, model.rotation))
     except GluedStructureError as error:
         raise _refused(error, 0) from error
     progress("assembly of the prestressed stiffness")
@@ -248,11 +249,14 @@ def _positions(coordinates: FloatArray, coupled: sparse.csr_matrix) -> FloatArra
 
 
 def _static_load(mass: sparse.csr_matrix, coordinates: FloatArray, model: MeshModel | MatrixModel) -> FloatArray:
-    if model.rotation is None:
-        return np.zeros(mass.shape[0])
+    load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
+    return load if model.rotation is None else load + _centrifugal_load(mass, coordinates, model.rotation)
+
+
+def _centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
     # what has no place has no arm: an amplitude within an element
-    places = np.where(np.isnan(coordinates), model.rotation.point, coordinates)
-    return centrifugal_load(mass, places, model.rotation)
+    places = np.where(np.isnan(coordinates), rotation.point, coordinates)
+    return centrifugal_load(mass, places, rotation)
 
 
 def _along(model: MeshModel | MatrixModel, joint: JointDefinition) -> FloatArray:

@@ -28,9 +28,9 @@ class NodalMatrices:
     mass: sparse.csr_matrix
     missing: BoolArray
 
-    def model(self, rotation: Rotation | None = None) -> MatrixModel:
-        """The model of them."""
-        return MatrixModel(self.coordinates, self.numbers, self.stiffness, self.mass, rotation)
+    def model(self, rotation: Rotation | None = None, preload: FloatArray | None = None) -> MatrixModel:
+        """The model of them. preload (3 n_nodes,): constant forces beside the centrifugal ones, N."""
+        return MatrixModel(self.coordinates, self.numbers, self.stiffness, self.mass, rotation, preload)
 
 
 def order_by_nodes(

@@ -38,7 +38,10 @@ _LARGEST_CHUNK = 2**25
 _OF_NETCDF = ("_NCProperties", "_nc3_strict")
 _MOST_CHUNKS = 100_000
 _MOST_OBJECTS = 2000
-_DEEPEST = 4  # groups above a dataset: nd/<k>/load/static
+_DEEPEST = 4  # of groups and datasets within each other: nd/<k>/load/static
+DEEPEST_RESULT = 5
+"""The same in a result, which holds its scene in a group."""
+
 _LONGEST_NAME = 100
 _FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF)
 
@@ -156,7 +159,9 @@ def read_attribute(group: h5py.Group, name: str) -> NDArray[np.generic] | None:
     return np.asarray(group.attrs[name])
 
 
-def walk(group: h5py.Group, prefix: str = "", seen: list[int] | None = None) -> Iterator[tuple[str, h5py.HLObject]]:
+def walk(
+    group: h5py.Group, prefix: str = "", seen: list[int] | None = None, deepest: int = _DEEPEST
+) -> Iterator[tuple[str, h5py.HLObject]]:
     """All groups and datasets below a group by name with the groups above; no link is followed.
 
     Parameters
@@ -167,6 +172,8 @@ def walk(group: h5py.Group, prefix: str = "", seen: list[int] | None = None) -> 
         Names of the groups above, each with a slash behind it.
     seen
         How many objects were met on the way, counted on.
+    deepest
+        How many groups and datasets may lie within each other.
 
     Raises
     ------
@@ -184,9 +191,9 @@ def walk(group: h5py.Group, prefix: str = "", seen: list[int] | None = None) -> 
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise SceneError(key, "a link", "store the data itself under this name")
         item = _open(group, name, key)
-        if isinstance(item, h5py.Group) and key.count("/") < _DEEPEST - 1:
+        if isinstance(item, h5py.Group) and key.count("/") < deepest - 1:
             yield key, item
-            yield from walk(item, f"{key}/", seen)
+            yield from walk(item, f"{key}/", seen, deepest)
         elif isinstance(item, h5py.Dataset):
             yield key, item
         elif not isinstance(item, h5py.Datatype):

@@ -12,6 +12,7 @@ import h5py
 import netCDF4
 
 from studies.guards.hdf5_guard import (
+    DEEPEST_RESULT,
     LARGEST_RESULT,
     LARGEST_TEXT,
     check_dataset,
@@ -48,7 +49,7 @@ def read_result_through(path: Path) -> None:
 def _read_as_hdf5(file: h5py.File) -> None:
     for name in file.attrs:
         read_attribute(file, name)
-    for key, item in walk(file):
+    for key, item in walk(file, deepest=DEEPEST_RESULT):
         for name in item.attrs:
             _check_attribute(item, name, f"{key}:{name}")
         if isinstance(item, h5py.Dataset) and not only_names_a_dimension(item):

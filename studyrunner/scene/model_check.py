@@ -36,7 +36,7 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
         rows = describe_model(loaded, scene, parameters, progress)
         rows.insert(0, ("files", describe_origin(files, parameters)["model_files"]))
     try:
-        draw_pairs(scene, picture)
+        draw_pairs(loaded, scene, picture)
     except OSError as error:
         remedy = f"give a folder that can be written to: {error.strerror or error}"
         raise UserError("command line", "--check", str(picture), remedy) from None

@@ -9,6 +9,7 @@ from scipy import linalg
 from studies.model_check import check_model
 from studies.scenes.dovetail_sector import Parameters, build, natural_frequencies
 from studies.scenes.finite_element.condensation import projection
+from studies.scenes.finite_element.condensation.modes import lowest_modes
 from tests.studies.reduction_twin import build_linear
 
 MATRICES = ("mass", "damping", "stiffness")
@@ -82,3 +83,20 @@ def test_natural_frequencies_are_those_of_the_reduced_models():
     for k, linear in model.linear.items():
         stuck = np.sqrt(np.diag(linear.stiffness).real[n_relative : n_relative + 6]) / (2.0 * np.pi)
         assert told.frequencies[k] == pytest.approx(stuck, rel=1e-9)
+
+
+@pytest.mark.parametrize("n_modes", [5, 45, 65])
+def test_modes_of_a_mass_of_rank_45(n_modes):
+    """Against a dense solution; of more than there are, those that there are."""
+    n, rng = 600, np.random.default_rng(1)
+    stiffness = rng.standard_normal((2, n, n))
+    stiffness = stiffness[0] + 1j * stiffness[1]
+    stiffness = 1e6 * (stiffness @ stiffness.conj().T) + 1e7 * np.eye(n)
+    moved = rng.standard_normal((n, 45))
+    mass = (moved * np.logspace(0.0, -4.0, 45)) @ moved.T
+    inverse = np.linalg.inv(stiffness)
+    start = inverse @ (mass @ rng.standard_normal((n, 8)))
+    squares, modes = lowest_modes(lambda forces: inverse @ forces, lambda vectors: mass @ vectors, start, n_modes)
+    expected = 1.0 / linalg.eigh(mass, stiffness, eigvals_only=True)[::-1][: min(n_modes, 45)]
+    assert squares == pytest.approx(expected, rel=1e-9)
+    assert np.abs(modes.conj().T @ mass @ modes - np.eye(len(squares))).max() < 1e-10

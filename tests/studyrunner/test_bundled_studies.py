@@ -13,6 +13,13 @@ from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies
 
 SMALL = {
+    "blade_root": [
+        "axes.excitation_amplitude=2.0",
+        "slow_time.cycles=1e4",
+        "slow_time.outputs=2",
+        "solver.harmonics=1",
+        "solver.samples=32",
+    ],
     "cylinder_on_flat": ["scene.strips=24", "solver.harmonics=3", "solver.samples=64"],
     "sphere_on_flat": ["scene.patches=5", "solver.harmonics=3", "solver.samples=64"],
     "dovetail": [

@@ -73,6 +73,9 @@ _READERS: Mapping[str, Callable[[Draft, Block], None]] = {
     **dict.fromkeys(PROCEDURES, read_procedure),
 }
 
+_LONG = ("NODE", "ELEMENT", "NSET", "ELSET")
+_MOST_LINES = 300_000  # of all other keywords that are read: a surface of so many faces takes seconds
+
 
 def read_deck(path: Path) -> Deck:
     """The model of a deck of CalculiX or Abaqus, with those keywords that the project knows.
@@ -93,11 +96,15 @@ def read_deck(path: Path) -> Deck:
     SceneError
         About "model": in one sentence with file and line, where the deck cannot be read or makes no sense.
     """
-    draft = Draft()
+    draft, left = Draft(), _MOST_LINES
     for block in read_blocks(path, draft.included):
         reader = _READERS.get(block.keyword)
         if reader is None:
             draft.skip(block)
-        else:
-            reader(draft, block)
+            continue
+        left -= 0 if block.keyword in _LONG else len(block.lines)
+        if left < 0:
+            remedy = "name what is meant by sets of nodes or elements"
+            raise block.place.wrong(f"more than {_MOST_LINES} lines below *{block.written} and others", remedy)
+        reader(draft, block)
     return finish(draft, path.name)

@@ -18,6 +18,7 @@ N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
 
 _RPM = 30.0 / np.pi
+_ROUND_OFF = 1e-9  # of the size of a facet: a distance that is none
 _FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
 
 
@@ -113,6 +114,7 @@ def _contacts(scene: FeScene) -> Iterator[str]:
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
         distance = pairs.distance[own]
+        distance = np.where(np.abs(distance) < _ROUND_OFF * np.sqrt(pairs.area[own].max()), 0.0, distance)
         yield (
             f"{own.sum()} nodes of {moving} on {opposite}, {1e6 * pairs.area[own].sum():.5g} mm2,"
             f" distances {distance.min():.2g} to {distance.max():.2g} m"

@@ -39,18 +39,10 @@ _SPEED_AGREES = 1e-3  # relative difference of the speed of a study from that of
 
 
 @dataclass(frozen=True)
-class PreloadForce:
-    """A constant force. motion: where it acts. force: N."""
-
-    motion: SetMotion
-    force: float
-
-
-@dataclass(frozen=True)
 class LoadedModel:
     """A model as its files and the study describe it.
 
-    deck: in units of the file. mesh: m. model, joint: SI. preloads: constant forces beside the centrifugal one.
+    deck: in units of the file. mesh: m. model, joint: SI.
     omega_squared_held: square of the speed at which the matrices were made, rad2/s2; None where they do not tell.
     """
 
@@ -59,7 +51,6 @@ class LoadedModel:
     mesh: SolidMesh
     model: MeshModel | MatrixModel
     joint: JointDefinition
-    preloads: tuple[PreloadForce, ...]
     omega_squared_held: float | None
 
 
@@ -101,7 +92,10 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     rotation = find_rotation(deck, parameters, units)
     surfaces = find_surfaces(selections, parameters, units)
     cut, held = find_cut(selections, parameters, units), find_held(selections, parameters)
-    model: MeshModel | MatrixModel = MeshModel(mesh, rotation, parameters.stress_stiffening)
+    preloads = [(_motion(selections, each, "preload.set"), each.force) for each in parameters.preload]
+    model: MeshModel | MatrixModel = MeshModel(
+        mesh, rotation, parameters.stress_stiffening, _preload(preloads, mesh.n_nodes)
+    )
     held_speed = None
     if files.matrices:
         if not parameters.stress_stiffening:
@@ -112,7 +106,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         check_units(deck, mass_of(deck, matrices), units)
         _check_export(deck, matrices, mesh, surfaces, units)
         if rotation is not None:
-            held_speed = _check_rotation(deck, matrices, rotation, parameters)
+            held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
         nodal = order_by_nodes(
             sparse.csr_matrix(matrices.stiffness * units.stiffness),
             sparse.csr_matrix(matrices.mass * units.mass),
@@ -123,7 +117,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         )
         _check_free_nodes(matrices, mesh, np.asarray(held.all(axis=1)))
         held = np.concatenate([held, np.zeros((len(nodal.numbers) - len(held), 3), dtype=np.bool_)]) | nodal.missing
-        model = nodal.model(rotation)
+        model = nodal.model(rotation, _preload(preloads, len(nodal.numbers)))
     joint = JointDefinition(
         contacts=surfaces.contacts,
         held=held,
@@ -135,8 +129,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
         ties=surfaces.ties,
     )
-    preloads = tuple(PreloadForce(_motion(selections, each, "preload.set"), each.force) for each in parameters.preload)
-    return LoadedModel(deck, units, mesh, model, joint, preloads, held_speed)
+    return LoadedModel(deck, units, mesh, model, joint, held_speed)
 
 
 def _check_there(path: Path, key: str) -> None:
@@ -150,6 +143,11 @@ def _check_there(path: Path, key: str) -> None:
 
 def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
     return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
+
+
+def _preload(forces: list[tuple[SetMotion, float]], n_nodes: int) -> FloatArray | None:
+    """Nodal forces (3 n_nodes,), N, of forces on sets; None of none."""
+    return sum((force * motion.row(n_nodes) for motion, force in forces), np.zeros(3 * n_nodes)) if forces else None
 
 
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
@@ -180,10 +178,12 @@ def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> 
     check_nodes_have_dofs(matrices, mesh.numbers[~held.astype(bool)], "the mesh without its clamps")
 
 
-def _check_rotation(deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters) -> float | None:
+def _check_rotation(
+    deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters, units: Units
+) -> float | None:
     """Square of the speed that the matrices hold; it must be that of the rotation."""
     if parameters.rotation_speed is None:
-        check_speed(deck, matrices)
+        check_speed(deck, matrices, units)
     held = omega_squared_of(deck, matrices, rotation.axis)
     if held is not None and abs(held - rotation.omega_squared) > 2.0 * _SPEED_AGREES * rotation.omega_squared:
         found = f"{parameters.rotation_speed:g} rpm, the stiffness holds {30.0 * np.sqrt(held) / np.pi:.6g} rpm"

@@ -81,7 +81,7 @@ class Parameters(Table):
         None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"
     )
     preload: Annotated[tuple[Preload, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="constant forces beside the centrifugal one: {set, direction, force}"
+        (), description="constant forces beside the centrifugal one, no part of the prestress: {set, direction, force}"
     )
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")

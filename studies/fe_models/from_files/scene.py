@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from importlib import metadata
 
-import numpy as np
 from pydantic import BaseModel
 
-from solver.model import LinearModel, ReducedModel
+from solver.model import ReducedModel
 from studies.fe_models.fe_model import ReductionOptions
 from studies.fe_models.fe_scene import FeScene, Progress, build_fe_scene, silent
 from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_model
@@ -38,26 +36,7 @@ def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: 
 def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
     """Reduced model of a loaded one. Raises SceneError."""
     options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    # A mean displacement and a force that is shared evenly have the same row: constant forces are reduced as responses.
-    joint, extra = loaded.joint, {f"preload {place}": each.motion for place, each in enumerate(loaded.preloads)}
-    joint = replace(joint, responses={**joint.responses, **extra})
-    scene = build_fe_scene(loaded.model, joint, options, n_harmonics, progress)
-    if not extra:
-        return scene
-    n_own = len(loaded.joint.responses)
-    forces = np.array([each.force for each in loaded.preloads])
-
-    def preloaded(k: int, linear: LinearModel) -> LinearModel:
-        own, others = linear.response[:n_own], linear.response[n_own:]
-        static = linear.load_static + (forces @ others.real if k == 0 else 0.0)
-        return replace(linear, response=own, load_static=static)
-
-    model = replace(
-        scene.model,
-        linear={k: preloaded(k, linear) for k, linear in scene.model.linear.items()},
-        response_names=scene.model.response_names[:n_own],
-    )
-    return replace(scene, model=model)
+    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress)
 
 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:

@@ -23,12 +23,12 @@ def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation 
     Raises SceneError where a speed has no axis, or parts of the deck turn differently.
     """
     speed = parameters.rotation_speed
-    own = None if speed is not None and parameters.axis is not None else rotation_of_deck(deck)
+    own = None if speed is not None and parameters.axis is not None else rotation_of_deck(deck, units)
     if speed == 0.0 or (speed is None and own is None):
         return None
     axis = _axis(deck, parameters, units)
     if own is not None and parameters.axis is None:
-        axis = own.point * units.length, own.axis
+        axis = own.point, own.axis
     if axis is None:
         raise SceneError("axis", "missing", "give {point, direction} of the axis of rotation: the deck has none")
     omega_squared = own.omega_squared if speed is None and own is not None else (np.pi * (speed or 0.0) / 30.0) ** 2

@@ -4,30 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
-from studies.fe_models.libraries.process import REFUSED, seconds_for
+from studies.fe_models.libraries.process import seconds_for
+from studies.guards.limited_process import REFUSED, limit_this_process
 from studies.scene_error import SceneError
 
 _LEAST_MEMORY = 4 * 2**30  # bytes of address space; the libraries alone take one or two GiB of it
 _MEMORY_PER_BYTE = 20
-
-
-def _limit(size: int) -> None:
-    """Limits this process to what a file of this size may take."""
-    memory = _LEAST_MEMORY + _MEMORY_PER_BYTE * size
-    for what, limit in (
-        (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_CPU, seconds_for(size)),
-        (resource.RLIMIT_FSIZE, memory),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        _, most = resource.getrlimit(what)
-        resource.setrlimit(what, (limit if most == resource.RLIM_INFINITY else min(limit, most), most))
 
 
 def main(arguments: list[str]) -> NoReturn:
@@ -39,12 +26,17 @@ def main(arguments: list[str]) -> NoReturn:
         from studies.fe_models.libraries.cdb import read_arrays
     else:
         from studies.fe_models.libraries.full import read_arrays
-    _limit(path.stat().st_size)
+    size = path.stat().st_size
+    limit_this_process(_LEAST_MEMORY + _MEMORY_PER_BYTE * size, seconds_for(size))
     try:
         arrays = read_arrays(path)
         np.savez(answer, allow_pickle=False, **arrays)
     except SceneError as error:
         print(f"\n{json.dumps([error.value, error.remedy])}", end="", flush=True)
+        os._exit(REFUSED)
+    except ImportError as error:
+        found = f"the library that reads {path.name} does not load: {error}"
+        print(f"\n{json.dumps([found, 'install it again, with what it needs'])}", end="", flush=True)
         os._exit(REFUSED)
     # the libraries raise anything for a damaged file, and some of them end the process; the status says it all
     except (Exception, SystemExit):

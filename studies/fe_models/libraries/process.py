@@ -8,9 +8,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from studies.fe_models.text.places import check_file
-from studies.guards.search_path import search_path
+from studies.guards.limited_process import REFUSED, run_limited
 from studies.scene_error import SceneError
 
 Arrays = dict[str, np.ndarray]
@@ -30,17 +27,10 @@ _READERS: Mapping[str, tuple[str, str]] = {
 }
 """Library and the project's extra that brings it, of every kind of file."""
 
-REFUSED = 3
-"""Exit status of the process where a reader says in a sentence what is wrong."""
-
 _LARGEST_FILE = 2**31
 _LEAST_SECONDS = 60
 _BYTES_A_SECOND = 2**20
-_START = """\
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-from studies.fe_models.libraries.child import main
-main(sys.argv[2:])"""
+_CHILD = "studies.fe_models.libraries.child"
 
 
 def read_by_library(kind: str, path: Path, key: str) -> Arrays:
@@ -67,9 +57,10 @@ def read_by_library(kind: str, path: Path, key: str) -> Arrays:
         raise SceneError(key, found, f"install the project with its extra: pip install 'fretwear[{extra}]'")
     with tempfile.TemporaryDirectory(prefix="fretwear-") as folder:
         answer = Path(folder) / "arrays.npz"
-        status, said = _run([kind, str(path.absolute()), str(answer)], size)
+        status, said = run_limited(_CHILD, [kind, str(path.absolute()), str(answer)], 4.0 * seconds_for(size))
         if status == REFUSED:
-            raise SceneError(key, *json.loads(said))
+            # behind whatever the library has written
+            raise SceneError(key, *json.loads(said.rpartition("\n")[2]))
         if status != 0 or not answer.is_file():
             found = f"{path.name} is damaged: {library} cannot read it in a reasonable time and memory"
             raise SceneError(key, found, "write it again")
@@ -82,25 +73,6 @@ def _is_installed(library: str) -> bool:
         return importlib.util.find_spec(library) is not None
     except ModuleNotFoundError:
         return False
-
-
-def _run(arguments: list[str], size: int) -> tuple[int, str]:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    path = [str(Path(__file__).parents[3]), *search_path()]
-    command = [sys.executable, "-I", "-c", _START, json.dumps(path), *arguments]
-    try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=4.0 * seconds_for(size),
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return -1, ""
-    return done.returncode, done.stdout.decode(errors="replace").rpartition("\n")[2]
 
 
 def seconds_for(size: int) -> int:

@@ -12,8 +12,10 @@ from studies.fe_models.text.places import LARGEST_DECK, Place, check_file, shown
 _LONGEST_LINE = 10_000
 _MOST_INCLUDES = 1000
 _DEEPEST_INCLUDE = 10
+_BYTE_ORDER_MARK = "\xef\xbb\xbf"  # of UTF-8, which some editors write, in Latin-1
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET")
 _MOST_BLOCKS = 1_000_000
+_MOST_LINES = 6_000_000  # each takes a hundred bytes of memory and more
 # the name of a parameter, and its value: quoted, or up to the next comma
 _PARAMETER = re.compile(r'[\s,]*([^,="]+?)\s*(?:=\s*("[^"]*"|[^,"]*))?\s*(?:,|$)')
 
@@ -78,7 +80,7 @@ class _Cutter:
 
     def blocks(self) -> Iterator[Block]:
         block: Block | None = None
-        n_blocks = 0
+        n_blocks = n_lines = 0
         for text, place in self._lines(self.path, self.path.name):
             if text.startswith("*"):
                 if block is not None:
@@ -90,6 +92,9 @@ class _Cutter:
             elif block is None:
                 raise place.wrong(f"{shown(text)!r} before the first keyword", "give a deck of CalculiX or Abaqus")
             else:
+                n_lines += 1
+                if n_lines > _MOST_LINES:
+                    raise place.wrong(f"more than {_MOST_LINES} lines", "reduce the deck")
                 block.lines.append(text)
                 block.places.append((place.file, place.line))
         if block is None:
@@ -112,7 +117,7 @@ class _Cutter:
                 number += 1
                 if len(raw) > _LONGEST_LINE or "\0" in raw:
                     raise Place(name, number).wrong("no text, or a very long line", "give a deck of CalculiX or Abaqus")
-                text = raw.strip()
+                text = raw.removeprefix(_BYTE_ORDER_MARK).strip() if number == 1 else raw.strip()
                 if not text or text == "*" or text.startswith("**"):
                     continue
                 place = Place(name, number)

@@ -20,7 +20,11 @@ def run_ccx(folder: Path, text: str, name: str = "sector") -> Path:
     return folder / name
 
 
-def chain(nodes: tuple[int, ...] = (1, 2, 10)) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+System = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Stiffness and mass, dense, and node and direction (from 1) of the rows."""
+
+
+def chain(nodes: tuple[int, ...] = (1, 2, 10)) -> System:
     """Stiffness and mass (dense, definite) of some nodes, and node and direction (from 1) of the rows."""
     n = 3 * len(nodes)
     generator = np.random.default_rng(5)
@@ -38,8 +42,10 @@ def entries(matrix: np.ndarray, lower: bool = False, both: bool = False) -> list
     return [(r, c, v) for r, c, v in found if both or (r >= c if lower else r <= c)]
 
 
-def write_calculix(folder: Path, name: str = "job", nodes: tuple[int, ...] = (1, 2, 10)) -> Path:
-    stiffness, mass, node, direction = chain(nodes)
+def write_calculix(
+    folder: Path, name: str = "job", nodes: tuple[int, ...] = (1, 2, 10), system: System | None = None
+) -> Path:
+    stiffness, mass, node, direction = system or chain(nodes)
     for matrix, end in ((stiffness, "sti"), (mass, "mas")):
         lines = [f"{r + 1} {c + 1}  {v:.13e}" for r, c, v in entries(matrix)]
         (folder / f"{name}.{end}").write_text("\n".join(lines) + "\n")
@@ -47,8 +53,8 @@ def write_calculix(folder: Path, name: str = "job", nodes: tuple[int, ...] = (1,
     return folder / name
 
 
-def write_abaqus(folder: Path, name: str = "job", triangles: str = "lower") -> Path:
-    stiffness, mass, node, direction = chain((1, 2, -7))
+def write_abaqus(folder: Path, name: str = "job", triangles: str = "lower", system: System | None = None) -> Path:
+    stiffness, mass, node, direction = system or chain((1, 2, -7))
     for matrix, end in ((stiffness, "STIF1"), (mass, "MASS1")):
         lines = [
             f"{node[r]},{direction[r]}, {node[c]},{direction[c]}, {v:.15e}"
@@ -58,9 +64,9 @@ def write_abaqus(folder: Path, name: str = "job", triangles: str = "lower") -> P
     return folder / name
 
 
-def write_nastran(folder: Path, name: str = "job", large: bool = True, nodes: tuple[int, ...] = (1, 2, 10)) -> Path:
+def write_nastran(folder: Path, name: str = "job", large: bool = True, system: System | None = None) -> Path:
     """DMIG entries in large fields as Nastran punches them, or in small fields, two entries a line."""
-    stiffness, mass, node, direction = chain(nodes)
+    stiffness, mass, node, direction = system or chain()
     lines = ["$ matrices of a superelement", "GRID,1,,0.,0.,0."]
     for title, matrix in (("KAAX", stiffness), ("PAX", stiffness), ("MAAX", mass)):
         lines.append(f"{'DMIG':8}{title:8}{0:8d}{9 if title == 'PAX' else 6:8d}{2:8d}{0:8d}")

@@ -158,6 +158,15 @@ def test_too_large(tmp_path, monkeypatch):
     refused(write(tmp_path, "*INCLUDE,INPUT=mesh.inp\n" * 2), "mesh.inp, line 1: more than 0 MiB with its includes")
 
 
+def test_too_many_lines(tmp_path, monkeypatch):
+    monkeypatch.setattr("studies.fe_models.text.keyword_lines._MOST_LINES", 50)
+    monkeypatch.setattr("studies.fe_models.deck.read._MOST_LINES", 20)
+    refused(write(tmp_path, LEAST + "*HEADING\n" + "a\n" * 46), "deck.inp, line 54: more than 50 lines; reduce")
+    few = LEAST + "*SURFACE,NAME=S\n" + "1,S1\n" * 10
+    assert read_deck(write(tmp_path, few)).surfaces["S"].faces.tolist() == [1]
+    refused(write(tmp_path, few + "*BOUNDARY\n" + "1,1,3\n" * 11), r"line 19: more than 20 lines below \*BOUNDARY and")
+
+
 def test_sets_that_grow(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.fe_models.deck.sets._MOST_MEMBERS", 100)
     monkeypatch.setattr("studies.fe_models.deck.finish._MOST_FACES", 20)

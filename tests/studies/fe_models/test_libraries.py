@@ -13,6 +13,7 @@ from studies.fe_models.libraries import process
 from studies.fe_models.libraries.meshes import read_library_mesh
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
+from studies.guards import limited_process
 from studies.scene_error import SceneError
 from tests.studies.fe_models.meshes import BRICKS, GMSH_22, GMSH_41, PYRAMID, write_cdb
 from tests.studies.fe_models.mutations import mutate
@@ -182,11 +183,18 @@ def test_missing_library(tmp_path, monkeypatch):
         read_matrices(tmp_path / "job")
 
 
+def test_library_that_does_not_load(tmp_path, monkeypatch):
+    (tmp_path / "meshio.py").write_text("import no_such_module_at_all")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SceneError, match=r"reads mesh\.msh does not load: No module named 'no_such_module_at_all'"):
+        read_library_mesh(write(tmp_path, GMSH_22))
+
+
 def test_process_that_ends_badly(tmp_path, monkeypatch):
     path = write(tmp_path, GMSH_22)
     monkeypatch.setattr(process, "_is_installed", lambda _: True)
     for end in ("import os; os.abort()", "import sys; sys.exit(0)", "raise SystemExit", "x = bytearray(2 ** 60)"):
-        monkeypatch.setattr(process, "_START", end)
+        monkeypatch.setattr(limited_process, "_START", end)
         with pytest.raises(SceneError, match=r"mesh.msh is damaged: meshio cannot read it"):
             read_library_mesh(path)
 
