@@ -49,9 +49,9 @@ _MATRICES_A_RANK = 2
 def seconds_an_iteration(n_unknowns: int) -> float:
     """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
 
-    Fits 2, 9, 10 to 23, 100 and 210 ms measured at 336, 1008, 1584, 5280 and 7056 unknowns within a factor of 1.4.
+    Fits 7, 9, 35, 45 and 140 ms measured at 1008, 1584, 3360, 5280 and 7056 unknowns within a factor of 1.6.
     """
-    return 7e-4 + 5e-6 * n_unknowns + 4e-9 * float(n_unknowns) ** 2
+    return 7e-4 + 4e-6 * n_unknowns + 1.8e-9 * float(n_unknowns) ** 2
 
 
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
