@@ -15,6 +15,7 @@ from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.reading.result import Result
 from studyrunner.report.root.figures import draw_root
+from studyrunner.report.trends.figures import draw_trends
 
 Item = Drawing | Missing | Table
 _Part = Callable[[Result], Iterator[Item]]
@@ -25,7 +26,7 @@ def draw_report(result: Result) -> Iterator[Item]:
 
     Where no point holds a state, the results are left out with a single sentence.
     """
-    of_results: tuple[_Part, ...] = (draw_responses, draw_volumes, draw_root, draw_flanks, draw_loops)
+    of_results: tuple[_Part, ...] = (draw_trends, draw_responses, draw_volumes, draw_root, draw_flanks, draw_loops)
     if not result.held.any():
         of_results = (_tell_nothing,)
     parts = (

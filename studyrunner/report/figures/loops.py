@@ -177,6 +177,7 @@ def _draw_motion(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
         _draw_ends(panel, length(loop.displacement["tangent_1"]), length(loop.displacement["tangent_2"]), ends)
         panel.set_xlabel(length.label("displacement 1"))
         panel.set_ylabel(length.label("displacement 2"))
+        panel.set_aspect("equal", adjustable="datalim")
 
     figure = _grid(loops, 1, draw, ends)
     text = as_sentences(

@@ -138,7 +138,8 @@ def _split_summary(summary: str) -> tuple[tuple[str, str], ...]:
     rows = []
     for line in summary.splitlines():
         label, *text = re.split(r"\s{2,}", line.strip(), maxsplit=1)
-        rows.append((label, text[0] if text else ""))
+        # of nothing there is no place
+        rows.append((label, re.sub(r"^0\.0e\+00 at .*", "0", text[0]) if text else ""))
     return tuple(rows)
 
 

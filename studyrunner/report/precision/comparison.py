@@ -40,10 +40,11 @@ class Precision:
 
 def study_precision(result: Result) -> Precision | None:
     """What the settings of a file cost and how wrong they are; None where it does not compare at least two with a third
-    one, or with the exact answer.
+    one, or with the exact answer; schemes alone are compared with that only.
     """
     keys = varying_keys(result)
-    if not keys or not (result.has("worn_volume") or result.has("response_amplitude")):
+    of_schemes = all(key == "scheme" for key in keys) and not result.has("exact_worn_volume")
+    if of_schemes or not (result.has("worn_volume") or result.has("response_amplitude")):
         return None
     points = tuple(_read_points(result))
     if max(np.count_nonzero(point.compared) for point in points) < 2:

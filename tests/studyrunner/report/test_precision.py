@@ -176,6 +176,7 @@ def test_files_without_settings_to_compare() -> None:
     assert study_precision(synthetic({"frequency": [1.0, 2.0]}, error_of, time_of)) is None
     assert study_precision(synthetic({"scheme": ["implicit", "explicit"]}, error_of, time_of)) is None
     assert study_precision(synthetic({"scheme": ["implicit", "explicit"]}, error_of, time_of, exact=True)) is not None
+    assert study_precision(synthetic({"scheme": ["adaptive", "implicit", "explicit"]}, error_of, time_of)) is None
 
 
 @pytest.mark.parametrize(("wears", "shortcuts", "shared"), [(1, "true", False), (2, "true", True), (2, "false", False)])
