@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -143,7 +144,7 @@ def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
 
     def draw(panel: Axes, loop: _Loop, _row: int) -> None:
         phase = np.broadcast_to(np.degrees(loop.phase), loop.force["normal"].shape)
-        _draw_ends(panel, phase, load(loop.force["normal"]), ends)
+        _draw_ends(panel, phase, load(loop.force["normal"]), ends, arrows=False)
         panel.set_xticks([0, 90, 180, 270, 360])
         panel.set_xlim(0, 360)
         panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]) if loop.force["normal"].min() < 0.0 else 0.0)
@@ -196,11 +197,25 @@ def _tell_extent(loop: _Loop) -> str:
     return f"pair {loop.pair} {', then '.join(told)}"
 
 
-def _draw_ends(panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], ends: Sequence[str]) -> None:
-    """Lines (n_ends, n) of the first and the last cycle count; a marker where the period begins."""
+def _draw_ends(
+    panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], ends: Sequence[str], *, arrows: bool = True
+) -> None:
+    """Lines (n_ends, n) of the first and last cycle count; a marker where the period begins, an arrow its way."""
     for number, label in enumerate(ends):
         look = line_style(number)
         panel.plot(x[number], y[number], label=label, **{**look, "markevery": [0]})
+        if arrows:
+            _draw_arrow(panel, x[number], y[number], look["color"])
+
+
+def _draw_arrow(panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str) -> None:
+    """An arrow along the line (n,) where it goes fastest on paper; none on a line that stays where it is."""
+    if np.ptp(x) + np.ptp(y) == 0.0:
+        return
+    pace = np.hypot(np.diff(x) / (np.ptp(x) or 1.0), np.diff(y) / (np.ptp(y) or 1.0))
+    at = int(np.argmax(pace))
+    way: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.0, "mutation_scale": 15}
+    panel.annotate("", (x[at + 1], y[at + 1]), (x[at], y[at]), arrowprops=way, annotation_clip=False)
 
 
 def _grid(loops: Sequence[_Loop], n_rows: int, draw: Callable[[Axes, _Loop, int], None], ends: Sequence[str]) -> Figure:

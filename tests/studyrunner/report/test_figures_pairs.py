@@ -132,3 +132,17 @@ def test_a_pair_with_one_tangent_has_no_path() -> None:
     loops = items["fretting_loops"]
     assert isinstance(loops, Drawing)
     assert len(loops.figure.axes) == 2
+
+
+def test_arrows_go_the_way_of_the_loop() -> None:
+    """From each sample to the next, in the units of the figure; the normal force over the phase needs none."""
+    result = with_loops(make_result())
+    for panel in draw_figure(result, "pair_motion").figure.axes:
+        assert panel.get_aspect() == 1.0
+        assert len(panel.texts) == 2
+        for arrow in panel.texts:
+            (x, y), (x0, y0) = arrow.xy, arrow.get_position()
+            line = next(one for one in panel.get_lines() if [x0, y0] in np.transpose(one.get_data()).tolist())
+            at = np.transpose(line.get_data()).tolist().index([x0, y0])
+            assert np.transpose(line.get_data()).tolist()[at + 1] == [x, y]
+    assert not draw_figure(result, "normal_load").figure.axes[0].texts

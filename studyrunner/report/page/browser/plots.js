@@ -85,7 +85,7 @@ function drawResponse() {
     }
     traces.push({
       x: line.points.map(at), y: line.points.map((point) => value(point, state.cycle)), customdata: line.points,
-      text: line.points.map((point) => plain(pointText(point))), hovertemplate: "%{text}<br>%{y:.5~g}<extra></extra>",
+      text: line.points.map((point) => plain(pointText(point))), hovertemplate: `%{text}<br>amplitude %{y:.4~g} ${plain(entry ? entry.unit : "")}<extra></extra>`,
       mode: line.points.length > 1 ? "lines+markers" : "markers", name: plain(line.name || cycleText(state.cycle)),
       line: { color: colour, width: 2, dash: DASHES[number % DASHES.length] },
       marker: { color: colour, size: good.length > 60 ? 5 : 8, symbol: SYMBOLS[number % SYMBOLS.length] },
@@ -150,7 +150,7 @@ function drawCourse() {
     }
     traces.push({
       ...place, x: cycles, y: values, mode: cycles.length > 1 ? "lines" : "markers", showlegend: false, meta: name, name: title,
-      line: { color: data.colours[0], width: 2 }, hovertemplate: "cycle %{x}<br>%{y:.5~g}<extra></extra>",
+      line: { color: data.colours[0], width: 2 }, hovertemplate: `cycle %{x}<br>${title} %{y:.4~g} ${plain(entry.unit)}<extra></extra>`,
     });
     if (name === "worn_volume" && courses.exact_worn_volume) {
       traces.push({ ...place, x: cycles, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
@@ -254,7 +254,7 @@ function drawLoop() {
     const now = column === found.column;
     return { x: closed(displacement, column), y: closed(force, column), mode: "lines", name: cycleText(loops.cycles[column]),
       line: { color: now ? data.colours[0] : "#8c8c8c", width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
-      hovertemplate: "%{x:.4~g}, %{y:.4~g}<extra></extra>" };
+      hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
   const name = loops.components[state.component].replace("_", " ");
   Plotly.react("loop-plot", traces, layout({
