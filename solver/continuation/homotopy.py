@@ -143,7 +143,7 @@ def start_with_tail(
         both = slice(2 * place + 1, 2 * place + 3)
         force_h[:, both] = force[:, both]
         amplitude = force[:, 2 * place + 1] - 1j * force[:, 2 * place + 2]
-        moved = -np.linalg.solve(joint.structure.dynamic_stiffness[place], amplitude)
+        moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
         motion_h[:, 2 * place + 1], motion_h[:, 2 * place + 2] = moved.real, -moved.imag
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
 

@@ -236,7 +236,7 @@ class Linearisation:
             )
             for part in (self.motion_tangent, self.force_tangent)
         )
-        matrix = self._spread(self.joint.structure.dynamic_stiffness[place], rows, pair, component, motion[..., None])
+        matrix = self._spread(self.joint.structure.moving.matrix(place), rows, pair, component, motion[..., None])
         matrix[np.arange(rows.size), pair] += force[pair, component][..., None]
         return cast("ComplexArray", matrix.reshape(rows.size, -1)[:, 3 * pair + component])
 

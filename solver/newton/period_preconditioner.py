@@ -203,9 +203,9 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
 @lru_cache(maxsize=2)
 def _stiffness_of_most(of: Identity) -> FloatArray:
     structure = cast("CondensedStructure", of.objects[0])
-    return np.asarray(
-        np.median(np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real]), axis=0)
-    )
+    moving = (structure.moving.matrix(place).real for place in range(structure.n_harmonics))
+    stacked = np.stack([structure.static_stiffness, *moving])
+    return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
 
 
 @lru_cache(maxsize=2)
@@ -213,7 +213,8 @@ def _resonances(of: Identity, relative_penalty: bytes, options: NewtonOptions) -
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1
     most, added, seen = _stiffness_of_most(of), [], []
-    for place, stiffness in enumerate((structure.static_stiffness, *structure.dynamic_stiffness)):
+    for place in range(1 + structure.n_harmonics):
+        stiffness = structure.moving.matrix(place - 1) if place else structure.static_stiffness
         change = (stiffness - most) / penalty
         image = change @ np.random.default_rng(0).normal(size=(n_rel, min(options.resonances, n_rel)))
         for _ in range(options.power_iterations):

@@ -178,7 +178,7 @@ def sign_of(factor: tuple[FloatArray, IntArray]) -> float:
 def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> FloatArray:
     """`Z_r D V` (n_rel, m, size) of the motion of all pairs of a slip space."""
     m = joint.basis.synthesis.shape[0]
-    structure = joint.structure
+    structure, dynamic = joint.structure, joint.structure.dynamic_stiffness
     pushed = np.empty((joint.component_index.size, m, space.size))
     place = 0
     for pair, motion in zip(space.pairs, moved, strict=True):
@@ -189,7 +189,7 @@ def _pushed(joint: Joint, space: SlipSpace, moved: tuple[FloatArray, ...]) -> Fl
         pushed[:, 0, columns] = structure.static_stiffness[:, here] @ harmonics[:, 0]
         if m > 1:
             amplitude = (harmonics[:, 1::2] - 1j * harmonics[:, 2::2]).transpose(1, 0, 2)
-            force = np.matmul(structure.dynamic_stiffness[:, :, here], np.ascontiguousarray(amplitude))
+            force = np.matmul(dynamic[:, :, here], np.ascontiguousarray(amplitude))
             pushed[:, 1::2, columns] = force.real.transpose(1, 0, 2)
             pushed[:, 2::2, columns] = -force.imag.transpose(1, 0, 2)
         place += rank

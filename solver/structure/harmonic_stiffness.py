@@ -20,7 +20,10 @@ class HarmonicStiffness(Protocol):
 
     @property
     def dense(self) -> ComplexArray:
-        """Matrices (H, n_rel, n_rel), N/m."""
+        """Matrices (H, n_rel, n_rel), N/m: made anew where they are not kept."""
+
+    def matrix(self, place: int) -> ComplexArray:
+        """One of them."""
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
@@ -34,6 +37,10 @@ class DenseStiffness:
     """A matrix for each harmonic: of any structure. dense (H, n_rel, n_rel): N/m."""
 
     dense: ComplexArray
+
+    def matrix(self, place: int) -> ComplexArray:
+        """As in HarmonicStiffness."""
+        return cast("ComplexArray", self.dense[place])
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in HarmonicStiffness."""
@@ -73,17 +80,19 @@ class SharedStiffness:
     held_compliance: ComplexArray
     rough: RoughForms
 
-    @cached_property
+    @property
     def dense(self) -> ComplexArray:
-        """As in HarmonicStiffness; made where it is asked for."""
+        """As in HarmonicStiffness; not kept, as all harmonics together may take as much memory as all else."""
+        return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, self.n_rel, self.n_rel)
+
+    def matrix(self, place: int) -> ComplexArray:
+        """As in HarmonicStiffness."""
+        rate = self.rates[place]
         stiffness, mass, damping = self.columns
-        matrices = np.empty((self.rates.size, self.n_rel, self.n_rel), complex)
-        for place, rate in enumerate(self.rates):
-            columns = stiffness - rate**2 * mass + 1j * rate * damping
-            back = self.back[0] - rate**2 * self.back[1] + 1j * rate * self.back[2]
-            held = self.held_compliance[place] @ columns[self.n_rel :]
-            matrices[place] = columns[: self.n_rel] - back @ held
-        return matrices
+        columns = stiffness - rate**2 * mass + 1j * rate * damping
+        back = self.back[0] - rate**2 * self.back[1] + 1j * rate * self.back[2]
+        held = self.held_compliance[place] @ columns[self.n_rel :]
+        return cast("ComplexArray", columns[: self.n_rel] - back @ held)
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in HarmonicStiffness."""
