@@ -28,7 +28,8 @@ from studyrunner.evaluate import build_evaluator
 
 ROOT = Path(solver.__file__).parents[1]
 PACKAGES = (solver, studies, studyrunner)
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PYTHON_PAGE = (ROOT / "studyrunner" / "PYTHON.md").read_text(encoding="utf-8")
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 FREQUENCIES = [160.0, 150.0]
 SMALL = {"axes.frequency": np.array(FREQUENCIES), "axes.scheme": ("implicit",), "slow_time.cycles": 4000}
@@ -120,19 +121,17 @@ frequency_response(model, [0.1], 1.0, 0.5, sweep="sideways")
     assert sorted(found) == sorted(expected), done.stdout + done.stderr
 
 
-# --- the README ---
+# --- the pages ---
 
 
 @pytest.mark.slow
-def test_the_example_of_the_readme_runs(
+def test_the_example_of_the_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (example,) = re.findall(
-        r"```python\n(.*?)```", README.split("\n## In Python\n")[1].split("\n## ")[0], flags=re.DOTALL
-    )
+    (example,) = re.findall(r"```python\n(.*?)```", PYTHON_PAGE, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
-    exec(compile(example, "README.md", "exec"), names)
+    exec(compile(example, "PYTHON.md", "exec"), names)
     assert np.isfinite(names["result"]["worn_volume"]).all()
     assert set(names["curve"].outcome) == {Outcome.CONVERGED}
     assert names["history"].outcome is Outcome.CONVERGED
@@ -140,7 +139,7 @@ def test_the_example_of_the_readme_runs(
 
 
 def test_the_map_of_the_house_names_what_there_is() -> None:
-    section = README.split("\n## Map of the house\n")[1].split("\n## ")[0]
+    section = CONTRIBUTING.split("\n## Map of the house\n")[1].split("\n## ")[0]
     names = {path.name for package in PACKAGES for path in Path(package.__file__ or "").parent.rglob("*")}
     names |= {"solver", "studies", "studyrunner", "tests"}
     told = set(re.findall(r"`(?:\w+/)*(\w+\.(?:py|md|js|css))`", section))

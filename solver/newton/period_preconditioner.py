@@ -209,19 +209,19 @@ def _stiffness_of_most(of: Identity) -> FloatArray:
 
 
 @lru_cache(maxsize=2)
-def _resonances(of: Identity, relative_penalty: bytes, options: NewtonOptions) -> tuple[FloatArray, FloatArray]:
+def _resonances(of: Identity, relative_penalty: bytes, _: NewtonOptions) -> tuple[FloatArray, FloatArray]:
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1
     most, added, seen = _stiffness_of_most(of), [], []
     for place in range(1 + structure.n_harmonics):
         stiffness = structure.moving.matrix(place - 1) if place else structure.static_stiffness
         change = (stiffness - most) / penalty
-        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(options.resonances, n_rel)))
-        for _ in range(options.power_iterations):
+        image = change @ np.random.default_rng(0).normal(size=(n_rel, min(NEWTON.resonances, n_rel)))
+        for _ in range(NEWTON.power_iterations):
             image = change @ (change.conj().T @ np.linalg.qr(image)[0])
         basis = np.linalg.qr(image)[0]
         left, size, right = np.linalg.svd(basis.conj().T @ change, full_matrices=False)
-        for direction in np.flatnonzero(size > options.resonant_difference):
+        for direction in np.flatnonzero(size > NEWTON.resonant_difference):
             force, motion = size[direction] * (basis @ left[:, direction]), right[direction]
             both = np.zeros((2, 2, n_rel, m))
             if place == 0:

@@ -335,17 +335,19 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     assert sorted(tmp_path.iterdir()) == [path, parts_folder(path)]
 
 
-def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    readme = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
-    _, example, of_accessor = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+def test_the_examples_of_readme_and_pages_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = ("README.md", "studyrunner/RESULT_FILE.md", "studyrunner/REPORT.md")
+    texts = [Path(__file__).parents[2].joinpath(page).read_text(encoding="utf-8") for page in pages]
+    (short,), (example,), (of_accessor,) = (re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL) for text in texts)
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
-    study = read_study("dovetail", ["axes.frequency=[1, 2, 3]"])
+    study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
     plan = build_tasks(study, FACTS.n_displacements)
     completion = fake_completion(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
     with contextlib.closing(completion.store):
         gather.gather(study, FACTS, completion, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
-    exec(compile(example, "README.md", "exec"), {})
+    for page, code in zip(pages, (short, example), strict=False):
+        exec(compile(code, page, "exec"), {})
 
 
 def test_readme_and_ci_have_the_same_test_command() -> None:
