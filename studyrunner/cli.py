@@ -94,8 +94,21 @@ class _Parser(argparse.ArgumentParser):
         raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
 
 
+class _SceneHelp(argparse.Action):
+    """Prints what a bundled scene is and ends, as --help does."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
+        from studies.scene_help import scene_help
+        from studies.scenes import BUNDLED
+
+        if values not in BUNDLED:
+            raise UserError("command line", "--scene-help", str(values), f"give one of {', '.join(BUNDLED)}")
+        print(scene_help(str(values)), flush=True)
+        parser.exit()
+
+
 def parse_options(arguments: Sequence[str]) -> Options:
-    """The command line. Raises UserError; SystemExit after --help."""
+    """The command line. Raises UserError; SystemExit after --help and --scene-help."""
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,
@@ -126,6 +139,13 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
     parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
+    parser.add_argument(
+        "--scene-help",
+        action=_SceneHelp,
+        default=argparse.SUPPRESS,
+        metavar="SCENE",
+        help="print what a bundled scene is, and its parameters",
+    )
     parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"

@@ -209,7 +209,7 @@ def _stiffness_of_most(of: Identity) -> FloatArray:
 
 
 @lru_cache(maxsize=2)
-def _resonances(of: Identity, relative_penalty: bytes, _: NewtonOptions) -> tuple[FloatArray, FloatArray]:
+def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tuple[FloatArray, FloatArray]:
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1
     most, added, seen = _stiffness_of_most(of), [], []
