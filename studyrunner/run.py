@@ -29,8 +29,10 @@ from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
 from studyrunner.scene.scene import describe_scene, scene_to_keep
+from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study import Study
+from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_progress import TaskProgress, fault_of
@@ -118,7 +120,7 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; what there is has been written.
     """
-    facts = describe_scene(model)
+    facts = replace(describe_scene(model), static_response=static_response(model))
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
     if "natural_frequency" in study.outputs.variables:
@@ -129,7 +131,8 @@ def serve_study(
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind)
     with contextlib.closing(store):
-        for note in store.notes:
+        said = doubts_of_study(study)
+        for note in (*store.notes, *said):
             progress.note(note)
         remove_leftovers(path, alone=store.locked)
         completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
@@ -152,6 +155,9 @@ def serve_study(
 
             store.flush()
             gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished)
+            for doubt in gathered.doubts:
+                if doubt not in said:
+                    progress.note(doubt)
             return _summarise(plan, n_found, gathered, keep_finished)
 
         try:

@@ -47,12 +47,13 @@ class Gathered:
     """What the end of a run tells.
 
     outcomes: points by number of their outcome. certificates: the table. findings: lines that name the points that
-    failed or are less exact than was asked for.
+    failed or are less exact than was asked for. doubts: lines on what is hardly what was meant.
     """
 
     outcomes: Mapping[int, int]
     certificates: str
     findings: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,8 @@ def gather(
             origin = {} if scene is None else scene.origin
             file.setncatts({**describe_run(study, facts), **origin, "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
+            if gathered.doubts:
+                file.setncattr("plausibility", "\n".join(gathered.doubts))
             _write_values(file, study, facts, completion.store, index)
             _write_scene(file, study, completion.store, of_scene)
             _write_coordinates(file, study, facts)
@@ -165,7 +168,7 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
         " its points are not computed, the same command goes on"
         for name in dict.fromkeys(changed)
     ]
-    return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)))
+    return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)), table.doubts())
 
 
 def _records_at_once(store: Store) -> int:

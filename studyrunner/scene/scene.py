@@ -31,6 +31,7 @@ class SceneFacts:
     position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
     digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
+    static_response (n_response,): m per unit excitation amplitude, None where it is not known or not asked for.
     """
 
     n_displacements: int
@@ -40,6 +41,7 @@ class SceneFacts:
     response_names: tuple[str, ...]
     digest: str
     largest_harmonics: int | None = None
+    static_response: NDArray[np.float64] | None = None
 
 
 def _silent(_: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
+from fractions import Fraction as Rational
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
@@ -66,7 +67,7 @@ def whole(smallest: int, largest: int, *, or_auto: bool = False) -> WrapValidato
 
 
 def _spread(value: object) -> tuple[object, ...]:
-    """The values of an axis: one, a list of them or {start, stop, num}, which is what numpy.linspace gives."""
+    """The values of an axis: one, a list of them or {start, stop, num}."""
     if isinstance(value, dict):
         return _spread_range(value)
     if not isinstance(value, list | tuple):
@@ -77,13 +78,21 @@ def _spread(value: object) -> tuple[object, ...]:
 
 
 def _spread_range(table: dict[str, object]) -> tuple[float, ...]:
+    """Equally spaced values, each the number that a person would write: 212.8, not 212.79999999999998.
+
+    They are computed from the decimals of start and stop without round-off and rounded once, so that `sel` finds
+    them by the number written and a point is the same in a range and in a list.
+    """
     if table.keys() != {"start", "stop", "num"}:
         raise WrongValueError(table, "give a number, a list or {start, stop, num}")
     start, stop, num = read(_NUMBER, table["start"]), read(_NUMBER, table["stop"]), read(_LENGTH, table["num"])
     if num == 1:
         return (start,)
-    width = (stop - start) / (num - 1)
-    return (*(position * width + start for position in range(num - 1)), stop)
+    first, last = Rational(repr(start)), Rational(repr(stop))
+    whole = first.denominator * last.denominator
+    low, high = int(first * whole), int(last * whole)
+    # the quotient of two whole numbers is rounded correctly, whatever their length
+    return tuple((low * (num - 1 - place) + high * place) / (whole * (num - 1)) for place in range(num))
 
 
 def read(kind: TypeAdapter[Any], value: object) -> Any:

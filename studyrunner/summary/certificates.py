@@ -13,6 +13,7 @@ from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.outcome_table import OutcomeTable
+from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
 from studyrunner.summary.worn_volumes import WornVolumes
 from studyrunner.system.progress import count
@@ -54,6 +55,7 @@ class CertificateTable:
         self._volumes = WornVolumes(study)
         self._small = SmallWear(study, facts)
         self._outcomes = OutcomeTable(study)
+        self._doubts = Doubts(study, facts)
         self._n_complete = 0
         self._n_histories = 0
         self._worst: dict[str, tuple[float, _Place]] = {}
@@ -64,7 +66,7 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        for collected in (self._volumes, self._small, self._outcomes):
+        for collected in (self._volumes, self._small, self._outcomes, self._doubts):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -100,6 +102,11 @@ class CertificateTable:
         rows.append(("unstable states", self._format_noted("unstable", "see the variable stable")))
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Lines on what is hardly what was meant: wear coefficient, depth of the wear, frequencies, amplitudes."""
+        depth = () if self._small.is_met else (f"small-wear assumption {self._small.format()}",)
+        return (*doubts_of_study(self._study), *depth, *self._doubts.format())
 
     def _add_worst(
         self, name: str, first: Sequence[Index], values: NDArray[np.float64], complete: NDArray[np.bool_]

@@ -55,6 +55,11 @@ class SmallWear:
         remedy = "is wear_coefficient in 1/Pa? If it is, take fewer cycles"
         return f"NOT MET: depth over pair spacing ({self._spacing:.2g} m) is {ratio:.2g}{at}{all_of_them}: {remedy}"
 
+    @property
+    def is_met(self) -> bool:
+        """Whether it holds as far as is known."""
+        return self._worst is None or self._worst[0] <= SMALL
+
 
 def pair_spacing(facts: SceneFacts) -> float:
     """Smallest distance between neighbouring pairs of one surface, m; the side of a pair where positions do not say."""

@@ -96,9 +96,34 @@ def test_bundled_studies_are_automatic(name: str) -> None:
     }.get(name, 1e-2)
 
 
-def test_range_axis_is_that_of_numpy(tmp_path: Path) -> None:
+def test_range_axis_is_that_of_numpy_but_for_its_round_off(tmp_path: Path) -> None:
     text = SMALLEST.replace("frequency = 100", "frequency = {start = 186.0, stop = 198.1, num = 25}")
-    assert np.array_equal(read_study(write(tmp_path, text)).axes.frequency, np.linspace(186.0, 198.1, 25))
+    found = read_study(write(tmp_path, text)).axes.frequency
+    np.testing.assert_allclose(found, np.linspace(186.0, 198.1, 25), rtol=3e-16)
+    assert (found[0], found[-1]) == (186.0, 198.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "written"),
+    [
+        ("{start = 212, stop = 213, num = 6}", "212.0 212.2 212.4 212.6 212.8 213.0"),
+        ("{start = 212.3, stop = 212.7, num = 5}", "212.3 212.4 212.5 212.6 212.7"),
+        ("{start = 0.3, stop = 0.1, num = 3}", "0.3 0.2 0.1"),
+        ("{start = 1e-300, stop = 4e-300, num = 4}", "1e-300 2e-300 3e-300 4e-300"),
+        ("{start = 1, stop = 2, num = 4}", "1.0 1.3333333333333333 1.6666666666666667 2.0"),
+        ("{start = 7.7, stop = 9, num = 1}", "7.7"),
+    ],
+)
+def test_values_of_a_range_are_those_that_a_person_writes(tmp_path: Path, given: str, written: str) -> None:
+    study = read_study(write(tmp_path, SMALLEST.replace("frequency = 100", f"frequency = {given}")))
+    assert " ".join(map(repr, study.axes.frequency)) == written
+
+
+def test_a_long_range_takes_no_time(tmp_path: Path) -> None:
+    text = SMALLEST.replace("frequency = 100", "frequency = {start = 186.000000001, stop = 198.1, num = 100_000}")
+    axis = read_study(write(tmp_path, text)).axes.frequency
+    assert len(axis) == 100_000
+    assert (np.diff(axis) > 0.0).all()
 
 
 def test_order_of_an_axis_is_the_users(tmp_path: Path) -> None:
