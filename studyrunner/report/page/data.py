@@ -19,6 +19,7 @@ from studyrunner.report.drawing import COLOURS
 from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.page.root import build_root_numbers
+from studyrunner.report.page.trends import build_trend_numbers
 from studyrunner.report.reading.result import CONVERGED, Result
 from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE
@@ -106,6 +107,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
     remarks = {str(place): text for place, text in _remarks(result)}
     floats -= len(json.dumps(remarks)) / _CHARACTERS_A_FLOAT
     floats -= sum(len(str(entry["data"])) for entry in points.values()) / _CHARACTERS_A_FLOAT
+    trends = build_trend_numbers(result)
+    floats -= len(json.dumps(trends)) / _CHARACTERS_A_FLOAT
     kept = _fit_courses(result, _FRACTION_OF_COURSES * floats, notes)
     if kept is None:
         return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
@@ -136,6 +139,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "endings": {str(number): ending.sentence for number, ending in result.endings.items()},
         "points": points,
         "courses": courses,
+        "trends": trends,
         "maps": maps,
         "loops": loops,
         "root": root if maps else None,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from studyrunner.report.drawing import COLOURS, Drawing, hatch_empty, new_figure, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import scale_for, show_number, show_power, units_of
-from studyrunner.report.trends.quantities import Quantity, find_quantities
+from studyrunner.report.trends.quantities import Quantity, find_error, find_quantities, has_trends
 
 _MOST_AXES = 6
 _DECADES = 30.0
@@ -23,14 +23,13 @@ _MANY_CELLS = 400
 _SMALL = 7.5
 _LONG = 9
 """Characters that stand side by side under a small panel."""
-_PLAIN = ("frequency", "scheme")
 _TITLE = "Trends along the axes of the study"
 _MAPS = "Final worn volume over any two axes"
 
 
 def draw_trends(result: Result) -> Iterator[Drawing]:
     """Small multiples and maps; nothing where only frequency and scheme vary, which other figures show."""
-    if all(name in _PLAIN for name in result.varying) or not result.computed.any():
+    if not has_trends(result):
         return
     quantities = [one for one in find_quantities(result) if np.isfinite(one.values).any()]
     if not quantities:
@@ -49,15 +48,11 @@ def _choose_axes(result: Result) -> list[str]:
 def _draw_multiples(result: Result, quantities: list[Quantity], axes: list[str]) -> Drawing:
     """One row a quantity and one for the error, one column an axis."""
     shown = tuple(result.shown_point()[name] for name in result.axes)
-    errors = np.where(result.computed & (result.errors > 0.0), result.errors, np.nan)
-    rows = list(quantities)
-    if np.isfinite(errors).any() and quantities[0].units == "m3":
-        rows.append(Quantity("estimated error", "%", errors, np.full(errors.shape, np.nan)))
+    error = find_error(result)
+    rows = [*quantities, *([error] if error else [])]
     figure, panels = new_panels(len(rows), len(axes), 0.5 + 1.35 * len(rows), sharey="row")
     for row, quantity in enumerate(rows):
         scale = scale_for(quantity.units, quantity.values)
-        factor = 100.0 if quantity.units == "%" else scale.factor
-        unit = f"({quantity.units if quantity.units == '%' else scale.unit})"
         for column, name in enumerate(axes):
             panel: Axes = panels[row, column]
             axis = result.axes.index(name)
@@ -65,9 +60,9 @@ def _draw_multiples(result: Result, quantities: list[Quantity], axes: list[str])
                 panel.remove()
                 continue
             at, order = _positions(result, name)
-            lines = np.moveaxis(quantity.values, axis, 0)[order] * factor
+            lines = np.moveaxis(quantity.values, axis, 0)[order] * scale.factor
             place = tuple(0 if quantity.values.shape[i] == 1 else index for i, index in enumerate(shown) if i != axis)
-            wrong = np.moveaxis(quantity.errors, axis, 0)[order] * factor
+            wrong = np.moveaxis(quantity.errors, axis, 0)[order] * scale.factor
             through: tuple[Any, ...] = (slice(None), *place)
             wrong = wrong[through]
             others = lines.reshape(len(order), -1)
@@ -96,7 +91,7 @@ def _draw_multiples(result: Result, quantities: list[Quantity], axes: list[str])
             .replace("response of", "response\nof")
         )
         first = next(column for column, name in enumerate(axes) if quantity.values.shape[result.axes.index(name)] > 1)
-        panels[row, first].set_ylabel(f"{words}\n{unit}")
+        panels[row, first].set_ylabel(f"{words}\n({scale.unit})")
         panels[row, first].tick_params(labelleft=True)
     caption = as_sentences(
         f"Each column is one axis of the study; blue: through {result.describe(result.shown_point())}, where most is"

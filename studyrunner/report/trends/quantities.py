@@ -11,18 +11,33 @@ from studyrunner.report.reading.result import Result
 
 FloatArray = NDArray[np.float64]
 
+_PLAIN = ("frequency", "scheme")
+
 
 @dataclass(frozen=True)
 class Quantity:
     """A number of every point in SI, in the shape of the axes; `frequency` has length 1 where it was searched through.
 
-    label: in words. units: as in the file. values: NaN where it is not known. errors: absolute, NaN where none is told.
+    label: in words. units: as in the file, "%" of an error. values: NaN where it is not known. errors: absolute, NaN
+    where none is told.
     """
 
     label: str
     units: str
     values: FloatArray
     errors: FloatArray
+
+
+def has_trends(result: Result) -> bool:
+    """Whether more than frequency and scheme varies, which other figures show, and there is something to tell."""
+    return bool(result.computed.any()) and not all(name in _PLAIN for name in result.varying)
+
+
+def find_error(result: Result) -> Quantity | None:
+    """Estimated error of the final worn volume, %; None where the file tells of none above zero."""
+    errors = np.where(result.computed & (result.errors > 0.0), 100.0 * result.errors, np.nan)
+    known = result.has("worn_volume") and len(result.cycles) > 1 and np.isfinite(errors).any()
+    return Quantity("estimated error", "%", errors, np.full(errors.shape, np.nan)) if known else None
 
 
 def find_quantities(result: Result) -> list[Quantity]:

@@ -57,6 +57,7 @@ function pick(point) {
   drawCourse();
   drawMaps();
   drawLoop();
+  drawTrends();
   drawRoot();
   readout();
 }
@@ -103,6 +104,7 @@ function prepare() {
   } else {
     byId("map-plot").parentElement.hidden = true;
   }
+  prepareTrends();
   prepareRoot();
   if (loops) {
     state.component = Math.max(loops.components.indexOf("tangent_1"), 0);
@@ -126,10 +128,13 @@ function prepare() {
   });
   byId("explore").hidden = false;
   turnTo(state.cycle);
-  byId("response-plot").on("plotly_click", (event) => {
-    const point = event.points[0].customdata;
-    if (Number.isInteger(point)) pick(point);
-  });
+  for (const id of ["response-plot", "trend-plot", "trend-map-plot"]) {
+    // a plot that was never drawn hears nothing
+    byId(id).on?.("plotly_click", (event) => {
+      const point = event.points[0].customdata;
+      if (Number.isInteger(point)) pick(point);
+    });
+  }
   if (!byId("course-part").hidden) {
     byId("course-plot").on("plotly_click", (event) => turnTo(cycles.indexOf(event.points[0].x)));
   }

@@ -39,6 +39,13 @@ function axisLayout(title, more) {
 // Beside an axis the unit stands below the name: the plots are low.
 const upright = (text, unit) => ({ title: { text: plain(text) + (unit ? `<br>(${plain(unit)})` : ""), standoff: 8 } });
 
+// Places of the values of an axis as they are drawn: numbers ascend, words stay as in the file.
+function ordered(axis) {
+  const { values, words } = axes[axis];
+  const order = values.map((_, place) => place);
+  return words ? order : order.sort((a, b) => values[a] - values[b]);
+}
+
 // Lines of the response: every combination of the axes that are drawn as lines; the others are as in the picked point.
 function responseLines() {
   let lines = [places(state.point)];
@@ -46,11 +53,8 @@ function responseLines() {
     lines = lines.flatMap((line) => axes[axis].values.map((_, place) => line.with(axis, place)));
   }
   return lines.map((line, number) => {
-    const values = axes[data.horizontal].values;
-    const order = values.map((_, place) => place);
-    if (!axes[data.horizontal].words) order.sort((a, b) => values[a] - values[b]);
     const name = data.lines.map((axis) => `${axes[axis].label} ${axisText(axis, line[axis])}`).join(", ");
-    return { name, number, points: order.map((place) => pointAt(line.with(data.horizontal, place))) };
+    return { name, number, points: ordered(data.horizontal).map((place) => pointAt(line.with(data.horizontal, place))) };
   });
 }
 
