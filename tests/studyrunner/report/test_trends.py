@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.gallery import draw_report
+from studyrunner.report.page.trends import build_trend_numbers
 from studyrunner.report.reading.result import Result
 from studyrunner.report.trends.figures import draw_trends
-from studyrunner.report.trends.quantities import find_peak, find_quantities
+from studyrunner.report.trends.quantities import find_error, find_peak, find_quantities
 from tests.studyrunner.report.figure_cases import make_result, with_variables
 
 FREQUENCIES = (199.0, 200.0, 201.0, 202.0, 203.0, 204.0, 205.0, 206.0)
@@ -97,3 +101,34 @@ def test_which_there_are(result: Result, names: list[str]) -> None:
 def test_they_come_first_among_the_results() -> None:
     names = [item.name for item in draw_report(many()) if isinstance(item, Drawing)]
     assert names[:2] == ["trends", "trend_maps"]
+
+
+def test_the_page_gets_the_numbers_of_the_file_in_si() -> None:
+    result = many()
+    dataset = result.dataset
+    estimated = np.linspace(0.0, 0.3, result.computed.size).reshape(result.computed.shape)
+    result = with_variables(result, error_estimate=dataset["outcome"].astype(float).copy(data=estimated))
+    numbers: list[Any] = build_trend_numbers(result) or []
+    assert [one["unit"] for one in numbers] == ["mm³", "%", "mm", "Hz"]
+    for one in numbers:
+        for name in ("data", "errors"):
+            one[name] = one[name] and np.frombuffer(base64.b64decode(one[name]), "<f4").reshape(one["sizes"])
+    volume, error, peak, _ = numbers
+    worn = dataset["worn_volume"].isel(cycle=-1).values
+    np.testing.assert_allclose(volume["data"], worn, rtol=1e-6)
+    np.testing.assert_allclose(volume["errors"], worn * estimated, rtol=1e-6)
+    assert volume["factor"] == 1e9
+    assert error["errors"] is None
+    told = np.isfinite(error["data"])
+    np.testing.assert_array_equal(told, estimated > 0.0)
+    np.testing.assert_allclose(error["data"][told] * error["factor"], 100.0 * estimated[told], rtol=1e-6)
+    assert peak["sizes"] == [1, *worn.shape[1:]]
+
+
+def test_the_page_gets_none_where_other_plots_show_all() -> None:
+    assert build_trend_numbers(make_result()) is None
+    assert build_trend_numbers(make_result(wear_coefficient=(1e-12, 1e-11), failed=range(16))) is None
+
+
+def test_no_error_without_worn_volumes() -> None:
+    assert find_error(make_result(wear_coefficient=(1e-12, 1e-11), without=("worn_volume",))) is None

@@ -6,6 +6,7 @@ const trend = { quantity: 0, axis: 0, mapped: 0, across: 0, up: 0, drawn: {} };
 const PALE = "#bdbdbd";
 const DECADES = 30; // largest over smallest value from which an axis is logarithmic
 const MOST_TICKS = 8;
+const MOST_MARKERS = 2000; // of the other combinations: each takes time to draw
 
 for (const entry of trends) {
   entry.values = decode(entry.data);
@@ -81,7 +82,7 @@ function drawTrend() {
   const traces = [];
   if (others.length) {
     traces.push({
-      x: gapped(at), y: gapped(value), customdata: gapped(pointAt), text: gapped((found) => trendText(entry, found)), mode: "lines+markers",
+      x: gapped(at), y: gapped(value), customdata: gapped(pointAt), text: gapped((found) => trendText(entry, found)), mode: others.length * own.length > MOST_MARKERS ? "lines" : "lines+markers",
       hovertemplate: "%{text}<extra></extra>", name: "other combinations", meta: "others", line: { color: PALE, width: 1 }, marker: { color: PALE, size: 4 },
     });
   }
