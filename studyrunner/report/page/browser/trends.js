@@ -4,6 +4,7 @@
 const trends = data.trends || [];
 const trend = { quantity: 0, axis: 0, mapped: 0, across: 0, up: 0, drawn: {} };
 const PALE = "#bdbdbd";
+const LEFT = { align: "left" };
 const DECADES = 30; // largest over smallest value from which an axis is logarithmic
 const MOST_TICKS = 8;
 const MOST_MARKERS = 2000; // of the other combinations: each takes time to draw
@@ -30,10 +31,10 @@ function shortText(axis, place) {
   return axes[axis].words ? value : digits(value, 4);
 }
 
-// What varies, and the value with its error or why there is none.
+// The value with its error or why there is none, and what varies.
 function trendText(entry, found) {
   const named = varying.filter((axis) => entry.sizes[axis] > 1)
-    .map((axis) => `${axes[axis].label} ${withUnit(shortText(axis, found[axis]), axes[axis].unit)}`).join(", ");
+    .map((axis) => plain(`${axes[axis].label} ${withUnit(shortText(axis, found[axis]), axes[axis].unit)}`));
   const index = indexIn(entry, found);
   const value = entry.values[index] * entry.factor;
   const wrong = entry.wrong ? entry.wrong[index] * entry.factor : NaN;
@@ -41,7 +42,7 @@ function trendText(entry, found) {
   const why = isSearched(entry) ? ": no peak inside the frequencies computed" : known(point, cycles.length - 1) ? "" : `: ${sentence(point)}`;
   const error = Number.isFinite(wrong) ? ` ± ${digits(wrong, 2)}` : "";
   const told = Number.isFinite(value) ? withUnit(`${digits(value, 4)}${error}`, entry.unit) : `not known${why}`;
-  return [`${named}:`, `${entry.label} ${told}`].map((line) => plain(line).replace(/(.{40,}?) /g, "$1<br>")).join("<br>");
+  return [plain(told).replace(/(.{40,}?) /g, "$1<br>"), ...named].join("<br>");
 }
 
 // Lines of a quantity along an axis: places of their points, for every combination of the other axes.
@@ -77,13 +78,13 @@ function drawTrend() {
   const bad = own.filter((found) => !Number.isFinite(value(found)));
   // one trace of all the others, a gap after each line
   const gapped = (of) => others.flatMap((line) => [...line.map(of), null]);
-  const drawn = (points) => ({ customdata: points.map(pointAt), text: points.map((found) => trendText(entry, found)), hovertemplate: "%{text}<extra></extra>" });
+  const drawn = (points) => ({ customdata: points.map(pointAt), text: points.map((found) => trendText(entry, found)), hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT });
   const low = Math.min(0, ...Array.from(entry.values).filter(Number.isFinite)) * entry.factor;
   const traces = [];
   if (others.length) {
     traces.push({
       x: gapped(at), y: gapped(value), customdata: gapped(pointAt), text: gapped((found) => trendText(entry, found)), mode: others.length * own.length > MOST_MARKERS ? "lines" : "lines+markers",
-      hovertemplate: "%{text}<extra></extra>", name: "other combinations", meta: "others", line: { color: PALE, width: 1 }, marker: { color: PALE, size: 4 },
+      hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT, name: "other combinations", meta: "others", line: { color: PALE, width: 1 }, marker: { color: PALE, size: 4 },
     });
   }
   traces.push({
@@ -131,7 +132,7 @@ function drawTrendMap() {
   const finite = Array.from(entry.values).filter(Number.isFinite).map((each) => each * entry.factor);
   const traces = [{
     type: "heatmap", z: cells.map((line) => line.map(value)), customdata: cells.map((line) => line.map(pointAt)), meta: "map",
-    text: cells.map((line) => line.map((found) => trendText(entry, found))), hovertemplate: "%{text}<extra></extra>", xgap: 1, ygap: 1,
+    text: cells.map((line) => line.map((found) => trendText(entry, found))), hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT, xgap: 1, ygap: 1,
     zmin: Math.min(0, ...finite), zmax: Math.max(0, ...finite) || 1, colorscale: "Cividis",
     colorbar: { title: { text: plain(titled(entry.label, entry.unit)), side: "right" }, thickness: 14, outlinewidth: 0 },
   }];
@@ -140,7 +141,7 @@ function drawTrendMap() {
   if (bad.length) {
     traces.push({
       ...place(bad), mode: "markers", customdata: bad.map(pointAt), text: bad.map((found) => trendText(entry, found)),
-      hovertemplate: "%{text}<extra></extra>", meta: "failed", marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } },
+      hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT, meta: "failed", marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } },
     });
   }
   traces.push({
