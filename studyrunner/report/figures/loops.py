@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
-from studyrunner.report.drawing import Drawing, Missing, line_style, new_panels
+from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import scale_for
 
@@ -219,7 +219,7 @@ def _draw_arrow(panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], col
 
 
 def _grid(loops: Sequence[_Loop], n_rows: int, draw: Callable[[Axes, _Loop, int], None], ends: Sequence[str]) -> Figure:
-    """One column a pair; the legend above all."""
+    """One column a pair; the legend below all."""
     figure, panels = new_panels(n_rows, len(loops), 0.5 + 2.7 * n_rows)
     for column, loop in enumerate(loops):
         panels[0, column].set_title(f"pair {loop.pair}")
@@ -227,6 +227,5 @@ def _grid(loops: Sequence[_Loop], n_rows: int, draw: Callable[[Axes, _Loop, int]
             draw(panels[row, column], loop, row)
             panels[row, column].locator_params(nbins=5)
     if len(ends) > 1:
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2)
+        add_legend(figure)
     return figure

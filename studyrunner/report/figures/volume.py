@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from studyrunner.report.drawing import (
     Drawing,
     Missing,
+    add_legend,
     hatch_empty,
     line_style,
     mark_failed,
@@ -118,7 +119,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
     set_from_zero(panel, scale(highest).item() if highest > NO_VOLUME else 0.0)
     if len(panel.get_lines()) > 1:
-        panel.legend()
+        add_legend(figure)
     where = result.describe(shown, [course]) if course else ""
     amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if ends else ""
     amount = amount if largest > NO_VOLUME else "Nothing wears."
@@ -230,7 +231,7 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume at {result.cycle_label(-1)}"))
     if len(panel.get_lines()) > 1:
-        panel.legend()
+        add_legend(figure)
     caption = as_sentences(
         f"Worn volume after {result.cycle_label(-1)} over {course.name}",
         f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from studyrunner.report.drawing import Drawing, Missing, Table, line_style, new_panels
+from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, line_style, new_panels
 from studyrunner.report.precision.comparison import Precision
 from studyrunner.report.precision.errors import QUANTITIES, RESOLVED, Point
 from studyrunner.report.precision.settings import Setting
@@ -53,7 +53,7 @@ def _draw(precision: Precision, shown: Sequence[Point]) -> Drawing:
         row[0].set_ylabel("Relative error")
     for panel in panels[-1]:
         panel.set_xlabel("CPU time of one point (s)")
-    figure.legend(handles=marks.legend(), loc="outside lower center", ncols=4)
+    add_legend(figure, marks.legend())
     return Drawing("precision", _TITLE, _caption(precision, shown), figure)
 
 
