@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -22,6 +21,7 @@ from studyrunner.report.drawing import (
     new_panels,
     set_from_zero,
 )
+from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import LONE, Flank, cell_edges, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -239,7 +239,7 @@ def _draw_fields(
         inner.set_ylabel("")
     for inner in panels[:-1].flat:
         inner.set_xlabel("")
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(text), fraction=0.05)
+    add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
     return figure
 
 
@@ -260,6 +260,7 @@ def _draw_field(panel: Axes, flank: Flank, values: NDArray[np.float64], norm: No
         panel.invert_yaxis()
         # Cells as they are in the flank, unless it is so slender that nothing would be seen.
         panel.set_aspect("equal" if flank.height_over_width > _SLENDER else "auto")
+        add_isolines(panel, grid.along * 1e3, grid.across * 1e3, values[grid.pair], norm)
     elif flank.seen is not None:
         panel.scatter(
             flank.seen[:, 0] * 1e3, flank.seen[:, 1] * 1e3, c=values, norm=norm, s=60, edgecolors="0.3", linewidths=0.4
@@ -331,5 +332,5 @@ def _draw_profiles(flanks: Sequence[Flank], depth: NDArray[np.float64], scale: S
         if column > 0:
             panels[0, column].set_ylabel("")
     panels[1, 0].set_ylabel(scale.label("wear depth"))
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label("wear depth"), fraction=0.05)
+    add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)
     return figure

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
@@ -24,6 +23,7 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
+from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import cell_edges
 from studyrunner.report.reading.result import NO_VOLUME, Choice, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -162,8 +162,10 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         panel.grid(visible=False)
         panel.set_title(label)
     _label_map(panels, course, cycles)
+    for panel, field in zip(panels.flat, fields, strict=True):
+        add_isolines(panel, course.values, cycles(result.cycles), scale(field.T), norm)
     text = {"worn_volume": "worn volume", "wear_rate": "wear rate"}[name]
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(text))
+    add_colour_bar(figure, panels, norm, scale.label(text))
     caption = as_sentences(
         f"{text.capitalize()} over {course.name} and cycles",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
