@@ -243,7 +243,7 @@ def list_stability(result: Result) -> Iterator[Table]:
         rows.append(
             (
                 result.describe(point),
-                show_number(float(step[at])) if np.isfinite(step[at]) else "",
+                show_number(float(step[at]), 4) if np.isfinite(step[at]) else "",
                 show_number(float(limit[at]), 3) if explicit[at] and np.isfinite(limit[at]) else "",
                 "yes" if too_long[at] else "",
                 "yes" if oscillates[at] else "",
