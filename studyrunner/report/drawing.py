@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +12,11 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 from numpy.typing import NDArray
 
 WIDTH = 7.5
@@ -28,6 +33,9 @@ MAP = "cividis"
 # Okabe & Ito (2008), "Color universal design", without its yellow, which vanishes on white. Lightness differs as well.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9")
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_LONGEST_LABEL = 100
+_LEGEND_ROW = 0.18
+"""Inches of one row of a legend."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 _STYLE: Any = {
@@ -52,6 +60,8 @@ _STYLE: Any = {
     "lines.linewidth": 1.6,
     "lines.markersize": 4.0,
     "legend.frameon": False,
+    "legend.borderpad": 0.0,
+    "legend.columnspacing": 1.4,
     "image.cmap": MAP,
     "figure.dpi": DPI,
     "savefig.dpi": DPI,
@@ -134,6 +144,35 @@ def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
         # Lines are drawn over those before them, which stay visible around the smaller markers.
         "markersize": 5.4 - 0.6 * min(number, 4),
     }
+
+
+def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
+    """A legend below all panels, where it covers no curve, in as many columns as fit; the figure grows by its height.
+
+    handles: what is named; by default whatever has a label in any panel, each label once.
+    """
+    if handles is None:
+        found: dict[str, Artist] = {}
+        for panel in figure.axes:
+            for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+                found.setdefault(str(label), handle)
+    else:
+        found = {str(handle.get_label()): handle for handle in handles}
+    if not found:
+        return
+    labels = [textwrap.fill(label, _LONGEST_LABEL) for label in found]
+    size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
+    gap = size * mpl.rcParams["legend.columnspacing"]
+    mark = size * (mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"])
+    widest = max(TextPath((0, 0), line, size=size).get_extents().width for text in labels for line in text.split("\n"))
+    room = 72.0 * figure.get_figwidth() - size
+    n_columns = max(1, min(len(labels), int((room + gap) // (widest + mark + gap))))
+    n_rows = math.ceil(len(labels) / n_columns)
+    # as even as that number of rows allows
+    n_columns = math.ceil(len(labels) / n_rows)
+    more = sum(text.count("\n") for text in labels)
+    figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * (n_rows + more))
+    figure.legend(list(found.values()), labels, loc="outside lower center", ncols=n_columns)
 
 
 def set_from_zero(panel: Axes, largest: float) -> None:

@@ -6,13 +6,22 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, new_panels, set_from_zero
+from studyrunner.report.drawing import (
+    COLOURS,
+    Drawing,
+    Missing,
+    add_legend,
+    line_style,
+    new_figure,
+    new_panels,
+    set_from_zero,
+)
+from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import LONE, Flank, cell_edges, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -25,6 +34,8 @@ _MANY_PAIRS = 150
 _FEW_PAIRS = 6
 _MANY_CELLS = 600
 _SLENDER = 0.12
+_BELOW_AXIS = 4.6
+"""Heights of its text that a legend stands below a panel, to leave room for the ticks and the label of the axis."""
 _NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
@@ -79,7 +90,7 @@ def draw_depths(result: Result) -> Drawing:
     panel.grid(visible=False, axis="x")
     _shade_surfaces(panel, result, pairs)
     if len(series) > 1:
-        panel.legend()
+        add_legend(figure)
     deepest = [
         f"{scale.show(float(np.nanmax(d)))} at pair {pairs[np.nanargmax(d)]}{f' ({k})' if k else ''}" for d, k in series
     ]
@@ -149,7 +160,7 @@ def draw_pressure_history(result: Result) -> Drawing:
     panel.set_xlabel(cycles.label("vibration cycles"))
     panel.set_ylabel(scale.label("mean pressure"))
     if values.shape[1] > 1:
-        panel.legend()
+        add_legend(figure)
     text = as_sentences(
         f"Contact pressure, mean over a period, at {result.describe(shown)}",
         f"Largest: {scale.show(float(np.nanmax(values[0])))} ({result.cycle_label(0)}),"
@@ -228,7 +239,7 @@ def _draw_fields(
         inner.set_ylabel("")
     for inner in panels[:-1].flat:
         inner.set_xlabel("")
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(text), fraction=0.05)
+    add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
     return figure
 
 
@@ -249,6 +260,7 @@ def _draw_field(panel: Axes, flank: Flank, values: NDArray[np.float64], norm: No
         panel.invert_yaxis()
         # Cells as they are in the flank, unless it is so slender that nothing would be seen.
         panel.set_aspect("equal" if flank.height_over_width > _SLENDER else "auto")
+        add_isolines(panel, grid.along * 1e3, grid.across * 1e3, values[grid.pair], norm)
     elif flank.seen is not None:
         panel.scatter(
             flank.seen[:, 0] * 1e3, flank.seen[:, 1] * 1e3, c=values, norm=norm, s=60, edgecolors="0.3", linewidths=0.4
@@ -287,14 +299,14 @@ def _draw_bars(
     panels[0, 0].set_ylabel(scale.label(text))
     set_from_zero(panels[0, 0], scale(max(float(np.nanmax(value, initial=0.0)) for value in values)).item())
     if len(values) > 1:
-        panels[0, -1].legend()
+        add_legend(figure)
     return figure
 
 
 def _draw_profiles(flanks: Sequence[Flank], depth: NDArray[np.float64], scale: Scale) -> Figure:
     """A map of each flank, and under it the depth along the flank, downwards as the surface sinks."""
     inches = 6.0 / len(flanks) * min(1.2, max(0.28, max(flank.height_over_width for flank in flanks)))
-    figure = new_figure(inches + 2.9)
+    figure = new_figure(inches + 3.3)
     panels = figure.subplots(2, len(flanks), squeeze=False, sharex="col", height_ratios=(inches, 2.0))
     deepest = scale(float(np.nanmax(depth))).item() or 1.0
     norm = Normalize(0.0, deepest)
@@ -315,9 +327,10 @@ def _draw_profiles(flanks: Sequence[Flank], depth: NDArray[np.float64], scale: S
         panel.set_ylim(1.06 * deepest, -0.04 * deepest)
         panel.set_xlabel("along the flank (mm)")
         if len(rows) > 1:
-            panel.legend()
+            # The rows of pairs lie elsewhere on each flank: each has a legend of its own, below its axis.
+            panel.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=_BELOW_AXIS, ncols=2)
         if column > 0:
             panels[0, column].set_ylabel("")
     panels[1, 0].set_ylabel(scale.label("wear depth"))
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label("wear depth"), fraction=0.05)
+    add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,15 +14,41 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
-from studyrunner.report.drawing import Drawing, Missing, line_style, new_panels
+from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.units import scale_for
+from studyrunner.report.reading.units import Scale, scale_for
 
 _MOST_PAIRS = 3
 _TITLE = "Fretting loops"
 _NO_MOTION = 1e-15
 """m. A range below this is round-off."""
 _TANGENTS = ("tangent_1", "tangent_2")
+_LABEL_WIDTH = 25
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """The tangents in words. labels: what stands in place of {} is a displacement or a force. told: for the caption."""
+
+    labels: tuple[str, str]
+    told: str
+
+    def label(self, tangent: str, quantity: str, scale: Scale) -> str:
+        """Label of an axis, in lines that fit a panel."""
+        words = scale.label(self.labels[_TANGENTS.index(tangent)].format(quantity))
+        return textwrap.fill(words, _LABEL_WIDTH, break_on_hyphens=False)
+
+
+# By the model of the scene, as its pages define them.
+_OF_MODEL = {
+    "dovetail_sector": _Directions(
+        ("axial {}", "{} along the flank"),
+        "Positive is axially to the trailing edge, along the flank outwards; displacements are those of the blade"
+        " relative to the disk",
+    )
+}
+_LONE_TANGENT = _Directions(("tangential {}", "tangential {}"), "")
+_OF_FILE = _Directions(("{} along tangent 1", "{} along tangent 2"), "Tangents 1 and 2 are those of the scene")
 
 
 @dataclass(frozen=True)
@@ -56,10 +83,22 @@ def draw_loops(result: Result) -> Iterator[Drawing | Missing]:
     left_out = f"The file also holds the loops of {_tell_pairs(others)}" if others else ""
     tail = as_sentences(f"Pairs shown at {result.describe(point)}", left_out)
     ends = [result.cycle_label(0), result.cycle_label(-1)][: len(result.cycles)]
-    for draw in (_draw_fretting, _draw_normal, _draw_motion):
-        drawing = draw(loops, ends, tail)
+    directions = _find_directions(result, loops)
+    drawings = (
+        _draw_fretting(loops, directions, ends, tail),
+        _draw_normal(loops, ends, tail),
+        _draw_motion(loops, directions, ends, tail),
+    )
+    for drawing in drawings:
         if drawing is not None:
             yield drawing
+
+
+def _find_directions(result: Result, loops: Sequence[_Loop]) -> _Directions:
+    """What the tangents are called: by the scene where it is known, else by their numbers."""
+    if not any("tangent_2" in loop.force or "tangent_2" in loop.displacement for loop in loops):
+        return _LONE_TANGENT
+    return _OF_MODEL.get(str(result.study.get("scene", {}).get("model", "")), _OF_FILE)
 
 
 def _deepest(result: Result) -> int:
@@ -110,7 +149,7 @@ def _read_loop(result: Result, point: dict[str, int], pair: int) -> _Loop:
     return _Loop(pair, np.asarray(loop["phase"].values, dtype=float), split("displacement"), split("force"))
 
 
-def _draw_fretting(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:
+def _draw_fretting(loops: Sequence[_Loop], directions: _Directions, ends: Sequence[str], tail: str) -> Drawing | None:
     """Tangential force over tangential displacement, one row a direction (Fig. 13)."""
     rows = [name for name in _TANGENTS if any(name in loop.displacement and name in loop.force for loop in loops)]
     if not rows:
@@ -122,13 +161,13 @@ def _draw_fretting(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Dr
         name = rows[row]
         if name in loop.displacement and name in loop.force:
             _draw_ends(panel, length(loop.displacement[name]), load(loop.force[name]), ends)
-        panel.set_xlabel(length.label(f"displacement {name[-1]}"))
-        panel.set_ylabel(load.label(f"force {name[-1]}"))
+        panel.set_xlabel(directions.label(name, "displacement", length))
+        panel.set_ylabel(directions.label(name, "force", load))
 
     figure = _grid(loops, len(rows), draw, ends)
     text = as_sentences(
         "Tangential force over relative displacement through a period: the area inside is the energy of friction",
-        "1 and 2 are the tangents of the file",
+        directions.told,
         tail,
         "Fig. 13 of the paper",
     )
@@ -167,7 +206,7 @@ def _open_fraction(loop: _Loop) -> str:
     return ", then ".join(f"{100.0 * fraction:.0f} %" for fraction in fractions)
 
 
-def _draw_motion(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Drawing | None:
+def _draw_motion(loops: Sequence[_Loop], directions: _Directions, ends: Sequence[str], tail: str) -> Drawing | None:
     """Path of the relative displacement in the contact plane (Fig. 15), or through the period with one tangent only."""
     loops = [loop for loop in loops if all(name in loop.displacement for name in _TANGENTS)]
     if not loops:
@@ -176,13 +215,14 @@ def _draw_motion(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
 
     def draw(panel: Axes, loop: _Loop, _row: int) -> None:
         _draw_ends(panel, length(loop.displacement["tangent_1"]), length(loop.displacement["tangent_2"]), ends)
-        panel.set_xlabel(length.label("displacement 1"))
-        panel.set_ylabel(length.label("displacement 2"))
+        panel.set_xlabel(directions.label("tangent_1", "displacement", length))
+        panel.set_ylabel(directions.label("tangent_2", "displacement", length))
         panel.set_aspect("equal", adjustable="datalim")
 
     figure = _grid(loops, 1, draw, ends)
     text = as_sentences(
-        "Path of the relative displacement along the tangents 1 and 2; a pair that sticks is a dot",
+        "Path of the relative displacement in the contact plane; a pair that sticks is a dot",
+        directions.told,
         f"Largest extent: {', '.join(_tell_extent(loop) for loop in loops)}",
         tail,
         "Fig. 15 of the paper",
@@ -219,14 +259,15 @@ def _draw_arrow(panel: Axes, x: NDArray[np.float64], y: NDArray[np.float64], col
 
 
 def _grid(loops: Sequence[_Loop], n_rows: int, draw: Callable[[Axes, _Loop, int], None], ends: Sequence[str]) -> Figure:
-    """One column a pair; the legend above all."""
+    """One column a pair; the legend below all."""
     figure, panels = new_panels(n_rows, len(loops), 0.5 + 2.7 * n_rows)
     for column, loop in enumerate(loops):
         panels[0, column].set_title(f"pair {loop.pair}")
         for row in range(n_rows):
             draw(panels[row, column], loop, row)
+            if column > 0:
+                panels[row, column].set_ylabel("")
             panels[row, column].locator_params(nbins=5)
     if len(ends) > 1:
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2)
+        add_legend(figure)
     return figure

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
+from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds
 from studyrunner.report.reading.reliance import tell_ends, tell_volumes
@@ -93,7 +93,7 @@ def draw_outcome_map(result: Result, course: Course) -> Drawing:
     for number in present:
         label = f"{number} {result.endings[number].word.replace('_', ' ')}"
         panel.plot([], [], linestyle="none", marker="s", markersize=9, color=colours[number], label=label)
-    figure.legend(loc="outside upper center", ncols=min(4, len(present)))
+    add_legend(figure)
     meaning = [f"{number}: {result.endings[number].sentence}" for number in failing]
     caption = as_sentences("How the computation of each point ended", *meaning, choice.sentence)
     return Drawing("outcome_map", "Where points failed, and why", caption, figure)
@@ -172,7 +172,7 @@ def draw_errors(result: Result, course: Course) -> Drawing | None:
     course.set_axis(panel)
     panel.set_xlim(course.edges[0], course.edges[-1])
     panel.set_ylabel("estimated relative error")
-    figure.legend(loc="outside upper center", ncols=3)
+    add_legend(figure)
     others = result.describe(point, [name for name in result.varying if name != course.axis])
     caption = as_sentences(
         f"Estimated relative errors{f' ({others})' if others else ''}; the largest: {'; '.join(worst)}",
@@ -243,7 +243,7 @@ def list_stability(result: Result) -> Iterator[Table]:
         rows.append(
             (
                 result.describe(point),
-                show_number(float(step[at])) if np.isfinite(step[at]) else "",
+                show_number(float(step[at]), 4) if np.isfinite(step[at]) else "",
                 show_number(float(limit[at]), 3) if explicit[at] and np.isfinite(limit[at]) else "",
                 "yes" if too_long[at] else "",
                 "yes" if oscillates[at] else "",

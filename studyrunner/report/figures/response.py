@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, mark_failed, new_panels, set_from_zero
+from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.reading.result import Choice, Point, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -77,7 +77,7 @@ def draw_response(result: Result, course: Course) -> Drawing:
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
         _mark_folds(result, panel)
         n_failed = mark_failed(panel, course.values, failed)
-        panel.legend()
+    add_legend(figure)
     course.set_axis(panels[-1, 0])
     more = len(result.responses) - n_panels
     caption = as_sentences(

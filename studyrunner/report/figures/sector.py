@@ -53,7 +53,7 @@ def _draw_frequencies(result: Result, panel: Axes) -> str:
     panel.set_ylabel("natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     text = f"Natural frequencies of the sector with its joint stuck, {frequencies.shape[1]} modes"
-    first = f"The lowest is {np.nanmin(frequencies):.5g} Hz"
+    first = f"The lowest is {np.nanmin(frequencies):.4g} Hz"
     diameter = result.study.get("scene", {}).get("nodal_diameter")
     if isinstance(diameter, int) and "frequency" in result.dataset.coords:
         studied = result.dataset["frequency"].values

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import (
     Drawing,
     Missing,
+    add_legend,
     hatch_empty,
     line_style,
     mark_failed,
@@ -23,6 +23,7 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
+from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import cell_edges
 from studyrunner.report.reading.result import NO_VOLUME, Choice, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -118,7 +119,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
     set_from_zero(panel, scale(highest).item() if highest > NO_VOLUME else 0.0)
     if len(panel.get_lines()) > 1:
-        panel.legend()
+        add_legend(figure)
     where = result.describe(shown, [course]) if course else ""
     amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if ends else ""
     amount = amount if largest > NO_VOLUME else "Nothing wears."
@@ -161,8 +162,10 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         panel.grid(visible=False)
         panel.set_title(label)
     _label_map(panels, course, cycles)
+    for panel, field in zip(panels.flat, fields, strict=True):
+        add_isolines(panel, course.values, cycles(result.cycles), scale(field.T), norm)
     text = {"worn_volume": "worn volume", "wear_rate": "wear rate"}[name]
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(text))
+    add_colour_bar(figure, panels, norm, scale.label(text))
     caption = as_sentences(
         f"{text.capitalize()} over {course.name} and cycles",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
@@ -230,7 +233,7 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume at {result.cycle_label(-1)}"))
     if len(panel.get_lines()) > 1:
-        panel.legend()
+        add_legend(figure)
     caption = as_sentences(
         f"Worn volume after {result.cycle_label(-1)} over {course.name}",
         f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",

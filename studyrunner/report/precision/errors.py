@@ -160,6 +160,13 @@ class Point:
         errors = self.errors[quantity]
         return errors[(errors > ROUND_OFF) & (errors < np.inf)]
 
+    def resolves(self, quantity: str) -> bool:
+        """Whether some error is clearly more than the uncertainty of the reference, and not all are the same."""
+        errors = self.clear_errors(quantity)
+        least = max(RESOLVED * self.uncertainty(quantity), ROUND_OFF)
+        known = self.measured[quantity].fillna(0.0)
+        return bool(errors.size) and errors.max() >= least and known.max() - known.min() > least / RESOLVED
+
     def uncertainty(self, quantity: str) -> float:
         """Of the reference."""
         return float("inf") if self.reference is None else self.reference.uncertainty[quantity]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,14 @@ from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 @dataclass(frozen=True)
 class Scale:
-    """How values in SI are shown: times `factor`, in `unit`. The unit is empty for plain numbers."""
+    """How values in SI are shown: times `factor`, in `unit`. The unit is empty for plain numbers.
+
+    least: in SI; smaller magnitudes are round-off, and shown as zero.
+    """
 
     factor: float
     unit: str
+    least: float = field(default=0.0, compare=False)
 
     def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
         """Values as shown."""
@@ -27,9 +31,15 @@ class Scale:
 
     def show(self, value: float, digits: int = 3) -> str:
         """One value in SI, as text with its unit."""
-        text = show_number(value * self.factor, digits)
+        text = show_number(value * self.factor if abs(value) >= self.least else 0.0, digits)
         return f"{text} {self.unit}" if self.unit else text
 
+
+_LARGE = 1e7
+"""From here on, numbers that were rounded are shown with an exponent."""
+
+_ROUND_OFF = 1e-12
+"""Of the largest value that is shown."""
 
 # Of each unit in SI: smallest value that is shown so, factor, unit; from large to small, the last for all below.
 _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
@@ -56,13 +66,14 @@ def scale_for(units: str, *values: ArrayLike) -> Scale:
     Units without prefixes stay as they are; where there is nothing but zero, the usual unit of an engineer.
     """
     largest = max((_largest(array) for array in values), default=0.0)
+    least = _ROUND_OFF * largest
     steps = _SCALES.get(units)
     if steps is None:
-        return Scale(1.0, "" if units == "1" else units)
+        return Scale(1.0, "" if units == "1" else units, least)
     if largest == 0.0:
         usual = {"m": "mm", "m3": "mm³", "m3 per cycle": "mm³ per kcycle", "Pa": "MPa", "N": "N"}.get(units)
         return next((Scale(factor, unit) for _, factor, unit in steps if unit == usual), Scale(*steps[-1][1:]))
-    return next(Scale(factor, unit) for smallest, factor, unit in steps if largest >= smallest)
+    return next(Scale(factor, unit, least) for smallest, factor, unit in steps if largest >= smallest)
 
 
 def _largest(values: ArrayLike) -> float:
@@ -71,15 +82,18 @@ def _largest(values: ArrayLike) -> float:
 
 
 def show_number(value: float, digits: int = 6) -> str:
-    """A number in few digits; thousands set apart."""
+    """A number in few digits; thousands set apart. Whole numbers keep all of theirs."""
+    text = f"{value:.{digits}g}"
     if float(value).is_integer() and 1e4 <= abs(value) < 1e15:
         return f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
-    return f"{value:.{digits}g}"
+    if "e+" in text and abs(value) < _LARGE:
+        return f"{float(text):.0f}" if abs(value) < 1e4 else show_number(float(text))
+    return text
 
 
 def show_cycles(value: float) -> str:
-    """A cycle count in words."""
-    return f"{show_number(value, 8)} cycle" + ("" if value == 1 else "s")
+    """A cycle count in words: in whole numbers as it is, else in four digits."""
+    return f"{show_number(value, 4)} cycle" + ("" if value == 1 else "s")
 
 
 def units_of(name: str) -> str:

@@ -132,6 +132,26 @@ def test_a_pair_with_one_tangent_has_no_path() -> None:
     loops = items["fretting_loops"]
     assert isinstance(loops, Drawing)
     assert len(loops.figure.axes) == 2
+    assert loops.figure.axes[0].get_xlabel() == "displacement along\ntangent 1 (µm)"
+
+
+@pytest.mark.parametrize(
+    ("model", "first", "second"),
+    [
+        ("dovetail_sector", "axial displacement (µm)", "displacement along the flank (µm)"),
+        ("joint.inp", "displacement along tangent 1 (µm)", "displacement along tangent 2 (µm)"),
+    ],
+)
+def test_tangents_are_told_in_the_words_of_the_scene(model: str, first: str, second: str) -> None:
+    """Names of the bundled scene are those of its page: first tangent axial, second along the flank."""
+    result = with_loops(make_result())
+    result.dataset.attrs["study"] = f'[scene]\nmodel = "{model}"\n'
+    top, bottom = draw_figure(result, "fretting_loops").figure.axes[::2]
+    assert top.get_xlabel().replace("\n", " ") == first
+    assert bottom.get_xlabel().replace("\n", " ") == second
+    assert top.get_ylabel().replace("\n", " ") == first.replace("displacement", "force").replace("µm", "N")
+    motion = draw_figure(result, "pair_motion").figure.axes[0]
+    assert [motion.get_xlabel().replace("\n", " "), motion.get_ylabel().replace("\n", " ")] == [first, second]
 
 
 def test_arrows_go_the_way_of_the_loop() -> None:

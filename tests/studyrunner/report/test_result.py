@@ -157,7 +157,7 @@ def test_a_study_that_cannot_be_read_is_empty() -> None:
         ("m", 2e-9, "2 nm"),
         ("m", 139.0, "139 m"),
         ("m3", 2.25e-9, "2.25 mm³"),
-        ("m3", 3e-15, "3e+03 µm³"),
+        ("m3", 3e-15, "3000 µm³"),
         ("m3 per cycle", 1.2e-13, "0.12 mm³ per kcycle"),
         ("Pa", 23.4e6, "23.4 MPa"),
         ("Pa", 1280.0, "1.28 kPa"),
@@ -174,6 +174,15 @@ def test_prefixes_fit_the_values(units: str, largest: float, shown: str) -> None
     assert scale_for(units, [np.nan, 0.1 * largest, -largest]).show(largest) == shown
 
 
+def test_round_off_of_the_largest_is_shown_as_zero() -> None:
+    """A mean of 2.76e-23 m beside depths of micrometres is none; a millionth of the largest is a value."""
+    scale = scale_for("m", [8e-6, 2.76e-23])
+    assert scale.show(2.76e-23) == "0 µm"
+    assert scale.show(-2.76e-23) == "0 µm"
+    assert scale.show(8e-12) == "8e-06 µm"
+    assert scale_for("m", [2.76e-9]).show(2.76e-9) == "2.76 nm"
+
+
 def test_scales_apply_to_arrays_and_labels() -> None:
     scale = Scale(1e3, "mm")
     np.testing.assert_allclose(scale([1e-3, np.nan]), [1.0, np.nan])
@@ -184,6 +193,10 @@ def test_scales_apply_to_arrays_and_labels() -> None:
 def test_numbers_in_words() -> None:
     assert show_number(100000.0) == "100\N{NO-BREAK SPACE}000"
     assert show_number(1234.5678) == "1234.57"
+    assert show_number(23412.87, 4) == "23\N{NO-BREAK SPACE}410"
+    assert show_number(2.1234567e11 + 0.5, 4) == "2.123e+11"
+    assert show_cycles(23412.87) == "23\N{NO-BREAK SPACE}410 cycles"
+    assert show_cycles(123456.0) == "123\N{NO-BREAK SPACE}456 cycles"
     assert show_cycles(1) == "1 cycle"
     assert show_cycles(0) == "0 cycles"
     assert [show_power(value) for value in (1.0, 0.1, 1e-12, 1e4, 2e-3, 0.0)] == [
