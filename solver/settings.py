@@ -13,7 +13,7 @@ Scheme = Literal["explicit", "implicit", "adaptive"]
 """Of the steps on the slow time scale."""
 
 
-Quantity = Literal["wear_depth", "worn_volume"]
+Quantity = Literal["wear_depth", "worn_volume", "frequency_shift"]
 TARGETS: tuple[Quantity, ...] = get_args(Quantity)
 """What a target may be of."""
 
@@ -22,7 +22,8 @@ TARGETS: tuple[Quantity, ...] = get_args(Quantity)
 class WearTarget:
     """Wear at which a march ends.
 
-    quantity: "wear_depth", of the deepest pair, m, or "worn_volume", of all pairs, m3. value: above 0.
+    quantity: "wear_depth", of the deepest pair, m, "worn_volume", of all pairs, m3, or "frequency_shift", by how much
+    the resonance of the vibration (`results.resonance`) has changed, up or down, relative. value: above 0.
     """
 
     quantity: Quantity

@@ -301,6 +301,8 @@ def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], t
         return ""
     if not math.isnan(target):
         return "" if whole else f"at its target at cycle {show_count(target)}: later counts are not computed"
+    if task.until.quantity == "frequency_shift":
+        return f"frequency_shift stays below {task.until.value:g}"
     deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
     value, unit = (deepest, "m") if task.until.quantity == "wear_depth" else (volume, "m3")
     return f"{task.until.quantity} stays below {task.until.value:g} {unit}: it is {value:.3g} {unit} at the last count"

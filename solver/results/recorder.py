@@ -49,6 +49,7 @@ class RecorderState(TypedDict):
     local: float
     truncation: float
     pair_truncation: FloatArray
+    first_resonance: float
 
 
 @dataclass
@@ -61,6 +62,7 @@ class Recorder:
     they close, stay within the friction cone and have the mean pressure that is reported at the same count.
 
     target: wear whose count is looked for between the steps in the same way; reached: that count, NaN until then.
+    first_resonance: rad/s, of the first state, where the target is of it.
     compared (n_output, n_contact): m, depths of the coarser history, once it has finished.
     """
 
@@ -78,6 +80,7 @@ class Recorder:
     truncation: float = field(init=False, default=0.0, repr=False)
     pair_truncation: FloatArray = field(init=False, repr=False)
     compared: FloatArray = field(init=False, repr=False)
+    first_resonance: float = field(init=False, default=math.nan, repr=False)
 
     def __post_init__(self) -> None:
         n_output, n_contact = self.cycles.size, self.model.contact.n_contact
@@ -126,6 +129,7 @@ class Recorder:
         smooth = self.scheme == "adaptive"
         if self.last is None:
             wanted = self.cycles == cycle
+            self.first_resonance = report.resonance
             before, before_report, before_rate = cycle, report, rate
         else:
             before, before_report, before_rate = self.last
@@ -140,7 +144,8 @@ class Recorder:
                 self.pair_truncation = self.pair_truncation + half * gain * of.wearing_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.wearing_work)) for of in (before_report, report)]
-        self._look_for_target(before, cycle, ends[0], ends[1])
+        shifts = tuple(self._shift(of.resonance) for of in (before_report, report))
+        self._look_for_target(before, cycle, ends[0], ends[1], shifts)
         depth = depth_within(fraction, cycle - before, ends[0], ends[1], smooth)
         if smooth and cycle > before:
             fraction = self._worn_fraction(depth, before_report.wear_depth, report.wear_depth, fraction)
@@ -166,21 +171,42 @@ class Recorder:
         """The coarser history says by itself what its depths are at the counts."""
 
     def _look_for_target(
-        self, before: float, cycle: float, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray]
+        self,
+        before: float,
+        cycle: float,
+        start: tuple[FloatArray, FloatArray],
+        end: tuple[FloatArray, FloatArray],
+        shifts: tuple[float, ...],
     ) -> None:
-        """Note the count at which a step reaches the target; start, end: depth and wear rate, as `depth_within` has."""
-        if self.target is None or self._worn(end[0]) < self.target.value or not math.isnan(self.reached):
+        """Note the count at which a step reaches the target; start, end: depth and wear rate, as `depth_within` has.
+
+        shifts: of the resonance, at both ends.
+        """
+        if self.target is None or not math.isnan(self.reached):
+            return
+        wanted = self.target.value
+        if self.target.quantity == "frequency_shift":
+            if not shifts[1] >= wanted:
+                return
+            # a function of the state, which is a function of what is worn, as all else that is reported
+            share = (wanted - shifts[0]) / (shifts[1] - shifts[0]) if shifts[1] > shifts[0] else 0.0
+            wanted = self._worn(start[0]) + max(share, 0.0) * (self._worn(end[0]) - self._worn(start[0]))
+        if self._worn(end[0]) < wanted:
             return
         low, high = 0.0, 1.0
         # depths never fall within a step
         while high - low > RESULTS.target_resolution:
             middle = 0.5 * (low + high)
             depth = depth_within(np.array([middle]), cycle - before, start, end, self.scheme == "adaptive")[0]
-            low, high = (low, middle) if self._worn(depth) >= self.target.value else (middle, high)
+            low, high = (low, middle) if self._worn(depth) >= wanted else (middle, high)
         self.reached = before + high * (cycle - before)
 
+    def _shift(self, resonance: float) -> float:
+        """Change of the resonance since the first state, up or down, relative."""
+        return abs(resonance / self.first_resonance - 1.0)
+
     def _worn(self, depth: FloatArray) -> float:
-        """What the target is compared with: the largest depth, m, or the volume, m3, of depths (n_contact,), m."""
+        """What tells how far wear is: the largest depth, m, or the volume, m3, of depths (n_contact,), m."""
         assert self.target is not None
         if self.target.quantity == "wear_depth":
             return float(depth.max(initial=0.0))

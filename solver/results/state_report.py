@@ -16,6 +16,7 @@ from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
 from solver.results.loops import contact_loops
+from solver.results.resonance import resonance_frequency
 from solver.settings import Resolution
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
@@ -40,7 +41,8 @@ class StateReport:
     """What is reported of a state; units and shapes as in `WearHistory`, without the cycle dimension.
 
     wearing_work (n_contact,): J, the work that wears in a cycle: the slip work, but for what another wear law than
-    Archard's makes of it; and what it is wrong by for want of harmonics.
+    Archard's makes of it; and what it is wrong by for want of harmonics. resonance: as `resonance_frequency`, rad/s,
+    NaN where it was not asked for.
     """
 
     wear_depth: FloatArray
@@ -55,6 +57,7 @@ class StateReport:
     loop_force: FloatArray
     certificate: Certificate
     resolution: Resolution
+    resonance: float = float("nan")
 
 
 def report_state(
@@ -63,6 +66,8 @@ def report_state(
     certificate: Certificate,
     slip_work_error: FloatArray,
     loops: tuple[int, ...] = (),
+    *,
+    with_resonance: bool = False,
 ) -> StateReport:
     """Pressures, slip and responses of a converged state; all of its slip work wears.
 
@@ -74,6 +79,8 @@ def report_state(
         (n_contact,), N m, what the slip work is wrong by for want of harmonics.
     loops
         Pairs whose fretting loops are reported, too.
+    with_resonance
+        Whether the resonance of the vibration is.
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
@@ -90,6 +97,7 @@ def report_state(
         loop_force=loop_force,
         certificate=certificate,
         resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
+        resonance=resonance_frequency(joint, evaluation) if with_resonance else float("nan"),
     )
 
 

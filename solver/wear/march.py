@@ -90,7 +90,8 @@ def march_wear(
         failed = recorder.failed(start.outcome, 0.0)
         return replace(failed, branch=start.branch, fold_frequency=start.fold_frequency, message=start.message)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-    march = Trajectory(case, start, wear_coefficient, scheme, loops, law)
+    shifts = until is not None and until.quantity == "frequency_shift"
+    march = Trajectory(case, start, wear_coefficient, scheme, loops, law, with_resonance=shifts)
     companion = Companion(march, start, counts)
     watch = EndWatch(march, cycles.final_share if isinstance(cycles, ToTheEnd) else None)
     spent_before, message = 0.0, ""

@@ -69,7 +69,10 @@ class TrajectoryState(TypedDict):
 
 @dataclass
 class Trajectory:
-    """The current state of a joint that wears, and how it goes on. loops: pairs whose fretting loops are reported."""
+    """The current state of a joint that wears, and how it goes on.
+
+    loops: pairs whose fretting loops are reported. with_resonance: whether the resonance of the vibration is.
+    """
 
     case: Case
     start: StartState
@@ -77,6 +80,7 @@ class Trajectory:
     scheme: Scheme
     loops: tuple[int, ...] = ()
     wear_law: WearLaw = ARCHARD
+    with_resonance: bool = False
 
     def __post_init__(self) -> None:
         state = self.start.state
@@ -207,7 +211,14 @@ class Trajectory:
         """What is reported of the current state, which has been checked."""
         assert self.certificate is not None
         at = worn_by(self.point.evaluation)
-        report = report_state(self.joint, self.point.evaluation, self.certificate, self.slip_work_error, self.loops)
+        report = report_state(
+            self.joint,
+            self.point.evaluation,
+            self.certificate,
+            self.slip_work_error,
+            self.loops,
+            with_resonance=self.with_resonance,
+        )
         by_slip_work, _, _ = self.wearing.slopes(*at)
         return replace(
             report, wearing_work=self.wearing.work(*at), wearing_work_error=by_slip_work * report.wearing_work_error

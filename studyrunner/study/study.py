@@ -134,7 +134,9 @@ class SlowTimeSection(Section):
         " cycles = inf their number, equally spaced in worn volume",
     )
     until: Annotated[dict[str, float] | None, BeforeValidator(_read_target)] = Field(
-        None, description="wear at which a point ends, {wear_depth = m of the deepest pair} or {worn_volume = m3}"
+        None,
+        description="wear at which a point ends, {wear_depth = m of the deepest pair}, {worn_volume = m3}, or"
+        " {frequency_shift = relative change of the resonance of the vibration}",
     )
     largest_depth: Positive | None = Field(
         None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"

@@ -1,0 +1,52 @@
+"""The resonance of a vibration: at which frequency its force and its motion would be a quarter of a period apart.
+
+With x and F the first harmonics of all displacements and of the excitation, `x^H` times the equation of motion (1) is
+
+    w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F,
+
+and what the motion x with its contact forces lambda would need for no part of F in phase with it is the frequency
+
+    w_r^2 = w^2 + Re (x^H F) / (x^H M x).
+
+Of a linear oscillator this is the natural frequency, whatever w is; of a joint that slips and opens it is that of the
+vibration as it is, a Rayleigh quotient with the contact forces of the state. It costs one product with the matrices.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import ComplexArray, IntArray
+from solver.structure.condensation import relative_indices
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Joint
+
+
+def resonance_frequency(joint: Joint, evaluation: Evaluation) -> float:
+    """w_r, rad/s, of a converged state; NaN where nothing with mass moves, or where no frequency would do."""
+    linear, conjugate = joint.model.harmonic_structure(1)
+    mass, damping, stiffness, shape = (
+        np.conj(part) if conjugate else part
+        for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic)
+    )
+    relative, _ = relative_indices(joint.contact)
+    internal = np.setdiff1d(np.arange(len(shape)), relative)
+    force = joint.excitation_amplitude * shape
+    moved = np.zeros(len(shape), complex)
+    moved[relative] = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
+    if internal.size:
+
+        def block(columns: IntArray) -> ComplexArray:
+            at = np.ix_(internal, columns)
+            whole = stiffness[at] + 1j * joint.omega * damping[at] - joint.omega**2 * mass[at]
+            return cast("ComplexArray", whole)
+
+        moved[internal] = np.linalg.solve(block(internal), force[internal] - block(relative) @ moved[relative])
+    inertia = float(np.real(np.vdot(moved, mass @ moved)))
+    if not inertia > 0.0:
+        return float("nan")
+    square = joint.omega**2 + float(np.real(np.vdot(moved, force))) / inertia
+    return float(np.sqrt(square)) if square > 0.0 else float("nan")
