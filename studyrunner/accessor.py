@@ -19,7 +19,7 @@ from studyrunner.user_error import UserError
 
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
 _SAME = 1e-9  # relative: two values of an axis that differ by less are one
-_NOT_COMPUTED = -1
+_NOT_COMPUTED = 13  # `Outcome.NOT_COMPUTED` of the solver, which results are read without
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
 
 
@@ -179,7 +179,7 @@ def _parallel_lines(
 def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.Dataset:
     """One result of several: the axes hold the values of all of them. A point in several is taken whole from the last.
 
-    A point in none of them is NaN, its whole numbers 0 and its `outcome` -1, not_computed. Attributes are kept that all
+    A point in none of them is NaN, its whole numbers 0 and its `outcome` not_computed. Attributes are kept that all
     agree on.
 
     Parameters
