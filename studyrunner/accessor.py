@@ -47,7 +47,9 @@ class FretwearAccessor:
         Dimensions of `response_amplitude`; NaN where a point failed. KeyError: the file holds no amplitude or no phase.
         """
         amplitude, phase = self._dataset["response_amplitude"], self._dataset["response_phase"]
-        response = (amplitude * np.exp(1j * phase)).rename("response")
+        # a damaged file may hold anything
+        with np.errstate(invalid="ignore"):
+            response = (amplitude * np.exp(1j * phase)).rename("response")
         return response.assign_attrs(units="m", long_name="first harmonic of the response")
 
     @property

@@ -21,7 +21,7 @@ from studyrunner.study.study_file import read_study
 pytestmark = pytest.mark.usefixtures("reader")
 
 COARSE = ("scene.mesh=1", "axes.frequency=[211.5, 212.0]", "axes.scheme=implicit", "slow_time.cycles=500")
-OUTPUTS = ("slow_time.outputs=2", "outputs.loops=[3]", "solver.rtol=0.1")
+OUTPUTS = ("slow_time.outputs=2", 'outputs.variables=["default"]', "outputs.loops=[3]", "solver.rtol=0.1")
 WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20", "solver.harmonics=2", "solver.samples=64")
 
 STUDY = """

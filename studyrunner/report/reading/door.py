@@ -23,7 +23,7 @@ MOST_POINTS = 10**6
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "last_cycle", "cycle_count", *CERTIFICATE)
+_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "cycle_count", *CERTIFICATE)
 _MOST_NAMES = 2**20  # values along any dimension
 _LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
 _DEEPEST = 3  # of what is nested in a study
@@ -92,10 +92,12 @@ def check_numbers(dataset: xr.Dataset, source: str) -> None:
     UserError
         Where there is one.
     """
+    # a final state that was found without slow time comes after any number of cycles
+    infinite = (*_INFINITE, "last_cycle") if "cycle_count" in dataset.variables else _INFINITE
     for name, variable in dataset.variables.items():
         if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
             sizes = np.abs(variable.values)
-            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (name not in _INFINITE))]
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (name not in infinite))]
             if wrong.size:
                 raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
 
