@@ -45,7 +45,7 @@ def add_isolines(
     colours = [_colour(norm, level) for level in levels]
     lines = panel.contour(x, y, np.ma.masked_invalid(values), levels, colors=colours, linewidths=0.7)
     panel.apply_aspect()
-    figure = panel.get_figure(root=True)
+    figure = panel.figure
     assert figure is not None
     scale = 72.0 / figure.dpi
     border = np.array(panel.get_window_extent().get_points()) * scale
