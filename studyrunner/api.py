@@ -10,8 +10,10 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
+from studyrunner.mpi.hand_out import HandOut
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
+from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.door import check_dataset, reading_errors
 from studyrunner.report.reading.result import open_vetted
@@ -86,8 +88,9 @@ def run_study(
     try:
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
         with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
-            model = build_study_scene(study)
-            serve_study(Alone(), study, model, target, shown, fresh=fresh, retry_failed=retry_failed, prune=prune)
+            alone = Alone()
+            model = HandOut(alone, {0: describe_machine()}, build_study_scene(study))
+            serve_study(alone, study, model, target, shown, fresh=fresh, retry_failed=retry_failed, prune=prune)
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left

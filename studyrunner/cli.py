@@ -10,18 +10,19 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
-from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks, wait_for_message
+from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
 from studyrunner.system.endings import take_endings
 from studyrunner.system.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
+    from studyrunner.mpi.version_check import Machine
     from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -233,7 +234,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     try:
         from studyrunner.mpi.version_check import check_versions
 
-        check_versions(ranks)
+        machines = check_versions(ranks)
         options = parse_options(arguments)
         from studyrunner.study.study_file import read_study
 
@@ -245,7 +246,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         elif options.write_scene is not None:
             status = _write_scene(study, options.write_scene)
         else:
-            return _compute(ranks, study, options)
+            return _compute(ranks, machines, study, options)
     except UserError as error:
         print(f"run-study: {error}", file=sys.stderr)
         status = BAD_INPUT
@@ -261,16 +262,19 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
+    from studyrunner.mpi.hand_out import LostError, take_over
     from studyrunner.mpi.version_check import report_version
 
     report_version(ranks)
-    job = wait_for_message(ranks)
-    if job is not None:
-        from studyrunner.run import Job, work_on_job
+    try:
+        model = take_over(ranks)
+    except LostError:
+        # it is gone with what this rank was to compute with; where the others go on, they do so without both
+        os._exit(UNEXPECTED)
+    if model is not None:
+        from studyrunner.run import work_on_job
 
-        if not isinstance(job, Job):
-            raise TypeError(f"rank 0 sent {job!r} instead of a job")
-        work_on_job(ranks, job)
+        work_on_job(ranks, model)
     return CONVERGED
 
 
@@ -311,7 +315,8 @@ def _write_scene(study: Study, path: Path) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, study: Study, options: Options) -> int:
+def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
+    from studyrunner.mpi.hand_out import HandOut
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.run import Interrupted, serve_study
@@ -322,8 +327,8 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     target = check_output("-o", path, study.files)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = build_study_scene(study, _SlowSteps().say)
-    for line in compare_with_archived(study, model):
+    model = HandOut(ranks, machines, build_study_scene(study, _SlowSteps().say))
+    for line in compare_with_archived(study, model.value):
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:
         with progress:

@@ -22,7 +22,7 @@ from studyrunner.mpi.crashes import (
     note_tasks,
     read_tally,
 )
-from studyrunner.mpi.ranks import Ranks
+from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
 from studyrunner.netcdf.output import holds_finished_result, parts_folder, remove_leftovers
 from studyrunner.plan.identity import Identities, hash_of_kind
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
     from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
+    from studyrunner.mpi.hand_out import HandOut
     from studyrunner.netcdf.gather import Gathered
 
 
@@ -56,9 +57,8 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for the tasks of a study. folder: of the run, which not all ranks need see."""
+    """What every rank needs for the tasks of a study beside its model. folder: of the run, which not all need see."""
 
-    model: ReducedModel
     friction_coefficient: float | None
     law: WearLaw
     folder: Path
@@ -84,7 +84,7 @@ class RunSummary:
 def serve_study(
     ranks: Ranks,
     study: Study,
-    model: ReducedModel,
+    hand_out: HandOut[ReducedModel],
     path: Path,
     progress: ProgressDisplay,
     *,
@@ -98,8 +98,10 @@ def serve_study(
 
     Parameters
     ----------
-    ranks, study, model
+    ranks, study
         The ranks, and what they are to compute.
+    hand_out
+        The reduced model of the study's scene, which every rank gets.
     path
         The result file. Beside it is the folder in which an earlier run has left what it had.
     progress
@@ -120,6 +122,7 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; what there is has been written.
     """
+    model = hand_out.value
     facts = replace(describe_scene(model), static_response=static_response(model))
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
@@ -161,10 +164,11 @@ def serve_study(
             return _summarise(plan, n_found, gathered, keep_finished)
 
         try:
-            job = Job(model, study.friction_coefficient, study.wear_law, store.folder)
+            hand_out.send()
+            job = Job(study.friction_coefficient, study.wear_law, store.folder)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
-            with _evaluator(job, rank=0) as evaluate:
+            with _evaluator(model, job, rank=0) as evaluate:
                 run_tasks(ranks, completion, evaluate, progress)
             progress.say("writing the result")
             summary = write()
@@ -231,15 +235,18 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
     )
 
 
-def work_on_job(ranks: Ranks, job: Job) -> None:
-    """Any other rank: computes tasks until there are none."""
-    with _evaluator(job, ranks.rank) as evaluate:
+def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
+    """Any other rank, once it has got the model: computes tasks until there are none."""
+    job = wait_for_message(ranks)
+    if not isinstance(job, Job):
+        raise TypeError(f"rank 0 sent {job!r} instead of a job")
+    with _evaluator(model, job, ranks.rank) as evaluate:
         work_on_tasks(ranks, evaluate)
 
 
-def _evaluator(job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
+def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
     """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
-    compute = build_evaluator(job.model, job.friction_coefficient, job.law)
+    compute = build_evaluator(model, job.friction_coefficient, job.law)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         given: set[int] = set()

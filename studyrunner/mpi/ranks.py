@@ -67,8 +67,11 @@ class Ranks(Protocol):
         The receiver has to be looking for messages: a large one moves only while its sender is in the MPI library.
         """
 
-    def receive(self) -> tuple[int, object] | None:
-        """The rank that sent the next message and the message, or None where there is none yet."""
+    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
+        """The rank that sent the next message and the message, or None where there is none yet.
+
+        rank: takes what this one sent only; what others have sent stays where it is.
+        """
 
     def close(self) -> None:
         """Ends the communication in good order; called once, by every rank."""
@@ -91,7 +94,7 @@ class Alone:
     def flush(self) -> None:
         """Nothing was sent."""
 
-    def receive(self) -> tuple[int, object] | None:
+    def receive(self, rank: int | None = None) -> tuple[int, object] | None:  # noqa: ARG002 - as in Ranks
         """Nobody sends."""
         return None
 
@@ -146,12 +149,13 @@ class MpiRanks:
             time.sleep(POLL_SECONDS)
             self._forget_sent()
 
-    def receive(self) -> tuple[int, object] | None:
+    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
         """As in Ranks."""
         with uninterrupted():
             status = self._mpi.Status()
+            source = self._mpi.ANY_SOURCE if rank is None else rank
             # The matched probe takes the message out at once: a receive after it gets this one and no other.
-            matched = self._world.improbe(status=status)
+            matched = self._world.improbe(source, status=status)
             return None if matched is None else (status.Get_source(), matched.recv())
 
     def close(self) -> None:
@@ -204,10 +208,10 @@ class TolerantRanks(MpiRanks):
             except self._mpi.Exception as error:
                 self._note_lost(error)
 
-    def receive(self) -> tuple[int, object] | None:
+    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
         """As in Ranks."""
         try:
-            return super().receive()
+            return super().receive(rank)
         except self._mpi.Exception as error:
             self._note_lost(error)
             return None

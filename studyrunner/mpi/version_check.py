@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import time
+from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +21,15 @@ _REMEDY = "install the same software for all ranks"
 _PACKAGES = ("fretwear", "numba", "numpy", "scipy")
 _SOURCE = "source of run-study"
 _SOURCES = ("solver", "studies", "studyrunner")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where a rank is. host: its name. boot, processes: what tells machines of one name, and containers, apart."""
+
+    host: str
+    boot: str
+    processes: str
 
 
 def describe_software() -> dict[str, str]:
@@ -38,12 +49,28 @@ def describe_software() -> dict[str, str]:
 
 
 def report_version(ranks: Ranks) -> None:
-    """Any other rank: tells rank 0 what it runs."""
-    ranks.send((platform.node(), describe_software()), 0)
+    """Any other rank: tells rank 0 where it is and what it runs."""
+    ranks.send((describe_machine(), describe_software()), 0)
 
 
-def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
+def describe_machine() -> Machine:
+    """Where this process is. Ranks of the same machine see each other's processes."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+        processes = Path("/proc/self/ns/pid").readlink().as_posix()
+    except OSError:
+        # no such system: each is alone
+        boot, processes = "", str(os.getpid())
+    return Machine(platform.node(), boot, processes)
+
+
+def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> dict[int, Machine]:
     """Rank 0: compares what the other ranks run with what it runs itself.
+
+    Returns
+    -------
+    dict of int, Machine
+        Where each rank is.
 
     Raises
     ------
@@ -52,8 +79,9 @@ def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
     KeyboardInterrupt
         Where another rank was interrupted.
     """
+    machines = {0: describe_machine()}
     if ranks.size == 1:
-        return
+        return machines
     own = describe_software()
     silent = set(range(1, ranks.size))
     differences = {}
@@ -69,16 +97,18 @@ def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
             continue
         rank, said = received
         match said:
-            case (str(host), dict(software)):
+            case (Machine() as machine, dict(software)):
                 silent.discard(rank)
+                machines[rank] = machine
                 if software != own:
-                    differences[rank] = _difference(own, host, software)
+                    differences[rank] = _difference(own, machine.host, software)
             case _:
                 raise KeyboardInterrupt
     if differences:
         first = min(differences)
         more = f" (and {len(differences) - 1} more)" if len(differences) > 1 else ""
         raise LauncherError(f"rank {first}{more} {differences[first]}: {_REMEDY}")
+    return machines
 
 
 def _difference(own: dict[str, str], host: str, other: dict[str, str]) -> str:

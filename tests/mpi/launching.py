@@ -180,3 +180,16 @@ def _parent(pid: int) -> int:
 
 def _same_rank(one: dict[bytes, bytes], other: dict[bytes, bytes]) -> bool:
     return any(name in one and one[name] == other.get(name) for name in (b"PMI_RANK", b"OMPI_COMM_WORLD_RANK"))
+
+
+def memory_of_mapping(name: str) -> dict[str, int]:
+    """What this process has of a mapped file: all of it, and what it has copied for itself, kB."""
+    found = {"Rss": 0, "Anonymous": 0}
+    inside = False
+    for line in Path("/proc/self/smaps").read_text(encoding="utf-8", errors="replace").splitlines():
+        head, *rest = line.split()
+        if not head.endswith(":"):
+            inside = name in line
+        elif inside and head[:-1] in found:
+            found[head[:-1]] += int(rest[0])
+    return found

@@ -1,0 +1,48 @@
+"""Hands arrays of SHARED_BYTES from rank 0 to all others; to be started by the tests under mpiexec.
+
+Each of the others reads all of them and writes to `<rank>.json` their sum, and what it has of them for itself.
+CANNOT_MAP: a rank that the system does not let map the memory of others.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from studyrunner.mpi import hand_out
+from studyrunner.mpi.ranks import start_ranks
+from studyrunner.mpi.shared_memory import Address
+from studyrunner.mpi.version_check import check_versions, report_version
+from tests.mpi.launching import memory_of_mapping
+
+
+def refuse(_: Address) -> object:
+    raise PermissionError
+
+
+def share() -> None:
+    ranks = start_ranks()
+    if str(ranks.rank) == os.environ.get("CANNOT_MAP"):
+        hand_out.open_shared = refuse
+    n_bytes = int(os.environ["SHARED_BYTES"])
+    if ranks.rank == 0:
+        handed = hand_out.HandOut(ranks, check_versions(ranks), {"ones": np.ones(n_bytes // 8)})
+        handed.send()
+        value: object = handed.value
+    else:
+        report_version(ranks)
+        value = hand_out.take_over(ranks)
+    assert isinstance(value, dict)
+    said = {"sum": float(value["ones"].sum()), **memory_of_mapping("fretwear-scene")}
+    Path(f"{ranks.rank}.json").write_text(json.dumps(said), encoding="utf-8")
+    ranks.close()
+
+
+if __name__ == "__main__":
+    share()

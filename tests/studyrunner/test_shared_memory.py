@@ -1,0 +1,224 @@
+"""Arrays that several processes share, and how an object gets to all ranks of several machines."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies import build_scene
+from studyrunner.mpi import hand_out
+from studyrunner.mpi.hand_out import HandOut, LostError, take_over
+from studyrunner.mpi.shared_memory import Address, SharedObject, open_shared
+from studyrunner.mpi.version_check import Machine
+from studyrunner.scene.scene import describe_scene
+
+ROOT = Path(__file__).parents[2]
+
+READER = """
+import pickle, sys
+sys.path.insert(0, {root!r})
+from studyrunner.mpi.shared_memory import open_shared
+thing = open_shared(pickle.loads(sys.stdin.buffer.read({length})))
+print("there", flush=True)
+sys.stdin.buffer.read()
+print(float(thing["a"].sum()), flush=True)
+"""
+
+OWNER = """
+import pickle, sys, time
+sys.path.insert(0, {root!r})
+import numpy as np
+from studyrunner.mpi.shared_memory import SharedObject
+shared = SharedObject(dict(a=np.arange(100000.0)))
+sys.stdout.buffer.write(pickle.dumps(shared.address))
+sys.stdout.flush()
+time.sleep(60)
+"""
+
+
+def test_a_scene_is_the_same_with_its_arrays_in_shared_memory() -> None:
+    model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3, n_harmonics=3)
+    shared = SharedObject(model)
+    other = open_shared(shared.address)
+    assert describe_scene(shared.value).digest == describe_scene(other).digest == describe_scene(model).digest
+    stiffness = shared.value.linear[0].stiffness
+    assert stiffness.flags.writeable
+    assert stiffness.flags.aligned
+    assert not np.shares_memory(stiffness, model.linear[0].stiffness)
+    shared.close()
+
+
+def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept() -> None:
+    things = {"c": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.eye(3)), "none": np.zeros((0, 2)), "n": None}
+    things["part"] = np.arange(10.0)[::2]
+    shared = SharedObject(things)
+    shared.value["c"][0, 0] = 7.0
+    other = open_shared(shared.address)
+    assert other["c"][0, 0] == 0.0
+    for name in ("f", "none", "part"):
+        np.testing.assert_array_equal(other[name], things[name])
+    assert other["f"].flags.f_contiguous
+    assert other["n"] is None
+    shared.close()
+
+
+def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed() -> None:
+    with subprocess.Popen([sys.executable, "-c", OWNER.format(root=str(ROOT))], stdout=subprocess.PIPE) as owner:
+        assert owner.stdout is not None
+        address = pickle.dumps(pickle.load(owner.stdout))
+        reader = READER.format(root=str(ROOT), length=len(address))
+        command = [sys.executable, "-c", reader]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+            assert other.stdin is not None
+            assert other.stdout is not None
+            other.stdin.write(address)
+            other.stdin.flush()
+            assert other.stdout.readline() == b"there\n"
+            owner.send_signal(signal.SIGKILL)
+            owner.wait(timeout=30)
+            other.stdin.close()
+            assert float(other.stdout.readline()) == 99999.0 * 50000.0
+        with pytest.raises(FileNotFoundError):
+            open_shared(pickle.loads(address))
+
+
+def test_a_number_that_has_become_another_file_is_no_shared_object(tmp_path: Path) -> None:
+    shared = SharedObject({"a": np.arange(4.0)})
+    with pytest.raises(OSError, match="another file"):
+        open_shared(replace(shared.address, inode=shared.address.inode + 1))
+    with (tmp_path / "else").open("wb") as other:
+        os.dup2(other.fileno(), shared.address.descriptor)
+        with pytest.raises(OSError, match="another file"):
+            open_shared(shared.address)
+    shared.close()
+
+
+class Threads:
+    """Ranks that are threads of one process. lost: known to all at once."""
+
+    def __init__(self, rank: int, boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]], lost: set[int]) -> None:
+        self.rank, self._boxes, self._lost = rank, boxes, lost
+        self.size = 1 + max(rank for rank, _ in boxes)
+
+    @property
+    def lost(self) -> frozenset[int]:
+        return frozenset(self._lost)
+
+    def send(self, message: object, rank: int) -> None:
+        self._boxes[self.rank, rank].put(pickle.dumps(message))
+
+    def flush(self) -> None:
+        pass
+
+    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
+        for source in range(self.size) if rank is None else [rank]:
+            box = self._boxes[source, self.rank]
+            if not box.empty():
+                return source, pickle.loads(box.get())
+        return None
+
+    def close(self) -> None:
+        pass
+
+    def abort(self, status: int) -> None:
+        raise AssertionError(status)
+
+
+def hand_to_all(
+    monkeypatch: pytest.MonkeyPatch, hosts: str, refused: str = "", lost: frozenset[int] = frozenset()
+) -> tuple[dict[int, object], int]:
+    """What each rank gets, one letter a rank for the machine it is on; how often the memory of others was mapped."""
+    size = len(hosts)
+    gone = set(lost)
+    boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]] = {
+        (a, b): queue.SimpleQueue() for a in range(size) for b in range(size)
+    }
+    machines = {rank: Machine(host, "boot", "processes") for rank, host in enumerate(hosts)}
+    got: dict[int, object] = {}
+    mapped: list[str] = []
+
+    def open_here(address: Address) -> object:
+        if threading.current_thread().name in refused:
+            raise PermissionError
+        mapped.append(threading.current_thread().name)
+        return open_shared(address)
+
+    monkeypatch.setattr(hand_out, "open_shared", open_here)
+
+    def follow(rank: int) -> None:
+        ranks = Threads(rank, boxes, gone)
+        try:
+            got[rank] = take_over(ranks)
+            # what rank 0 sends next is still there
+            while (message := ranks.receive(0)) is None:
+                pass
+            assert message == (0, "next")
+        except LostError as error:
+            got[rank] = error
+
+    others = [threading.Thread(target=follow, args=(rank,), name=str(rank)) for rank in range(1, size)]
+    for rank, thread in enumerate(others, 1):
+        if rank not in lost:
+            thread.start()
+    ranks = Threads(0, boxes, gone)
+    handed = HandOut(ranks, machines, {"a": np.arange(5.0)})
+    handed.send()
+    got[0] = handed.value
+    for rank in range(1, size):
+        ranks.send("next", rank)
+    for rank, thread in enumerate(others, 1):
+        if rank not in lost:
+            thread.join(timeout=30)
+            assert not thread.is_alive()
+    return got, len(mapped)
+
+
+@pytest.mark.parametrize(
+    ("hosts", "refused", "n_mapped"),
+    [("a", "", 0), ("aaa", "", 2), ("abc", "", 0), ("abbabb", "", 4), ("abbabb", "25", 2)],
+)
+def test_every_rank_gets_it_and_those_of_a_machine_share(
+    monkeypatch: pytest.MonkeyPatch, hosts: str, refused: str, n_mapped: int
+) -> None:
+    got, mapped = hand_to_all(monkeypatch, hosts, refused)
+    assert mapped == n_mapped
+    assert sorted(got) == list(range(len(hosts)))
+    for value in got.values():
+        assert isinstance(value, dict)
+        np.testing.assert_array_equal(value["a"], np.arange(5.0))
+
+
+def test_without_shared_memory_every_rank_has_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(hand_out, "SharedObject", refuse)
+    got, mapped = hand_to_all(monkeypatch, "aabb")
+    assert mapped == 0
+    assert len(got) == 4
+
+
+def test_a_lost_rank_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    got, mapped = hand_to_all(monkeypatch, "aaabbb", lost=frozenset({1, 3}))
+    assert mapped == 2
+    assert sorted(got) == [0, 2, 4, 5]
+
+
+def test_a_rank_whose_leader_is_lost_on_the_way_says_so() -> None:
+    boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]] = {
+        (a, b): queue.SimpleQueue() for a in range(3) for b in range(3)
+    }
+    machines = {0: Machine("a", "", ""), 1: Machine("b", "", ""), 2: Machine("b", "", "")}
+    HandOut(Threads(0, boxes, set()), machines, {"a": np.arange(5.0)}).send()
+    with pytest.raises(LostError):
+        take_over(Threads(2, boxes, {1}))
