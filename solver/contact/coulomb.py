@@ -290,5 +290,5 @@ def mean_normal_tangent(
                     + other_before * basis_t[n - 1, j]
                     + other_after * basis_t[ahead, j]
                 )
-        tangent[pair] = np.dot(analysis_t, rows)
+        np.dot(analysis_t, rows, tangent[pair])
     return tangent

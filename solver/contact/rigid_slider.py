@@ -181,8 +181,8 @@ def step_plane(
         second = next_2
     out[2] = first
     out[3] = second
-    tangent[2, :] = inner[0]
-    tangent[3, :] = inner[1]
+    for k in range(5):
+        tangent[2, k], tangent[3, k] = inner[0, k], inner[1, k]
 
 
 @njit(cache=True)
@@ -263,7 +263,7 @@ def march_masses(
         largest = np.abs(predicted_t[pair, 1:]).max()
         velocity = np.zeros(2)
         for _ in range(MOST_MASS_PERIODS):
-            velocity_t[pair, :, 0] = velocity
+            velocity_t[pair, 0, 0], velocity_t[pair, 1, 0] = velocity[0], velocity[1]
             slip_work[pair] = 0.0
             for n in range(n_samples):
                 normal = max(predicted_t[pair, 0, n], 0.0)

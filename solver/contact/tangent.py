@@ -76,7 +76,8 @@ def march_tangent(
             )
             trial_1 = predicted_t[pair, 1, n] - first
             trial_2 = predicted_t[pair, 2, n] - second
-            before_dstate[:, :] = dstate
+            for column in range(width + 2):
+                before_dstate[0, column], before_dstate[1, column] = dstate[0, column], dstate[1, column]
             advance_tangent(
                 dstate,
                 basis_t[n],
@@ -166,8 +167,11 @@ def _line_tangent(
             start = dforce[n, width] * dstart[0, k] + dforce[n, width + 1] * dstart[1, k]
             closed[n, k] = dforce[n, k] + start
     harmonics = np.dot(analysis_t, closed)
-    tangent[rows : rows + m, :own] = harmonics[:, :own]
-    tangent[rows : rows + m, rows : rows + m] = harmonics[:, own:]
+    for row in range(m):
+        for k in range(own):
+            tangent[rows + row, k] = harmonics[row, k]
+        for k in range(m):
+            tangent[rows + row, rows + k] = harmonics[row, own + k]
     for k in range((2 - line) * m, (3 - line) * m):
         tangent[k, k] = 1.0
 
@@ -209,7 +213,8 @@ def start_tangent(
             )
             if status != STICK:
                 advance_tangent(moved, basis_t[n], status, normal, trial_1, trial_2, friction, columns, dforce)
-    dstart[:, :] = moved[:, :width]
+    for column in range(width):
+        dstart[0, column], dstart[1, column] = moved[0, column], moved[1, column]
 
 
 @njit(cache=True)
@@ -293,7 +298,8 @@ def mass_tangent(
                     for k in range(m):
                         leave[row, k] += by_limit * point_t[n, k]
             for place, tangent in enumerate(tangents):
-                dforce_t[n, place, : width + 2] = leave[tangent]
+                for column in range(width + 2):
+                    dforce_t[n, place, column] = leave[tangent, column]
             by_normal, by_speed = slip_work_slopes(normal, out[6])
             for column in range(width + 2):
                 work[column] += by_speed * step * leave[4, column]
@@ -302,8 +308,8 @@ def mass_tangent(
                     work[k] += by_normal * step * point_t[n, k]
             velocity[0] = out[2]
             velocity[1] = out[3]
-            entry[0, :] = leave[2]
-            entry[1, :] = leave[3]
+            for column in range(width + 2):
+                entry[0, column], entry[1, column] = leave[2, column], leave[3, column]
         # the start of the period is its end: v0 = v(x, v0)
         own_1, other_1 = entry[0, width], entry[0, width + 1]
         other_2, own_2 = entry[1, width], entry[1, width + 1]

@@ -112,4 +112,5 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
                 first = state_t[pair, 0, i] - state_t[pair, 0, j]
                 second = state_t[pair, 1, i] - state_t[pair, 1, j]
                 largest[pair] = max(largest[pair], first * first + second * second)
-    return np.sqrt(largest)
+        largest[pair] = np.sqrt(largest[pair])
+    return largest

@@ -35,7 +35,7 @@ resonance, 3 away from it)."""
 AUTOMATIC_HARMONICS = 5
 """That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
 
-COMPILE_SECONDS = 15
+COMPILE_SECONDS = 9
 """For the kernels of the solver, once on a machine."""
 
 AUTOMATIC_HARMONICS_AT_MOST = 9
