@@ -136,11 +136,11 @@ class Recorder:
             wanted = (self.cycles > before) & (self.cycles <= cycle)
             self.local += euler_error(cycle - before, abs(rate - before_rate)) if error is None else error
             # what the wear rates are wrong by for want of harmonics and samples, of all pairs together and of each
+            most = RESULTS.unknown_wear_rate_error
             for value, of in ((before_rate, before_report), (rate, report)):
                 half = 0.5 * (cycle - before)
-                wrong = min(of.certificate.wear_rate_error, RESULTS.unknown_wear_rate_error)
-                # of fixed harmonics and samples it may not have been estimated
-                self.truncation += half * value * (0.0 if np.isnan(wrong) else wrong)
+                # NaN where harmonics and samples are fixed and no state with more of them was found
+                self.truncation += half * value * np.fmin(of.certificate.wear_rate_error, most)
                 self.pair_truncation = self.pair_truncation + half * gain * of.wearing_work_error
         fraction = (self.cycles[wanted] - before) / (cycle - before) if cycle > before else np.ones(wanted.sum())
         ends = [(of.wear_depth, wear_rate(wear_coefficient, area, of.wearing_work)) for of in (before_report, report)]

@@ -192,6 +192,11 @@ def march_wear(
 
 def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tuple[Outcome, str]:
     """Outcome of a history that has come to its end, and what it does not say by itself; compared: its companion."""
+    if np.isinf(march.worst.largest) and not march.case.settings.automatic:
+        return Outcome.INACCURATE, (
+            f"from cycle {march.inaccurate_from:,.0f} on the error of the wear rate is not known: no state with more"
+            ' harmonics was found that would show it; harmonics = "auto" may'.replace(",", " ")
+        )
     if history.error_estimate > SENSITIVE_ERROR:
         # one that has reached its target has no last count
         area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.wear_depth).all(axis=1))[-1])

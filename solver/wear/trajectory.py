@@ -8,7 +8,7 @@ from typing import TypedDict
 import numpy as np
 
 from solver.accuracy.certificate import Certificate, certify
-from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.pair_error import slip_work_error
 from solver.accuracy.period_events import lacks_even
@@ -160,10 +160,12 @@ class Trajectory:
             accurate, anew = self._refine(), True
             holds = self._certify()
         self.accurate = self.accurate if not anew else accurate
-        if not self.accurate:
+        # NaN where harmonics and samples are fixed and no state with others was found to compare with
+        known = not np.isnan(self.estimate.largest)
+        if not self.accurate or not known:
             self.inaccurate_from = min(self.inaccurate_from, self.cycle)
-            if self.estimate.largest >= self.worst.largest:
-                self.worst = self.estimate
+            if not self.estimate.largest < self.worst.largest:
+                self.worst = self.estimate if known else UNKNOWN
         if not holds:
             return Outcome.CERTIFICATE_FAILED
         return self._period_doubling() if anew else Outcome.CONVERGED

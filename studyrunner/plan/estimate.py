@@ -28,9 +28,9 @@ STEPS_TO_THE_END = 100
 ITERATIONS_TO_A_FINAL_STATE = 50
 """Of the scheme "final" where it needs no march (4 to 35 pairs: 15 to 60)."""
 
-ITERATIONS_AN_ADAPTIVE_STEP = 8
-"""For one of them, steps that are refused and the coarser history included (48 pairs: 11, 336 pairs: 23 beside the
-resonance, 3 away from it)."""
+ITERATIONS_AN_ADAPTIVE_STEP = 20
+"""For one of them, steps that are refused, estimates of errors and the coarser history included, beside the resonance
+(48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away from it."""
 
 AUTOMATIC_HARMONICS = 5
 """That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -43,7 +43,7 @@ AUTOMATIC_HARMONICS_AT_MOST = 9
 
 _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
-_MATRICES_A_RANK = 2
+_MATRICES_A_RANK = 1
 
 
 def seconds_an_iteration(n_unknowns: int) -> float:
@@ -66,8 +66,7 @@ def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:
     """Memory of one rank, bytes: the libraries, what is as large as dense matrices, and the arrays of the result.
 
-    Measured 0.37 and 1.6 GB at 48 and 160 pairs with automatic harmonics, 0.44 and 1.04 GB at 160 and 336 with three:
-    within a factor of 1.3.
+    Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
 
     n_unknowns: of the largest state. automatic: whether that is one of `AUTOMATIC_HARMONICS`. built_with: bytes that
     building the scene takes beside the libraries, which every rank does.

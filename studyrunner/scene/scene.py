@@ -49,7 +49,8 @@ def _silent(_: str) -> None:
 
 
 def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -> ReducedModel:
-    """Reduced model of the study's scene, for the largest number of harmonics that the study gives.
+    """Reduced model of the study's scene, for the largest number of harmonics that the study gives and those beyond
+    that tell the error.
 
     progress: takes a line on what is done next, where that may take long.
 
@@ -68,9 +69,10 @@ def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -
 
 
 def harmonics_to_build(study: Study) -> int:
-    """Harmonics whose nodal diameters a scene is built with."""
-    given = max(study.given_harmonics, default=1)
-    return max(given, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else given
+    """Harmonics whose nodal diameters a scene is built with: also those that show the error of a given number."""
+    # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
+    shown = 2 * max(study.given_harmonics, default=0) + 3
+    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
 
 
 def _build(study: Study, progress: Callable[[str], None]) -> ReducedModel:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN
 from solver.accuracy.refinement import Refined, refine
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -235,7 +236,7 @@ def test_a_companion_that_was_lost_once_is_followed_again(
 )
 def test_a_sensitive_volume_is_told_with_what_differs(other: float, error: float, said: str) -> None:
     area = np.array([2.0])
-    march: Any = SimpleNamespace(joint=SimpleNamespace(contact=SimpleNamespace(area=area)))
+    march: Any = SimpleNamespace(joint=SimpleNamespace(contact=SimpleNamespace(area=area)), worst=NOTHING)
     history: Any = SimpleNamespace(error_estimate=error, wear_depth=np.array([[0.0], [0.5e-9]]))
     outcome, message = march_module._judge(march, history, np.array([[0.0], [0.5e-9 * other]]))
     assert outcome is Outcome.SENSITIVE
@@ -243,12 +244,15 @@ def test_a_sensitive_volume_is_told_with_what_differs(other: float, error: float
 
 
 @pytest.mark.slow
-def test_a_state_whose_wear_rate_is_not_known_counts_for_its_own_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("error", [np.inf, np.nan])
+def test_a_state_whose_wear_rate_is_not_known_counts_for_its_own_stretch(
+    monkeypatch: pytest.MonkeyPatch, error: float
+) -> None:
     usual, report = worn("implicit", 1000.0), Trajectory.report
 
     def not_known(self: Trajectory) -> Any:
         known = report(self)
-        unknown = replace(known.certificate, wear_rate_error=np.inf)
+        unknown = replace(known.certificate, wear_rate_error=error)
         return replace(known, certificate=unknown) if self.cycle == 1000.0 else known
 
     monkeypatch.setattr(Trajectory, "report", not_known)
@@ -256,3 +260,12 @@ def test_a_state_whose_wear_rate_is_not_known_counts_for_its_own_stretch(monkeyp
     history = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
     assert usual.error_estimate < history.error_estimate < 10.0
     assert np.isfinite(history.worn_volume_error).all()
+
+
+def test_a_volume_whose_error_nothing_tells_says_that() -> None:
+    fixed = SimpleNamespace(settings=SolverSettings(harmonics=1, samples=32))
+    march: Any = SimpleNamespace(case=fixed, worst=UNKNOWN, inaccurate_from=0.0)
+    history: Any = SimpleNamespace(error_estimate=10.0)
+    outcome, message = march_module._judge(march, history, np.zeros((2, 1)))
+    assert outcome is Outcome.INACCURATE
+    assert message.startswith("from cycle 0 on the error of the wear rate is not known: no state with more harmonics")

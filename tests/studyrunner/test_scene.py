@@ -63,8 +63,9 @@ def test_a_wave_is_built_for_automatic_harmonics() -> None:
     assert describe_scene(build_study_scene(study)).largest_harmonics == AUTOMATIC_HARMONICS_OF_A_WAVE
 
 
-@pytest.mark.parametrize(("harmonics", "largest"), [("[2, 4]", 4), ("['auto', 2]", 13), ("['auto', 14]", 14)])
-def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, largest: int) -> None:
+@pytest.mark.parametrize(("harmonics", "largest"), [("[2, 4]", 11), ("['auto', 2]", 13), ("['auto', 14]", None)])
+def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, largest: int | None) -> None:
+    # those two levels up are there, too, which show the error
     study = read_study("dovetail", (*WAVE, f"axes.harmonics={harmonics}"))
     assert describe_scene(build_study_scene(study)).largest_harmonics == largest
 
@@ -73,7 +74,7 @@ def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, large
 def wave_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """Study of a scene file with the nodal diameters of 3 harmonics."""
     monkeypatch.chdir(tmp_path)
-    write_scene(build_study_scene(read_study("dovetail", (*WAVE, "solver.harmonics=3"))), tmp_path / "wave.h5")
+    write_scene(holding(build_study_scene(read_study("dovetail", WAVE)), 3), tmp_path / "wave.h5")
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
     return "s.toml"
 
