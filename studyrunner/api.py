@@ -14,6 +14,7 @@ from studyrunner.mpi.hand_out import HandOut
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
 from studyrunner.mpi.version_check import describe_machine
+from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.door import check_dataset, reading_errors
 from studyrunner.report.reading.result import open_vetted
@@ -35,6 +36,7 @@ def run_study(
     fresh: bool = False,
     retry_failed: bool = False,
     prune: bool = False,
+    date: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
@@ -59,6 +61,8 @@ def run_study(
         Compute points that failed in an earlier run once more.
     prune
         Remove what other studies have left in the folder, once this is finished.
+    date
+        `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
     progress
         Whether stderr tells how far the run is.
 
@@ -84,13 +88,24 @@ def run_study(
         study = read_study(study, overrides)
     elif overrides:
         raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
+    checked = None if date is None else check_date(date, "run_study", "date")
     target = _check_output(Path(f"{study.study.name}.nc" if output is None else output), study)
     try:
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
         with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
             alone = Alone()
             model = HandOut(alone, {0: describe_machine()}, build_study_scene(study))
-            serve_study(alone, study, model, target, shown, fresh=fresh, retry_failed=retry_failed, prune=prune)
+            serve_study(
+                alone,
+                study,
+                model,
+                target,
+                shown,
+                fresh=fresh,
+                retry_failed=retry_failed,
+                prune=prune,
+                date=checked,
+            )
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left

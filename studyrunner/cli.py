@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
+from studyrunner.netcdf.creation_date import NOW, check_date
 from studyrunner.system.endings import take_endings
 from studyrunner.system.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
@@ -63,7 +64,7 @@ is in the folder OUT.nc.parts; with it a study that is changed computes only wha
 
 @dataclass(frozen=True)
 class Options:
-    """The command line. output: None for `<study name>.nc` in the current folder."""
+    """The command line. output: None for `<study name>.nc` in the current folder. date: checked, None for none."""
 
     study: str
     output: Path | None
@@ -74,6 +75,7 @@ class Options:
     fresh: bool
     retry_failed: bool
     prune: bool
+    date: str | None
 
 
 class _SlowSteps:
@@ -156,7 +158,17 @@ def parse_options(arguments: Sequence[str]) -> Options:
         action="store_true",
         help="remove what other studies have left in OUT.nc.parts, once this is finished",
     )
-    return Options(**vars(parser.parse_args(list(arguments))))
+    parser.add_argument(
+        "--date",
+        nargs="?",
+        const=NOW,
+        metavar="ISO",
+        help="date_created of the result: a date, or now; without it equal runs have equal files",
+    )
+    found = vars(parser.parse_args(list(arguments)))
+    if found["date"] is not None:
+        found["date"] = check_date(found["date"], "command line", "--date")
+    return Options(**found)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -343,6 +355,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
                 fresh=options.fresh,
                 retry_failed=options.retry_failed,
                 prune=options.prune,
+                date=options.date,
             )
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"

@@ -91,6 +91,7 @@ def serve_study(
     fresh: bool = False,
     retry_failed: bool = False,
     prune: bool = False,
+    date: str | None = None,
 ) -> RunSummary:
     """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
 
@@ -112,6 +113,8 @@ def serve_study(
         Whether points that failed there are computed again.
     prune
         Whether what other studies have left there is removed at the end.
+    date
+        Of creation, as `check_date` gives it; None for none in the file.
 
     Raises
     ------
@@ -157,7 +160,7 @@ def serve_study(
             from studyrunner.netcdf.gather import gather
 
             store.flush()
-            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished)
+            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished, date)
             for doubt in gathered.doubts:
                 if doubt not in said:
                     progress.note(doubt)

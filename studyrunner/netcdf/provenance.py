@@ -37,8 +37,9 @@ _COMMENT = (
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes of the file. None of them depends on when, where or on how many ranks the study ran.
 
-    So there is no date_created: equal runs have equal files, but for the run times that they measure. For the same
-    reason the id is a hash of what the result depends on: it names the result, whoever computes it.
+    So there is no date_created unless it is asked for: equal runs have equal files, but for the run times that they
+    measure. For the same reason the id is a hash of what the result depends on: it names the result, whoever computes
+    it.
     """
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
