@@ -24,7 +24,10 @@ from studyrunner.mpi.crashes import (
 )
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
+from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.output import holds_finished_result, parts_folder, remove_leftovers
+from studyrunner.netcdf.provenance import PACKAGES
+from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
@@ -134,6 +137,8 @@ def serve_study(
     of_scene = build_scene_variables(study, model)
     kept_scene = scene_to_keep(study, model)
     keep_finished = holds_finished_result(path)
+    # as it is when the run begins: a checkout may be another one at its end
+    software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind)
     with contextlib.closing(store):
@@ -160,7 +165,8 @@ def serve_study(
             from studyrunner.netcdf.gather import gather
 
             store.flush()
-            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished, date)
+            origin = {**software, **describe_date(date)}
+            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished, origin)
             for doubt in gathered.doubts:
                 if doubt not in said:
                     progress.note(doubt)

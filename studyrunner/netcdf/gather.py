@@ -23,7 +23,6 @@ from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
 from studyrunner.checkpoint.records import empty_record, variable_sizes
 from studyrunner.checkpoint.store import Store
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
-from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
@@ -86,7 +85,7 @@ def gather(
     of_scene: Sequence[SceneVariable] = (),
     scene: KeptScene | None = None,
     keep_finished: bool = False,
-    date: str | None = None,
+    origin: Mapping[str, str] | None = None,
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
@@ -106,8 +105,8 @@ def gather(
         What goes into the group of the scene, None for none.
     keep_finished
         `path` holds a finished result, and is left as it is where points of this one are missing.
-    date
-        Of creation, as `check_date` gives it; None for none.
+    origin
+        Attributes on where and when the result was made, which are no part of it.
 
     Raises
     ------
@@ -120,10 +119,10 @@ def gather(
         return gathered
     try:
         with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
-            origin = {} if scene is None else scene.origin
-            file.setncatts({**describe_run(study, facts), **origin, "certificate_summary": gathered.certificates})
+            of_model = {} if scene is None else scene.origin
+            file.setncatts({**describe_run(study, facts), **of_model, "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
-            file.setncatts(describe_date(date))
+            file.setncatts(origin or {})
             if gathered.doubts:
                 file.setncattr("plausibility", "\n".join(gathered.doubts))
             _write_values(file, study, facts, completion.store, index)

@@ -1,0 +1,81 @@
+"""Which software made a result: where it is published and its commit, where that is known.
+
+Nothing of this is needed for a result: whatever is missing, damaged or slow is left out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+CHANGED = " with local changes"
+"""Ends the text of a commit some of whose files were changed since."""
+
+_PUBLISHED_AS = ("repository", "source", "source code", "homepage", "documentation")
+_SECONDS_FOR_GIT = 5.0
+
+
+def describe_software(name: str) -> dict[str, str]:
+    """Attributes of a result, `software_url` and `software_commit`; each only where it is known.
+
+    Parameters
+    ----------
+    name
+        Of the distribution.
+    """
+    origin = _installed_from(metadata.distribution(name).read_text("direct_url.json"))
+    url = published_at(metadata.metadata(name).get_all("Project-URL") or [])
+    # the checkout that the code is run from, if it is one; else what was installed
+    commit = commit_of(Path(__file__).parents[2]) or origin.get("commit_id", "")
+    found = {"software_url": url or origin.get("url", ""), "software_commit": commit}
+    return {key: text for key, text in found.items() if text}
+
+
+def published_at(urls: list[str]) -> str:
+    """The URL under which the source is found, of the labelled ones of a package; empty where there is none."""
+    labelled = {label.strip().lower(): url.strip() for label, _, url in (line.partition(",") for line in urls)}
+    return next((labelled[label] for label in _PUBLISHED_AS if labelled.get(label)), "")
+
+
+def commit_of(folder: Path) -> str:
+    """Commit that is checked out in a folder, with `CHANGED` where files of it were changed; empty where it is unknown.
+
+    A folder inside a checkout, as an environment may be, is none.
+    """
+    if not (folder / ".git").exists():
+        return ""
+    # a hook or an alias of the caller's own repository, whose variables are set, is not meant; nothing is written
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    command = ["git", "-C", str(folder), "describe", "--always", "--exclude=*", "--abbrev=40", "--dirty"]
+    try:
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=_SECONDS_FOR_GIT,
+            check=True,
+            env={**clean, "GIT_OPTIONAL_LOCKS": "0"},
+        )
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return ""
+    commit = done.stdout.strip()
+    return commit.removesuffix("-dirty") + CHANGED if commit.endswith("-dirty") else commit
+
+
+def _installed_from(text: str | None) -> Mapping[str, str]:
+    """Commit and, where everybody can follow it, URL of a package that was installed from a repository (PEP 610)."""
+    try:
+        found = json.loads(text or "{}")
+        info, url = found.get("vcs_info"), found.get("url")
+        if not isinstance(info, dict):
+            return {}
+        commit = info.get("commit_id")
+    except (ValueError, AttributeError):
+        return {}
+    known = {"commit_id": commit, "url": url if isinstance(url, str) and url.startswith("https://") else ""}
+    return {key: value for key, value in known.items() if isinstance(value, str)}

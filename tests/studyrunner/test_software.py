@@ -1,0 +1,125 @@
+"""Commit and URL of the software in a result: only where they are known, and no trouble where they are not."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+import netCDF4
+import pytest
+
+from studyrunner.cli import main
+from studyrunner.netcdf import software
+from studyrunner.netcdf.software import CHANGED, commit_of, describe_software, published_at
+from tests.studyrunner.faked_runs import SMALL, Solver
+
+WHO = ("-c", "user.name=a", "-c", "user.email=b")
+
+
+def git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", "-C", str(folder), *WHO, *arguments], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", "/dev/null")
+    folder = tmp_path / "checkout"
+    folder.mkdir()
+    git(folder, "init", "-q")
+    (folder / "a.py").write_text("one", encoding="utf-8")
+    git(folder, "add", "a.py")
+    git(folder, "commit", "-qm", "one")
+    return folder
+
+
+def test_the_commit_is_that_of_git(checkout: Path) -> None:
+    head = git(checkout, "rev-parse", "HEAD")
+    assert len(head) == 40
+    assert commit_of(checkout) == head
+    git(checkout, "tag", "-a", "v1", "-m", "a name is no commit")
+    assert commit_of(checkout) == head
+    (checkout / "a.py").write_text("two", encoding="utf-8")
+    assert commit_of(checkout) == head + CHANGED
+    git(checkout, "commit", "-qam", "two")
+    assert commit_of(checkout) == git(checkout, "rev-parse", "HEAD") != head
+    tree = checkout.parent / "tree"
+    git(checkout, "worktree", "add", "-q", str(tree), head)
+    assert commit_of(tree) == head
+
+
+def test_an_environment_in_a_checkout_is_none(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inside = checkout / "lib"
+    inside.mkdir()
+    assert commit_of(inside) == ""
+    # and a hook of another repository does not lead away
+    monkeypatch.setenv("GIT_DIR", str(checkout / "nowhere"))
+    assert len(commit_of(checkout)) == 40
+
+
+def test_whatever_is_wrong_is_left_out(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (checkout / ".git" / "HEAD").write_text("garbage", encoding="utf-8")
+    assert commit_of(checkout) == ""
+    monkeypatch.setenv("PATH", str(checkout))
+    assert commit_of(checkout) == ""
+    monkeypatch.undo()
+
+    def hang(command: list[str], **_: object) -> None:
+        raise subprocess.TimeoutExpired(command, 5.0)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    assert commit_of(checkout) == ""
+
+
+def test_the_url_is_that_of_the_source() -> None:
+    urls = ["Changelog, https://a.example/log", "Homepage, https://a.example", "Repository, https://b.example/r"]
+    assert published_at(urls) == "https://b.example/r"
+    assert published_at(urls[:2]) == "https://a.example"
+    assert published_at([*urls[:1], "homepage, "]) == ""
+
+
+@pytest.mark.parametrize(
+    ("direct_url", "expected"),
+    [
+        (None, {}),
+        ("no json", {}),
+        ("[1]", {}),
+        (json.dumps({"url": "file:///home/me", "dir_info": {"editable": True}}), {}),
+        (
+            json.dumps({"url": "https://b.example/r", "vcs_info": {"vcs": "git", "commit_id": "a" * 40}}),
+            {"software_url": "https://b.example/r", "software_commit": "a" * 40},
+        ),
+        (
+            json.dumps({"url": "file:///home/me/r", "vcs_info": {"vcs": "git", "commit_id": "a" * 40}}),
+            {"software_commit": "a" * 40},
+        ),
+        (json.dumps({"url": 3, "vcs_info": {"commit_id": 4}}), {}),
+    ],
+)
+def test_a_package_from_a_repository_says_its_commit(
+    direct_url: str | None, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    about = tmp_path / "tool-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: tool\nVersion: 1\n", encoding="utf-8")
+    if direct_url is not None:
+        (about / "direct_url.json").write_text(direct_url, encoding="utf-8")
+    monkeypatch.setattr(metadata, "distribution", lambda _: metadata.Distribution.at(about))
+    monkeypatch.setattr(metadata, "metadata", lambda _: metadata.Distribution.at(about).metadata)
+    monkeypatch.setattr(software, "commit_of", lambda _: "")
+    assert describe_software("tool") == expected
+
+
+@pytest.mark.usefixtures("reader", "folder")
+def test_it_stands_in_the_result_and_is_no_part_of_it(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for known in ({}, {"software_url": "https://b.example/r", "software_commit": "b" * 40}):
+        monkeypatch.setattr("studyrunner.run.describe_software", lambda _, known=known: known)
+        assert main(SMALL) == 0
+        with netCDF4.Dataset("out.nc") as file:
+            found.append({name: file.getncattr(name) for name in file.ncattrs()})
+        n_results = solver.n_results
+    assert found[1] == found[0] | {"software_url": "https://b.example/r", "software_commit": "b" * 40}
+    assert n_results == 6
