@@ -46,7 +46,7 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": study.study.title or study.study.name,
-        "summary": "Fretting wear of a joint under vibration: wear histories over the axes of a parameter study.",
+        "summary": _summarise(study, facts),
         "keywords": "fretting wear, contact, dry friction, vibration, harmonic balance",
         "id": hashlib.sha256("\n".join((text, facts.digest, solver)).encode()).hexdigest()[:32],
         "naming_authority": PACKAGES[0],
@@ -61,6 +61,23 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
         "solver_digest": solver,
         "scene_sha256": facts.digest,
     }
+
+
+def _summarise(study: Study, facts: SceneFacts) -> str:
+    """What ACDD calls an abstract: what was computed, for what and over which ranges."""
+    pairs = "one contact pair" if len(facts.area) == 1 else f"{len(facts.area)} contact pairs"
+    ranges = [
+        f"{name} {min(values):.6g} to {max(values):.6g} ({len(values)} values)"
+        if all(isinstance(value, float | int) for value in values)
+        else f"{name} {', '.join(map(str, values))}"
+        for name, values in study.dimensions.items()
+        if len(values) > 1
+    ]
+    over = f", over {'; '.join(ranges)}" if ranges else ""
+    return (
+        f"Fretting wear of a joint under vibration: wear histories of the scene {study.scene.model} with {pairs}{over}."
+        " Wear depths and worn volume, contact pressures and slip, vibration, and the errors of each."
+    )
 
 
 def describe_versions() -> str:

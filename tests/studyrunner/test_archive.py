@@ -134,7 +134,7 @@ def test_a_written_scene_gives_the_same_result(wave: tuple[str, ...], folder: Pa
     assert "mesh_quad" in own
     assert list(own.variables) == list(file.variables)
     differing = {name for name in own.attrs if own.attrs[name] != file.attrs[name]}
-    assert differing == {"study", "id"}
+    assert differing == {"study", "id", "summary"}
     own.attrs = file.attrs = {}
     xr.testing.assert_identical(own, file)
 

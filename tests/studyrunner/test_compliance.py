@@ -71,23 +71,30 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_compliance_checker_passes(result: Path) -> None:
     done = subprocess.run([sys.executable, CHECK, str(result)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
-    assert said["n_checks"] > 50
+    as_it_is, mended = json.loads(done.stdout).values()
+    assert min(as_it_is["n_checks"], mended["n_checks"]) > 50
     left = []
-    for checker, weight, name, message in said["complaints"]:
+    for checker, weight, name, message in mended["complaints"]:
         if checker == "acdd:1.3" and message == "standard_name":
             # the table of standard names knows geophysics: it has no name for any of these, and inventing one breaks CF
             continue
         attribute = message.removeprefix("Attr ").split()[0]
         if checker == "acdd:1.3" and weight < 3 and attribute.startswith(NOT_OF_THIS_DATA):
             continue
-        if checker == "cf:1.11" and weight < 3 and "wear_coefficient (Z)" in message:
-            # 1/Pa is taken for a pressure, which would be a height and stand on the right
-            continue
         left.append((checker, weight, name, message))
     assert left == []
-    # it subtracts the words of an axis from each other; CF has nothing against them
-    assert set(said["broken"]) <= {"check_coordinate_variables_strict_monotonicity"}
+    assert mended["broken"] == {}
+
+    # What the two faults of the checker cost, which run_compliance_checker.py names: a height would stand on the right,
+    # and the words of `scheme`, `sweep`, `response` and `component` are subtracted from each other.
+    of_faults = [complaint for complaint in as_it_is["complaints"] if complaint not in mended["complaints"]]
+    assert all(
+        (checker, weight, name) == ("cf:1.11", 2, "§2.4 Dimensions") and "wear_coefficient (Z)" in message
+        for checker, weight, name, message in of_faults
+        if message != "standard_name"
+    )
+    assert set(as_it_is["broken"]) <= {"check_coordinate_variables_strict_monotonicity"}
+    assert all("'str'" in message for message in as_it_is["broken"].values())
 
 
 def test_the_header_reads_like_documentation(result: Path) -> None:
@@ -109,6 +116,9 @@ def test_the_header_reads_like_documentation(result: Path) -> None:
         assert set(np.unique(outcome[:])) <= set(outcome.flag_values.tolist())
         for word in ("positive when the pair closes", "compression", "Re(X exp(i omega t))", "run-study"):
             assert word in file.comment
+        for word in ("scene.h5 with", "frequency 211.5 to 212 (2 values)", "scheme implicit, adaptive"):
+            assert word in file.summary
+        assert "excitation_amplitude" not in file.summary
         assert "Salles" in file.references
         for name in ("fretwear", "numpy", "scipy", "numba", "h5py", "netCDF4", "Python"):
             assert name in file.versions
