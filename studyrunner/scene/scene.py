@@ -142,7 +142,7 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
 
 @dataclass(frozen=True)
 class KeptScene:
-    """What a result file keeps of a scene file: its attributes, and its datasets by name with groups.
+    """What a result file keeps of a scene, as scene files have it: attributes, and datasets by name with groups.
 
     origin: attributes of the result on the files of a finite-element model.
     """
@@ -153,8 +153,8 @@ class KeptScene:
 
 
 def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
-    """The whole content of a scene file; None of a bundled scene, which its parameters give again."""
-    if study.scene.is_bundled:
+    """The whole content of a scene file; of a bundled scene, which its parameters give again, only on request."""
+    if study.scene.is_bundled and not study.outputs.scene:
         return None
     from studies.scene_layout import scene_attributes, scene_datasets
 

@@ -167,6 +167,9 @@ class OutputsSection(Section):
     loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field(
         (), description="indices of the contact pairs whose fretting loops are kept"
     )
+    scene: Switch = Field(
+        False, description="whether the reduced model of a bundled scene is kept, as that of a scene file always is"
+    )
 
 
 class SceneFileParameters(Section):
@@ -193,8 +196,8 @@ class SceneSection(Section):
 
     @property
     def is_bundled(self) -> bool:
-        """Whether it is one of the bundled scenes, which needs no file."""
-        return self.path is None and self.files is None
+        """Whether it is one of the bundled scenes, which needs no file; a result may hold what it was built to."""
+        return not (names_file(self.model) or names_model(self.model))
 
 
 class Study(Section):

@@ -101,7 +101,9 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     if twice:
         value = _section(table, "solver")[twice[0]]
         raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
-    sections["scene"] = _check_scene(_section(table, "scene"), source, path, archived)
+    # only what was kept on request takes the place of what a bundled scene builds
+    kept = archived if _section(table, "outputs").get("scene") is True else None
+    sections["scene"] = _check_scene(_section(table, "scene"), source, path, archived, kept)
     moved = _move_solver_axes(sections)
     try:
         return _check(Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, "")
@@ -212,7 +214,10 @@ def _move_solver_axes(sections: Table) -> dict[str, str]:
     return moved
 
 
-def _check_scene(table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:
+def _check_scene(
+    table: Table, source: str, path: Path, archived: Archived | None, kept: Archived | None
+) -> SceneSection:
+    """The scene in a table. kept: the result that may hold what a bundled scene was built to, None to build it."""
     parameters = dict(table)
     model = parameters.pop("model", None)
     if model is None:
@@ -229,7 +234,12 @@ def _check_scene(table: Table, source: str, path: Path, archived: Archived | Non
         offers = tuple(name for name, function in _OFFERED.items() if scene_has(model, function))
     except SceneError as error:
         raise UserError(source, "scene.model", model, error.remedy) from None
-    return SceneSection(model=model, parameters=_check(kind, parameters, source, "scene"), offers=offers)
+    checked, found = _check(kind, parameters, source, "scene"), {}
+    if kept is not None and kept.holds_scene and model == kept.scene.get("model"):
+        before = {key: value for key, value in kept.scene.items() if key != "model"}
+        if checked == _check(kind, before, source, "scene"):
+            found = _find_scene(model, source, path, kept)
+    return SceneSection(model=model, parameters=checked, **{**found, "offers": offers})
 
 
 def _check_model_scene(model: str, table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:

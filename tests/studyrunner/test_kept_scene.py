@@ -1,0 +1,129 @@
+"""`outputs.scene`: the reduced model of a bundled scene stands in the result, which is then run with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies.scene_file import read_scene
+from studies.scenes import build_scene
+from studyrunner.cli import main
+from studyrunner.scene import scene as scene_room
+from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.study.study_file import read_study
+
+pytestmark = pytest.mark.usefixtures("reader", "folder")
+
+SLIDER = ["sdof_slider", "--set", "axes.frequency=[150, 160]", "--set", "slow_time.cycles=2000"]
+SLIDER += ["--set", "slow_time.outputs=3", "--set", "outputs.variables=['default', 'exact']"]
+KEEP = ["--set", "outputs.scene=true"]
+
+
+def contents(path: str) -> xr.Dataset:
+    with xr.open_dataset(path) as result:
+        return result.load().drop_vars("run_time")
+
+
+@pytest.fixture
+def not_built(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From when it is called on, bundled scenes cannot be built."""
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("built again")
+
+    return lambda: monkeypatch.setattr(scene_room, "build_scene", refuse)
+
+
+@pytest.mark.slow
+def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
+    assert main([*SLIDER, "-o", "plain.nc"]) == 0
+    assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
+    plain, kept = contents("plain.nc"), contents("kept.nc")
+    assert {name for name in kept.attrs if kept.attrs[name] != plain.attrs[name]} == {"study", "id"}
+    xr.testing.assert_identical(kept.drop_attrs(), plain.drop_attrs())
+    with netCDF4.Dataset("plain.nc") as file:
+        assert "scene" not in file.groups
+
+    not_built()
+    assert main(["kept.nc", "-o", "again.nc"]) == 0
+    xr.testing.assert_identical(contents("again.nc"), kept)
+    with netCDF4.Dataset("kept.nc") as one, netCDF4.Dataset("again.nc") as other:
+        assert one["scene/stiffness"][:].tolist() == other["scene/stiffness"][:].tolist()
+        assert set(one["scene"].groups) == {"contact", "load", "response"}
+    assert main(["again.nc", "--write-scene", "slider.h5"]) == 0
+    assert describe_scene(read_scene("slider.h5")).digest == kept.attrs["scene_sha256"]
+
+
+@pytest.mark.slow
+def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], capsys: pytest.CaptureFixture) -> None:
+    """Twice all masses, stiffnesses and forces, and half the wear coefficient: the same motion and the same wear."""
+    assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
+    with h5py.File("kept.nc", "r+") as file:
+        for name in ("mass", "damping", "stiffness", "load/static", "load/harmonic", "contact/normal_load"):
+            values = file[f"scene/{name}"]
+            values[...] = 2.0 * values[...]
+    not_built()
+    capsys.readouterr()
+    one = contents("kept.nc")
+    half = ["--set", f"axes.wear_coefficient={0.5 * one.wear_coefficient.item()!r}"]
+    assert main(["kept.nc", *half, "-o", "twice.nc"]) == 0
+    assert "another scene" in capsys.readouterr().err
+    twice = contents("twice.nc")
+    assert float(one.worn_volume.max()) > 0.0
+    for name, factor in (("response_amplitude", 1.0), ("worn_volume", 1.0), ("mean_pressure", 2.0)):
+        np.testing.assert_allclose(twice[name].values, factor * one[name].values, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_other_parameters_build_the_scene_anew() -> None:
+    start = ["--set", "slow_time.cycles=0", "--set", "axes.frequency=150"]
+    assert main(["sdof_slider", *start, *KEEP, "-o", "kept.nc"]) == 0
+    before = read_study("kept.nc")
+    assert (before.scene.path, before.scene.group, before.scene.is_bundled) == (Path("kept.nc"), "scene", True)
+    assert read_study("kept.nc", ["outputs.scene=false"]).scene.path is None
+    heavy = read_study("kept.nc", ["scene.mass=0.11"])
+    assert heavy.scene.path is None
+    expected = build_scene("sdof_slider", heavy.scene.parameters, 5)
+    assert describe_scene(build_study_scene(heavy)).digest == describe_scene(expected).digest
+    assert main(["kept.nc", "--set", "scene.mass=0.11", "-o", "heavy.nc"]) == 0
+    with netCDF4.Dataset("heavy.nc") as file:
+        assert file["scene/mass"][-1, -1] == 0.11
+    # another study altogether takes nothing from the file
+    assert read_study("kept.nc", ["scene={model = 'two_masses'}"]).scene.path is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wave", [(), ("scene.nodal_diameter=3", "scene.n_sectors=20")], ids=["standing", "travelling"])
+def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave: tuple[str, ...], not_built: Callable[[], None]) -> None:
+    coarse = ("scene.mesh=1", "scene.stuck_modes=5", "axes.frequency=211.5", "slow_time.cycles=0", "outputs.scene=true")
+    overrides = ("axes.scheme=implicit", "outputs.loops=[]", "outputs.variables=['worn_volume', 'mesh']")
+    study = read_study("dovetail", [*coarse, *overrides, *wave, "solver.harmonics=2", "solver.samples=32"])
+    model = build_study_scene(study)
+    digest = describe_scene(model).digest
+    settings = [part for text in (*coarse, *overrides, *wave) for part in ("--set", text)]
+    settings += ["--set", "solver.harmonics=2", "--set", "solver.samples=32"]
+    assert main(["dovetail", *settings, "-o", "kept.nc"]) == 0
+    not_built()
+    kept = read_study("kept.nc")
+    assert describe_scene(build_study_scene(kept)).digest == digest
+    assert "mesh" in kept.scene.offers
+    assert kept.scene.parameters == study.scene.parameters
+    assert main(["kept.nc", "--write-scene", "root.h5"]) == 0
+    with h5py.File("root.h5") as file:
+        assert "mesh/quad" in file
+        assert set(file.get("nd", ())) == ({str(number) for number in model.linear} if wave else set())
+        assert not wave or {0, 3, 6} <= set(model.linear)
+
+
+def test_it_is_yes_or_no(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sdof_slider", "--set", "outputs.scene=some"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "outputs.scene" in said[0]
