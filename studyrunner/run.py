@@ -186,6 +186,7 @@ def serve_study(
         if summary.n_left == 0:
             forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
             completion.prune(0.0 if prune else MOST_OF_OTHERS)
+            completion.pack()
     return summary
 
 

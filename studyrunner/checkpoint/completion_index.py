@@ -207,6 +207,14 @@ class CompletionIndex:
         """Leaves at most so many bytes in the store that are not of this study; for 0 bytes nothing else."""
         self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
 
+    def pack(self) -> None:
+        """All is finished, and the store takes as little room as it can; the last call before it is closed."""
+        for branch, keys in zip(self.plan.branches, self._starts, strict=True):
+            # nothing is left to be followed; that of a march which was given up for its time is what it goes on from
+            if all(self.store.has_start(key) for key in keys):
+                self.store.forget_progress(self.key(branch))
+        self.store.pack()
+
     def _all_histories(self) -> set[str]:
         return set(itertools.chain.from_iterable(self._histories.values()))
 

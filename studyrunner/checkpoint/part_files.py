@@ -37,14 +37,15 @@ Rows = Sequence[int]
 """Places of entries in a file."""
 
 
-class _Summed:
-    """A file that is written, with the sum of what was written so far."""
+class Summed:
+    """A file that is being written, with the sum of what was written so far."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
         self._sum = 0
 
     def write(self, content: bytes | memoryview) -> int:
+        """Writes so much more."""
         self._sum = zlib.crc32(content, self._sum)
         return self._file.write(content)
 
@@ -55,7 +56,7 @@ class _Summed:
 
 def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
     """Records (n,) of one type, piece by piece."""
-    _write_pieces(file, pieces[0].dtype, sum(map(len, pieces)), pieces)
+    write_pieces(file, pieces[0].dtype, sum(map(len, pieces)), pieces)
 
 
 def load_records(path: Path) -> NDArray[np.void]:
@@ -84,10 +85,10 @@ def load_record_keys(path: Path) -> tuple[np.dtype[np.void], list[str]]:
         Where it cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
-        _check_sum(file)
+        check_sum(file)
         kind, n_records = _read_record_header(file)
         keys: list[str] = []
-        for _, n_rows in _portions(n_records, kind):
+        for _, n_rows in portions(n_records, kind):
             records = np.frombuffer(file.read(n_rows * kind.itemsize), kind)
             keys += [_text(key) for key in records[KEY].tolist()]
     return kind, keys
@@ -97,16 +98,16 @@ def merge_records(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None
     """Writes records of some files, of one type, into a new one."""
     for path, _ in sources:
         with open_plain(path, LARGEST_PART) as source:
-            _check_sum(source)
+            check_sum(source)
     kind = load_records(sources[0][0]).dtype
-    _write_pieces(file, kind, sum(len(rows) for _, rows in sources), _records_of(sources))
+    write_pieces(file, kind, sum(len(rows) for _, rows in sources), records_of(sources))
 
 
-def _records_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[NDArray[np.void]]:
+def records_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[NDArray[np.void]]:
     """Records of some files, piece by piece."""
     for path, rows in sources:
         # each piece from the file anew: what was used of it once does not stay in memory
-        for first, n_rows in _portions(len(rows), load_records(path).dtype):
+        for first, n_rows in portions(len(rows), load_records(path).dtype):
             yield load_records(path)[list(rows[first : first + n_rows])]
 
 
@@ -119,7 +120,7 @@ def write_bundle(file: IO[bytes], entries: Mapping[str, Packed]) -> None:
 def load_keys(path: Path) -> list[str]:
     """Keys of a bundle. Raises ValueError where any of it is damaged and OSError where it cannot be read."""
     with open_plain(path, LARGEST_PART) as file:
-        _check_sum(file)
+        check_sum(file)
         return list(_Contents.of(file).keys)
 
 
@@ -135,7 +136,7 @@ def merge_bundles(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None
     lengths: list[int] = []
     for path, rows in sources:
         with open_plain(path, LARGEST_PART) as source:
-            _check_sum(source)
+            check_sum(source)
             contents = _Contents.of(source)
             keys += [contents.keys[row] for row in rows]
             lengths += [contents.ends[row] - contents.begins[row] for row in rows]
@@ -174,9 +175,9 @@ class _Contents:
 
 
 def _write_entries(file: IO[bytes], keys: Sequence[str], lengths: Sequence[int], entries: Iterable[bytes]) -> None:
-    summed = _Summed(file)
+    summed = Summed(file)
     for column in (np.array(keys, KEY_TYPE), np.cumsum(lengths, dtype="<i8")):
-        _write_header(summed, column.dtype, len(column))
+        write_header(summed, column.dtype, len(column))
         summed.write(column.tobytes())
     for entry in entries:
         summed.write(entry)
@@ -201,30 +202,32 @@ def _arrays_in(content: bytes) -> Iterator[NDArray[np.generic]]:
         yield npy.read_array(buffer, allow_pickle=False)
 
 
-def _write_header(file: _Summed, kind: np.dtype[np.generic], length: int) -> None:
+def write_header(file: Summed, kind: np.dtype[np.generic], length: int) -> None:
+    """Writes type and length of an array of one dimension, whose elements follow."""
     header = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": (length,)}
     npy.write_array_header_1_0(file, header)
 
 
-def _read_header(file: IO[bytes]) -> tuple[np.dtype[Any], int]:
-    """Type and length of an array of one dimension that is no larger than the file. Raises ValueError."""
+def read_header(file: IO[bytes], largest: int = 0) -> tuple[np.dtype[Any], int]:
+    """Type and length of an array of one dimension. Raises ValueError where it is larger than the file or `largest`."""
     if npy.read_magic(file) != (1, 0):
         raise ValueError("not written by a run")
     shape, _, kind = npy.read_array_header_1_0(file)
-    if len(shape) != 1 or kind.hasobject or not 0 < kind.itemsize * shape[0] <= os.fstat(file.fileno()).st_size:
+    largest = largest or os.fstat(file.fileno()).st_size
+    if len(shape) != 1 or kind.hasobject or not 0 < kind.itemsize * shape[0] <= largest:
         raise ValueError("not written by a run")
     return kind, shape[0]
 
 
 def _read_column(file: IO[bytes], expected: str) -> NDArray[np.generic]:
-    kind, length = _read_header(file)
+    kind, length = read_header(file)
     if kind != np.dtype(expected):
         raise ValueError("not written by a run")
     return np.frombuffer(file.read(kind.itemsize * length), kind)
 
 
-def _check_sum(file: IO[bytes]) -> None:
-    """Raises ValueError where a file is not what was written; it is read on from where it was."""
+def check_sum(file: IO[bytes]) -> None:
+    """Reads through a file. Raises ValueError where it is not what was written; it is read on from where it was."""
     before = file.tell()
     file.seek(0)
     left, found = os.fstat(file.fileno()).st_size - _CHECK_SUM_BYTES, 0
@@ -235,16 +238,17 @@ def _check_sum(file: IO[bytes]) -> None:
     file.seek(before)
 
 
-def _write_pieces(file: IO[bytes], kind: np.dtype[np.void], n_records: int, pieces: Iterable[NDArray[np.void]]) -> None:
-    summed = _Summed(file)
-    _write_header(summed, kind, n_records)
+def write_pieces(file: IO[bytes], kind: np.dtype[np.void], n_records: int, pieces: Iterable[NDArray[np.void]]) -> None:
+    """Writes a file of n_records records, which come in pieces."""
+    summed = Summed(file)
+    write_header(summed, kind, n_records)
     for piece in pieces:
-        for first, n_rows in _portions(len(piece), kind):
+        for first, n_rows in portions(len(piece), kind):
             summed.write(piece[first : first + n_rows].tobytes())
     summed.end()
 
 
-def _portions(n_records: int, kind: np.dtype[np.void]) -> Iterator[tuple[int, int]]:
+def portions(n_records: int, kind: np.dtype[np.void]) -> Iterator[tuple[int, int]]:
     """First record and number of records of parts that are no larger than is read at once."""
     step = max(1, _BYTES_AT_ONCE // kind.itemsize)
     return ((first, min(step, n_records - first)) for first in range(0, n_records, step))
@@ -252,7 +256,7 @@ def _portions(n_records: int, kind: np.dtype[np.void]) -> Iterator[tuple[int, in
 
 def _read_record_header(file: IO[bytes]) -> tuple[np.dtype[Any], int]:
     """Type and number of records, which follow. Raises ValueError where the file has another length."""
-    kind, n_records = _read_header(file)
+    kind, n_records = read_header(file)
     if file.tell() + n_records * kind.itemsize + _CHECK_SUM_BYTES != os.fstat(file.fileno()).st_size:
         raise ValueError("the file has another length than it says")
     return kind, n_records

@@ -1,5 +1,7 @@
 """What is written at once into a run's folder: some new files, then old ones made into one, then what is left over.
 
+A run begins with unpacking what is there, and ends with packing it.
+
 A new file is written under a temporary name, put on the disk and renamed; that its name is on the disk as well comes
 before anybody hears of it, and before anything is removed that it stands for. So neither a kill nor a loss of power
 costs what was said to be there.
@@ -18,6 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
+from studyrunner.checkpoint.packed_files import (
+    pack_file,
+    pack_records,
+    packed_path,
+    unpack_file,
+    unpack_records,
+    unpacked_path,
+)
 from studyrunner.checkpoint.part_files import Rows, merge_bundles, merge_records, write_bundle, write_records
 from studyrunner.checkpoint.shelf import PartFile
 from studyrunner.system import files
@@ -119,6 +129,19 @@ class PartWriter:
             return Written(new, merged)
         return Written(new, ())
 
+    def pack(self, sort: str, file: PartFile) -> None:
+        """Puts a packed file in the place of one, which stays where there is no room for it or it cannot be read."""
+        put, target = pack_records if sort == RECORDS else pack_file, packed_path(file.path)
+        with contextlib.suppress(OSError, ValueError):
+            self._write_as(target, sort, file.number, lambda packed: put(packed, file.path))
+            files.sync_folder(self.folder)
+            self._remove([file.path])
+
+    def unpack(self, sort: str, number: int, packed: Path) -> None:
+        """Writes a packed file as it was, beside it. Raises OSError; ValueError where it is damaged."""
+        put = unpack_records if sort == RECORDS else unpack_file
+        self._write_as(unpacked_path(packed), sort, number, lambda file: put(file, packed))
+
     def _merge(self, merge: Merge) -> PartFile:
         put_together = merge_records if merge.sort == RECORDS else merge_bundles
         keys = [source.keys[row] for source, rows in merge.sources for row in rows]
@@ -126,8 +149,15 @@ class PartWriter:
         return self._write(merge.sort, merge.number, keys, lambda file: put_together(file, sources))
 
     def _write(self, sort: str, number: int, keys: Sequence[str], write: Callable[[IO[bytes]], None]) -> PartFile:
-        path = self.folder / f"{number:08d}-{self.run}{sort}"
-        partial = path.with_name(path.name + PARTIAL)
+        path = self.folder / self._name(sort, number)
+        return PartFile(number, path, keys, self._write_as(path, sort, number, write), ours=True)
+
+    def _name(self, sort: str, number: int) -> str:
+        return f"{number:08d}-{self.run}{sort}"
+
+    def _write_as(self, path: Path, sort: str, number: int, write: Callable[[IO[bytes]], None]) -> int:
+        """Number of bytes that were written."""
+        partial = self.folder / (self._name(sort, number) + PARTIAL)
         try:
             with files.create(partial) as file:
                 write(file)
@@ -140,7 +170,7 @@ class PartWriter:
         except ValueError:
             partial.unlink(missing_ok=True)
             raise
-        return PartFile(number, path, keys, n_bytes, ours=True)
+        return n_bytes
 
     def _remove(self, paths: Iterable[Path]) -> None:
         for path in paths:

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from studyrunner.checkpoint.packed_files import PACKED, packed_kind, packed_path, unpacked_path
 from studyrunner.checkpoint.part_files import load_keys, load_record_keys
-from studyrunner.checkpoint.part_writer import PARTIAL, PROGRESS, RECORDS, STARTS
+from studyrunner.checkpoint.part_writer import PARTIAL, PROGRESS, RECORDS, STARTS, PartWriter
 from studyrunner.checkpoint.shelf import PartFile, Shelf
-from studyrunner.system.files import NotPlainError
+from studyrunner.system import files
 
-_PART = re.compile(r"(\d{8})(-[0-9a-f]{12})?(\.npy|\.starts|\.progress)")
+_PART = re.compile(r"(\d{8})(-[0-9a-f]{12})?(\.npy|\.starts|\.progress)(\.z)?")
 _OF_ANOTHER_VERSION = re.compile(r"\d{8}\.starts\.npz|[0-9a-f]{32}\.progress\.npz")
 
 
@@ -32,24 +33,36 @@ class Stock:
     left_over: list[Path]
 
 
-def take_stock(folder: Path, kind: np.dtype[np.void], *, alone: bool) -> Stock:
-    """Looks through a folder. kind: of a record. alone: whether no other run is at work there.
+def take_stock(writer: PartWriter, kind: np.dtype[np.void], *, alone: bool) -> Stock:
+    """Looks through a folder and unpacks what this study can use.
+
+    writer: into the folder. kind: of a record. alone: whether no other run is at work there.
 
     What is damaged is no more than time lost. A file that cannot be read for another reason is not: raises OSError.
     """
-    known = sorted(folder.iterdir())
+    known = sorted(writer.folder.iterdir())
     shelves = {STARTS: Shelf(), RECORDS: Shelf(), PROGRESS: Shelf()}
     others: list[PartFile] = []
     damaged: list[Path] = []
+    unpacked: list[Path] = []
     last = 0
     for number, (path, match) in enumerate((path, match) for path in known if (match := _PART.fullmatch(path.name))):
         last = max(last, number, int(match[1]))
         try:
-            file, of_this_kind = _look_into(path, match[3], number, kind, alone)
+            if match[4] and (match[3] != RECORDS or packed_kind(path) == kind):
+                writer.unpack(match[3], number, path)
+                unpacked.append(path)
+                found = unpacked_path(path)
+            elif packed_path(path) in known:
+                # a run has ended between writing the one and removing the other: what is packed is whole
+                continue
+            else:
+                found = path
+            file, of_this_kind = _look_into(found, match[3], number, kind, alone)
         except FileNotFoundError:
             # of a run that is at work here, where there are no locks
             continue
-        except NotPlainError:
+        except files.NotPlainError:
             damaged.append(path)
         except (OSError, MemoryError):
             # a disk that fails for now is no reason to throw anything away
@@ -63,7 +76,10 @@ def take_stock(folder: Path, kind: np.dtype[np.void], *, alone: bool) -> Stock:
                 shelves[match[3]].put(file)
             else:
                 others.append(file)
-    left_over = [path for path in known if _is_left_over(path)] if alone else []
+    if unpacked:
+        # what was unpacked is on the disk before what it was packed in goes
+        files.sync_folder(writer.folder)
+    left_over = [*unpacked, *(path for path in known if _is_left_over(path))] if alone else []
     for shelf in shelves.values():
         left_over += [file.path for file in shelf.take_dead()]
     return Stock(shelves, others, last, [path.name for path in damaged], left_over)
@@ -74,6 +90,8 @@ def _look_into(path: Path, sort: str, number: int, kind: np.dtype[np.void], alon
     n_bytes = path.lstat().st_size
     if sort != RECORDS:
         return PartFile(number, path, load_keys(path), n_bytes, alone), True
+    if path.name.endswith(PACKED):
+        return PartFile(number, path, (), n_bytes, alone), False
     found, keys = load_record_keys(path)
     return PartFile(number, path, keys, n_bytes, alone), found == kind
 

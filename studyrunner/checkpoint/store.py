@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
+from studyrunner.checkpoint.packed_files import PACKED
 from studyrunner.checkpoint.part_files import load_records, read_entry
 from studyrunner.checkpoint.part_writer import PROGRESS, RECORDS, STARTS, Batch, Job, Merge, PartWriter, Written
 from studyrunner.checkpoint.shelf import PartFile, Place, Shelf
@@ -66,7 +67,8 @@ class Store:
         except OSError as error:
             raise StorageError(folder, error) from error
         try:
-            found = take_stock(folder, kind, alone=self._lock.holds)
+            self._part_writer = PartWriter(folder, secrets.token_hex(6))
+            found = take_stock(self._part_writer, kind, alone=self._lock.holds)
         except OSError as error:
             self._lock.close()
             raise StorageError(folder, error) from error
@@ -79,7 +81,7 @@ class Store:
                 f"{folder.name}: there are no locks on this file system, so nothing keeps a second run out: give each"
                 " run a result file of its own with -o"
             )
-        self._writer = Writer(PartWriter(folder, secrets.token_hex(6)).write)
+        self._writer = Writer(self._part_writer.write)
 
     @property
     def locked(self) -> bool:
@@ -235,6 +237,16 @@ class Store:
                 for key in set(shelf.places).difference(keys):
                     shelf.forget(key)
             self.remove_forgotten()
+
+    def pack(self) -> None:
+        """Packs all files, where no other run is at work; the last call before `close`, as nothing is read after it."""
+        self.remove_forgotten()
+        if not self.locked:
+            return
+        packed = [(sort, file) for sort, shelf in self._shelves.items() for file in shelf.files.values()]
+        of_others = [(RECORDS, file) for file in self._others if not file.path.name.endswith(PACKED)]
+        for sort, file in (*packed, *of_others):
+            self._part_writer.pack(sort, file)
 
     def close(self) -> None:
         """Writes what waits, as far as there is room, and lets other runs into the folder."""

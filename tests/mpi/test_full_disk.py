@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from studyrunner.checkpoint.packed_files import unpack_file, unpacked_path
 from studyrunner.checkpoint.part_files import load_keys
 from tests.mpi.launching import CHEAP, FAKED, results, run_to_end
 
@@ -36,8 +37,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def starts(disk: Path) -> list[str]:
-    """Keys of all start states in the folder of the run."""
-    return [key for path in (disk / "out.nc.parts").glob("*.starts") for key in load_keys(path)]
+    """Keys of all start states in the folder of the run, which a finished run has packed."""
+    folder = disk / "out.nc.parts"
+    for packed in folder.glob("*.starts.z"):
+        with unpacked_path(packed).open("wb") as file:
+            unpack_file(file, packed)
+        packed.unlink()
+    return [key for path in folder.glob("*.starts") for key in load_keys(path)]
 
 
 @pytest.mark.parametrize("n_ranks", [0, 2])

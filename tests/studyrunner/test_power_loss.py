@@ -113,13 +113,19 @@ def test_nothing_that_was_said_to_be_there_is_lost(
         store.flush()
         known[key(number)] = number
         progress[key(100)] = number
+    # ten files became one in the meantime
+    assert len(list(disk.folder.glob("*.npy"))) < 15
+    before = n_losses
+    store.pack()
     store.close()
+    assert {path.suffix for path in disk.folder.iterdir()} == {".z", ""}
+    assert n_losses > before + 3 * 3
+    Store(disk.folder, KIND).close()
+    assert ".z" not in {path.suffix for path in disk.folder.iterdir()}
     disk.watch = lambda: None
     assert n_losses > 25 * 7
     assert disk.log[:6] == ["file", "rename .starts", "file", "rename .npy", "file", "rename .progress"]
     assert disk.log[6] == "folder"
-    # ten files became one in the meantime
-    assert len(list(disk.folder.glob("*.npy"))) < 15
 
 
 def test_the_result_is_on_the_disk_before_anything_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
