@@ -5,19 +5,17 @@ from __future__ import annotations
 import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
 
 # isort: split
-import argparse
 import os
 import sys
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
-from studyrunner.netcdf.creation_date import NOW, check_date
+from studyrunner.options import Options, parse_options
 from studyrunner.system.endings import take_endings
 from studyrunner.system.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, show_text
@@ -37,46 +35,6 @@ _SECONDS_FOR_RANK_0 = 60.0
 _SECONDS_FOR_A_LINE = 2.0
 _SECONDS_WITHOUT_A_WORD = 3.0
 
-_DESCRIPTION = """\
-Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
-
-Alone, under "mpiexec -n N run-study ..." or under "srun run-study ...": the result is the same."""
-
-_EPILOG = """\
-examples:
-  run-study                                              the bundled study "dovetail" -> dovetail.nc
-  run-study --plan                                       what that would compute, and how long it takes
-  mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
-  run-study my_study.toml --check                        mass, pairs, frequencies of a finite-element model
-  run-study worn.nc -o again.nc                          the study of a result file again
-  run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
-
-exit status:
-  0  all points were computed, each with its error; the last lines say how many are within rtol
-  1  unexpected failure
-  2  bad input, nothing was computed: one line says what is wrong
-  3  finished and saved, but some points failed; their `outcome` says why
-  130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
-
-A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
-is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """The command line. output: None for `<study name>.nc` in the current folder. date: checked, None for none."""
-
-    study: str
-    output: Path | None
-    plan: bool
-    check: bool
-    overrides: list[str]
-    write_scene: Path | None
-    fresh: bool
-    retry_failed: bool
-    prune: bool
-    date: str | None
-
 
 class _SlowSteps:
     """Lines on stderr about a scene that takes long to build; none where it is built, or refused, at once."""
@@ -88,87 +46,6 @@ class _SlowSteps:
         seconds = time.monotonic() - self._began
         if seconds > _SECONDS_WITHOUT_A_WORD:
             print(f"[{seconds:5.0f} s] {doing}", file=sys.stderr, flush=True)
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that reports mistakes as UserError."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
-
-
-class _SceneHelp(argparse.Action):
-    """Prints what a bundled scene is and ends, as --help does."""
-
-    def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
-        from studies.scene_help import scene_help
-        from studies.scenes import BUNDLED
-
-        if values not in BUNDLED:
-            raise UserError("command line", "--scene-help", str(values), f"give one of {', '.join(BUNDLED)}")
-        print(scene_help(str(values)), flush=True)
-        parser.exit()
-
-
-def parse_options(arguments: Sequence[str]) -> Options:
-    """The command line. Raises UserError; SystemExit after --help and --scene-help."""
-    parser = _Parser(
-        prog="run-study",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    parser.add_argument(
-        "study",
-        nargs="?",
-        default="dovetail",
-        metavar="STUDY",
-        help="TOML file, result file or bundled study (default: dovetail)",
-    )
-    parser.add_argument(
-        "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
-    )
-    parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
-    parser.add_argument(
-        "--check", action="store_true", help="print what a finite-element model is, draw its contact pairs; then stop"
-    )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
-    )
-    parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
-    parser.add_argument(
-        "--scene-help",
-        action=_SceneHelp,
-        default=argparse.SUPPRESS,
-        metavar="SCENE",
-        help="print what a bundled scene is, and its parameters",
-    )
-    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
-    )
-    parser.add_argument(
-        "--prune",
-        action="store_true",
-        help="remove what other studies have left in OUT.nc.parts, once this is finished",
-    )
-    parser.add_argument(
-        "--date",
-        nargs="?",
-        const=NOW,
-        metavar="ISO",
-        help="date_created of the result: a date, or now; without it equal runs have equal files",
-    )
-    found = vars(parser.parse_args(list(arguments)))
-    if found["date"] is not None:
-        found["date"] = check_date(found["date"], "command line", "--date")
-    return Options(**found)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

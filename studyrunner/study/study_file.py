@@ -160,7 +160,7 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
     for name in names[:-1]:
         inner = place.setdefault(name, {})
         if not isinstance(inner, dict):
-            raise UserError(source, shown, value, f"{name} holds a value and no keys")
+            raise UserError(source, shown, value, f"{name} holds a value and no keys: give all of it")
         place = inner
     place[names[-1]] = value
     other = {"axes": "solver", "solver": "axes"}.get(names[0])

@@ -141,7 +141,7 @@ def test_overrides_take_toml_and_bare_words(tmp_path: Path) -> None:
 
 
 def test_override_of_a_part_of_a_range() -> None:
-    assert len(read_study("dovetail", ["axes.frequency.num=3"]).axes.frequency) == 3
+    assert len(read_study("sdof_slider", ["axes.frequency.num=3"]).axes.frequency) == 3
 
 
 def test_solver_key_moves_to_the_axes_by_override() -> None:
