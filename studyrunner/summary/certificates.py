@@ -22,6 +22,9 @@ from studyrunner.variables import CERTIFICATE, COORDINATES
 _NOT_OF_A_SWEEP = ("wear_coefficient", "step", "scheme")
 _FOLDS_NAMED = 5
 
+_ROUND_OFF = float(np.finfo(float).eps)
+"""Certificates are relative: less than this is none, wherever it is the most."""
+
 
 @dataclass(frozen=True, order=True)
 class _Place:
@@ -153,6 +156,8 @@ class CertificateTable:
         if name not in self._worst:
             return "not estimated" if self._n_histories else "none"
         largest, place = self._worst[name]
+        if largest < _ROUND_OFF:
+            return "none"
         where = _where(self._study, place)
         return f"{largest:.1e}" + (f" at {where}" if where else "")
 

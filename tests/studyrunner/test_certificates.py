@@ -160,3 +160,10 @@ def test_estimates_that_were_not_made() -> None:
     table = table_of(study, [changed(result, response_error=missing, residual=np.array([np.nan, 3e-9]))])
     assert table["estimated error of the response"] == "not estimated"
     assert table["scaled residual"] == "3.0e-09 at cycle 20000"
+
+
+def test_round_off_is_none_and_has_no_place() -> None:
+    study, (result,) = study_with_results(("axes.frequency=150", "axes.scheme=implicit", "slow_time.outputs=2"))
+    for tension, said in ((1.9e-23, "none"), (3e-9, "3.0e-09 at cycle 0")):
+        table = table_of(study, [changed(result, tension=np.full(2, tension))])
+        assert table["tension"] == said
