@@ -174,7 +174,7 @@ def test_overrides_are_values_or_texts() -> None:
     assert study.axes.frequency == tuple(FREQUENCIES)
     with pytest.raises(UserError, match=r"^sdof_slider: slow_time.cycle = 3: unknown key, give cycles$"):
         read_study("sdof_slider", {"slow_time.cycle": 3})
-    with pytest.raises(UserError, match=r"^overrides: study.name.x = 3: name holds a value and no keys: give all of it$"):
+    with pytest.raises(UserError, match=r"^overrides: study.name.x = 3: name holds a value and no keys: give all"):
         read_study("sdof_slider", {"study.name.x": 3})
 
 

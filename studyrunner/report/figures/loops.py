@@ -96,9 +96,20 @@ def draw_loops(result: Result) -> Iterator[Drawing | Missing]:
 
 def _find_directions(result: Result, loops: Sequence[_Loop]) -> _Directions:
     """What the tangents are called: by the scene where it is known, else by their numbers."""
-    if not any("tangent_2" in loop.force or "tangent_2" in loop.displacement for loop in loops):
+    return _directions(result, any("tangent_2" in loop.force or "tangent_2" in loop.displacement for loop in loops))
+
+
+def _directions(result: Result, both: bool) -> _Directions:
+    if not both:
         return _LONE_TANGENT
     return _OF_MODEL.get(str(result.study.get("scene", {}).get("model", "")), _OF_FILE)
+
+
+def component_labels(result: Result, both: bool) -> dict[str, str]:
+    """The components of a loop in words; in place of {} stands a displacement or a force. both: whether a pair has
+    two tangents.
+    """
+    return {"normal": "normal {}", **dict(zip(_TANGENTS, _directions(result, both).labels, strict=True))}
 
 
 def _deepest(result: Result) -> int:

@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS
+from studyrunner.report.figures.loops import component_labels
 from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.page.root import build_root_numbers
@@ -232,9 +233,8 @@ def _loops(
     if not result.has(*LOOPS) or not result.held.any():
         return None, 0.0
     first = int(np.flatnonzero(result.held)[0])
-    held = np.flatnonzero(
-        np.isfinite(_read(result.dataset["loop_force"], _Kept(np.array([first]), cycles[:1]))).any(axis=(0, 1, 3, 4))
-    )
+    force = _read(result.dataset["loop_force"], _Kept(np.array([first]), cycles[:1]))
+    held = np.flatnonzero(np.isfinite(force).any(axis=(0, 1, 3, 4)))
     if not len(held):
         return None, 0.0
     sizes = result.dataset.sizes
@@ -243,12 +243,17 @@ def _loops(
     _say_what_is_kept("Loops", kept, cycles, result, notes)
     if not len(kept.points):
         return None, 0.0
+    components = [str(name) for name in result.dataset["component"].values]
+    # a pair without a second tangent holds NaN or zero there
+    second = force[..., components.index("tangent_2")] if "tangent_2" in components else np.zeros(1)
+    labels = component_labels(result, both=bool(np.nan_to_num(second).any()))
     content = {
         "points": kept.points.tolist(),
         "cycles": np.searchsorted(cycles, kept.cycles).tolist(),
         "contacts": result.dataset["contact"].values[held].tolist(),
         "phases": int(sizes["phase"]),
-        "components": [str(name) for name in result.dataset["component"].values],
+        "components": components,
+        "labels": [labels.get(name, f"{name} {{}}") for name in components],
         "variables": {name: _variable(result, name, kept, held) for name in LOOPS},
     }
     return content, float(each * len(kept.points) * len(kept.cycles))

@@ -357,6 +357,8 @@ def test_histories_and_loops_are_those_of_the_point(page: Any, dataset: xr.Datas
     (loop,) = page.execute_script(
         "return document.getElementById('loop-plot').data.filter(({meta}) => meta === 'loop').map(({x, y}) => [x, y])"
     )
+    title = page.execute_script("return document.getElementById('loop-plot').layout.xaxis.title.text")
+    assert title.startswith(("displacement along tangent 2", "displacement along the flank"))
     for name, shown in zip(("loop_displacement", "loop_force"), loop, strict=True):
         values = dataset[name].values.reshape(16, 5, 24, 16, 3)[1, 4, 5, :, 2]
         np.testing.assert_allclose(shown, np.append(values, values[0]), rtol=1e-6)

@@ -109,7 +109,7 @@ function prepare() {
   if (loops) {
     state.component = Math.max(loops.components.indexOf("tangent_1"), 0);
     addChoice("loop-choice", "pair", "pair", loops.contacts.map(String), 0, (i) => { state.loop = i; drawLoop(); });
-    addChoice("loop-choice", "component", "component", loops.components.map((name) => name.replace("_", " ")), state.component, (i) => { state.component = i; drawLoop(); });
+    addChoice("loop-choice", "component", "direction", loops.labels.map((label) => label.replace("{}", "").trim()), state.component, (i) => { state.component = i; drawLoop(); });
   }
   byId("loop-part").hidden = !loops;
   byId("course-part").hidden = cycles.length < 2 || data.without.length === data.outcome.length || !(courses.worn_volume || courses.wear_rate);

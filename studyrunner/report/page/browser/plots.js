@@ -260,9 +260,9 @@ function drawLoop() {
       line: { color: now ? data.colours[0] : "#8c8c8c", width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
       hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
-  const name = loops.components[state.component].replace("_", " ");
+  const name = (quantity) => loops.labels[state.component].replace("{}", quantity);
   Plotly.react("loop-plot", traces, layout({
     height: 340, uirevision: `${state.loop} ${state.component}`, showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    xaxis: axisLayout(titled(`${name} displacement`, displacement.unit)), yaxis: axisLayout("", upright(`${name} force`, force.unit)),
+    xaxis: axisLayout(titled(name("displacement"), displacement.unit)), yaxis: axisLayout("", upright(name("force"), force.unit)),
   }), CONFIG);
 }

@@ -28,7 +28,7 @@ const mappable = trends.filter((entry) => axesOf(entry).length > 1);
 
 function shortText(axis, place) {
   const value = axes[axis].values[place];
-  return axes[axis].words ? value : digits(value, 4);
+  return axes[axis].words ? value : digits(value, 9);
 }
 
 // The value with its error or why there is none, and what varies.
