@@ -251,12 +251,20 @@ def _loops(
         "points": kept.points.tolist(),
         "cycles": np.searchsorted(cycles, kept.cycles).tolist(),
         "contacts": result.dataset["contact"].values[held].tolist(),
+        "widest": _widest(result, held),
         "phases": int(sizes["phase"]),
         "components": components,
         "labels": [labels.get(name, f"{name} {{}}") for name in components],
         "variables": {name: _variable(result, name, kept, held) for name in LOOPS},
     }
     return content, float(each * len(kept.points) * len(kept.cycles))
+
+
+def _widest(result: Result, held: NDArray[np.int64]) -> int:
+    """Which of the pairs moves furthest in the point that is shown first, unworn: the others may well stick."""
+    loops = result.dataset["loop_displacement"].isel({"cycle": 0, "contact": held, **result.shown_point()})
+    moved = np.ptp(loops.transpose("contact", "phase", "component").values, axis=1)
+    return int(np.argmax(np.nan_to_num(moved).max(axis=1)))
 
 
 def _say_what_is_kept(what: str, kept: _Kept, cycles: NDArray[np.int64], result: Result, notes: list[str]) -> None:

@@ -108,7 +108,8 @@ function prepare() {
   prepareRoot();
   if (loops) {
     state.component = Math.max(loops.components.indexOf("tangent_1"), 0);
-    addChoice("loop-choice", "pair", "pair", loops.contacts.map(String), 0, (i) => { state.loop = i; drawLoop(); });
+    state.loop = loops.widest;
+    addChoice("loop-choice", "pair", "pair", loops.contacts.map(String), state.loop, (i) => { state.loop = i; drawLoop(); });
     addChoice("loop-choice", "component", "direction", loops.labels.map((label) => label.replace("{}", "").trim()), state.component, (i) => { state.component = i; drawLoop(); });
   }
   byId("loop-part").hidden = !loops;

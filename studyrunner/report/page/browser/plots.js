@@ -261,8 +261,15 @@ function drawLoop() {
       hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
   const name = (quantity) => loops.labels[state.component].replace("{}", quantity);
+  // pairs that stick are upright lines, which may stand on the edge of the plot otherwise
+  const room = (key) => {
+    const values = traces.flatMap((trace) => trace[key]).filter(Number.isFinite);
+    const [low, high] = [Math.min(...values), Math.max(...values)];
+    return high > low ? { range: [low - 0.05 * (high - low), high + 0.05 * (high - low)] } : {};
+  };
   Plotly.react("loop-plot", traces, layout({
     height: 340, uirevision: `${state.loop} ${state.component}`, showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    xaxis: axisLayout(titled(name("displacement"), displacement.unit)), yaxis: axisLayout("", upright(name("force"), force.unit)),
+    xaxis: { ...axisLayout(titled(name("displacement"), displacement.unit)), ...room("x") },
+    yaxis: { ...axisLayout("", upright(name("force"), force.unit)), ...room("y") },
   }), CONFIG);
 }
