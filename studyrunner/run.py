@@ -186,7 +186,9 @@ def serve_study(
         if summary.n_left == 0:
             forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
             completion.prune(0.0 if prune else MOST_OF_OTHERS)
-            completion.pack()
+            # the result stands: what an ending keeps from being packed is packed by the next run
+            with contextlib.suppress(KeyboardInterrupt):
+                completion.pack()
     return summary
 
 

@@ -213,6 +213,19 @@ def test_a_run_that_is_finished_packs_and_goes_on_from_it(solver: Solver) -> Non
     assert solver.n_results == 6
 
 
+@pytest.mark.usefixtures("reader", "folder", "solver")
+def test_an_ending_while_files_are_packed_is_none_of_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    def end(_: Store) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "pack", end)
+        assert main(SMALL) == 0
+    assert not list(Path("out.nc.parts").glob("*.z"))
+    assert main(SMALL) == 0
+    assert list(Path("out.nc.parts").glob("*.z"))
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("reader", "folder")
 @pytest.mark.parametrize("study", ["sdof_slider", "two_masses"])
