@@ -14,13 +14,23 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.image import AxesImage
 from matplotlib.textpath import TextPath
+from matplotlib.ticker import AutoLocator, MaxNLocator
 from numpy.typing import NDArray
 
 WIDTH = 7.5
 """Inches of a figure across a printed page: 190 mm, both columns of a journal."""
+
+COLUMN_WIDTH = 3.55
+"""Inches of a figure in one column of a journal: 90 mm."""
+
+_COLUMN_HEIGHT = 2.6
+_COLUMN_LABEL = 28
+"""Characters of a vertical label that fit beside such a panel."""
 
 DPI = 120
 
@@ -80,14 +90,25 @@ class Drawing:
     figure: Figure
 
     def save(self, folder: Path) -> tuple[Path, Path]:
-        """Write `<name>.svg` and `<name>.png` into a folder that exists; both paths."""
-        paths = folder / f"{self.name}.svg", folder / f"{self.name}.png"
+        """Write `<name>.svg` and `<name>.png` into a folder that exists; both paths.
+
+        A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column.
+        """
         with style():
-            self.figure.savefig(paths[0], format="svg", metadata={"Date": None})
-            # What stands where is the same for both: it is found once.
-            self.figure.set_layout_engine("none")
-            self.figure.savefig(paths[1], format="png", dpi=PRINT_DPI)
+            paths = _save(self.figure, folder / self.name)
+            if self.fits_column:
+                set_in_column(self.figure)
+                _save(self.figure, folder / f"{self.name}_column")
         return paths
+
+    @property
+    def fits_column(self) -> bool:
+        """Whether it has one plane panel, no map, and its legend names what is drawn in it."""
+        panels, legends = self.figure.axes, self.figure.legends
+        if len(panels) != 1 or panels[0].name != "rectilinear" or panels[0].findobj(_is_map):
+            return False
+        labels = set(panels[0].get_legend_handles_labels()[1])
+        return all({text.get_text() for text in legend.get_texts()} <= labels for legend in legends)
 
 
 @dataclass(frozen=True)
@@ -117,6 +138,34 @@ def style() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def _is_map(artist: Artist) -> bool:
+    return isinstance(artist, QuadMesh | AxesImage)
+
+
+def _save(figure: Figure, path: Path) -> tuple[Path, Path]:
+    """The figure as SVG and as PNG; `path` is without a suffix. From then on what stands where is fixed."""
+    svg, png = path.with_name(f"{path.name}.svg"), path.with_name(f"{path.name}.png")
+    figure.savefig(svg, format="svg", metadata={"Date": None})
+    # What stands where is the same for both: it is found once.
+    figure.set_layout_engine("none")
+    figure.savefig(png, format="png", dpi=PRINT_DPI)
+    return svg, png
+
+
+def set_in_column(figure: Figure) -> None:
+    """Lay a figure of one panel out anew, as wide as a column of a journal; its text keeps its size."""
+    figure.set_size_inches(COLUMN_WIDTH, _COLUMN_HEIGHT)
+    figure.set_layout_engine("constrained")
+    for legend in figure.legends:
+        legend.remove()
+    (panel,) = figure.axes
+    panel.set_ylabel(textwrap.fill(panel.get_ylabel(), _COLUMN_LABEL, break_on_hyphens=False))
+    if isinstance(panel.yaxis.get_major_locator(), AutoLocator):
+        # steps of 2.5 have one digit more: with them the layout goes to and fro
+        panel.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    add_legend(figure)
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from studyrunner.report.drawing import WIDTH, Drawing, add_legend, new_panels, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, add_legend, new_panels, set_in_column, style
 from studyrunner.report.gallery import draw_report
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_loops, with_sector
@@ -41,15 +42,21 @@ def test_nothing_is_covered_or_cut_off(case: str) -> None:
     result: Callable[[], Result] = CASES[case]
     drawings = [item for item in draw_report(result()) if isinstance(item, Drawing)]
     assert sum(bool(_legends(drawing)) for drawing in drawings) >= 3
-    for drawing in drawings:
+    assert case == "precision" or sum(drawing.fits_column for drawing in drawings) >= 5
+    for drawing, width_in_print in [*((one, WIDTH) for one in drawings), *((one, COLUMN_WIDTH) for one in drawings)]:
         figure = drawing.figure
+        if width_in_print == COLUMN_WIDTH:
+            if not drawing.fits_column:
+                continue
+            with style():
+                set_in_column(figure)
         canvas = FigureCanvasAgg(figure)
         with style():
             figure.draw_without_rendering()
         renderer = canvas.get_renderer()
         inside = figure.get_tightbbox(renderer)
         width, height = figure.get_size_inches()
-        assert width == WIDTH
+        assert width == width_in_print
         assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -_THIN / figure.dpi, drawing.name
         boxes = [panel.get_window_extent(renderer) for panel in figure.axes]
         for legend in _legends(drawing):
@@ -87,3 +94,20 @@ def test_a_legend_names_each_label_once_and_its_figure_grows() -> None:
         add_legend(empty)
     assert 3.0 < heights[0] < heights[1]
     assert not empty.legends
+
+
+@pytest.mark.slow
+def test_figures_of_one_panel_are_saved_for_a_column_too(tmp_path: Path) -> None:
+    drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
+    assert drawings["final_worn_volume"].fits_column
+    assert not drawings["worn_volume_map"].fits_column
+    for name in ("final_worn_volume", "worn_volume_map"):
+        drawings[name].save(tmp_path)
+    expected = {f"{name}.{suffix}" for name in drawings for suffix in ("svg", "png") if "worn_volume" in name}
+    found = {path.name for path in tmp_path.iterdir()}
+    assert found == {each for each in expected if each.startswith(("final_worn_volume", "worn_volume_map"))} | {
+        "final_worn_volume_column.svg",
+        "final_worn_volume_column.png",
+    }
+    pixels = (tmp_path / "final_worn_volume_column.png").read_bytes()[16:20]
+    assert int.from_bytes(pixels) == 1065  # 90 mm at 300 dpi
