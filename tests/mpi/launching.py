@@ -193,3 +193,15 @@ def memory_of_mapping(name: str) -> dict[str, int]:
         elif inside and head[:-1] in found:
             found[head[:-1]] += int(rest[0])
     return found
+
+
+def processes_may_share() -> bool:
+    """Whether the system lets one process map the memory of another one; where it does not, each has its own copy."""
+    if not hasattr(os, "memfd_create"):
+        return False
+    descriptor = os.memfd_create("test", os.MFD_CLOEXEC)
+    try:
+        opening = f"open('/proc/{os.getpid()}/fd/{descriptor}', 'rb')"
+        return subprocess.run([sys.executable, "-c", opening], capture_output=True, check=False).returncode == 0
+    finally:
+        os.close(descriptor)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mpi.launching import ROOT
+from tests.mpi.launching import ROOT, processes_may_share
 from tests.mpi.test_ranks import start
 
 SCRIPT = str(ROOT / "tests/mpi/share_arrays.py")
@@ -16,6 +16,8 @@ N_BYTES = 64_000_000
 
 @pytest.mark.parametrize("refused", [None, 2])
 def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path: Path, refused: int | None) -> None:
+    if not processes_may_share():
+        pytest.skip("this system keeps the memory of processes apart")
     environment = {"SHARED_BYTES": str(N_BYTES), **({} if refused is None else {"CANNOT_MAP": str(refused)})}
     done = start(3, [SCRIPT], tmp_path, environment)
     assert done.returncode == 0, done.stderr
