@@ -178,6 +178,8 @@ def march_wear(
     )
     if outcome is Outcome.CONVERGED:
         outcome, message = _judge(march, history, recorder.compared)
+    elif outcome in (Outcome.UNSTABLE, Outcome.PERIOD_DOUBLED):
+        message = march.reason
     return replace(
         history,
         outcome=outcome,
