@@ -141,10 +141,10 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
         return monodromy.apply(vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: np.ndarray) -> bool:
-        return bool(residuals[np.argmax(np.abs(values))] < STABILITY.settled)
+        return bool(residuals[np.argmax(np.abs(values))] < STABILITY.settled_multiplier)
 
-    values, residuals = ritz_values(product, start, STABILITY.products, settled)
-    return values[residuals < STABILITY.settled]
+    values, residuals = ritz_values(product, start, STABILITY.arnoldi_multipliers, settled)
+    return values[residuals < STABILITY.settled_multiplier]
 
 
 def moving(joint: Joint, held: BoolArray) -> BoolArray:
@@ -161,7 +161,7 @@ def _samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], sma
     fastest = max((float(of.max(initial=0.0)) for of in rates), default=0.0) / joint.omega
     least = STABILITY.small_samples if small else STABILITY.large_samples
     wanted = 2 ** int(np.ceil(np.log2(max(STABILITY.samples_a_vibration * fastest, 1.0))))
-    return int(np.clip(wanted, least, STABILITY.most_samples))
+    return int(np.clip(wanted, least, STABILITY.most_marched_samples))
 
 
 def growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
@@ -184,7 +184,7 @@ def _is_passive(of: Identity) -> bool:
 def _is_semidefinite(matrix: Matrix) -> bool:
     size = float(np.abs(np.diag(matrix)).max(initial=0.0))
     try:
-        np.linalg.cholesky(matrix + STABILITY.round_off * size * np.eye(len(matrix)))
+        np.linalg.cholesky(matrix + STABILITY.indefinite * size * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
         return size == 0.0 and not matrix.any()
     return True

@@ -17,7 +17,7 @@ class StabilityOptions:
     pairs)."""
     samples_a_vibration: int = 40
     """Of the fastest vibration that grows in the structure alone: the march takes 4e-4 of it in a period of its own."""
-    most_samples: int = 4096
+    most_marched_samples: int = 4096
     """Of a march."""
     opening_harmonics: int = 19
     """Of a small joint that opens and closes, at least: with fewer the impacts are too soft (9 harmonics: 0.95 in place
@@ -26,15 +26,15 @@ class StabilityOptions:
     """Of the law with so many harmonics, at least."""
     all_multipliers: int = 160
     """Size of a disturbance up to which all of them are computed: 40 displacements, 0.1 s."""
-    products: int = 40
-    """Of Arnoldi's method; the largest multiplier of 48 pairs settles in 20."""
-    settled: float = 1e-3
+    arnoldi_multipliers: int = 40
+    """Products of Arnoldi's method; the largest multiplier of 48 pairs settles in 20."""
+    settled_multiplier: float = 1e-3
     """Residual of a multiplier that counts."""
     most_rows: int = 600
     """Displacements of pairs that switch: 200 such pairs take 0.4 GB and 10 s."""
     smallest_growth: float = 1e-3
     """In a period. Sliding pairs that stick have multipliers of 1."""
-    round_off: float = 1e-10
+    indefinite: float = 1e-10
     """Of the largest entry of a matrix: by so much it may be indefinite."""
 
 
