@@ -36,13 +36,15 @@ from solver.structure.joint import Case, Joint
 class Instability:
     """Why no vibration stays at a state.
 
-    multiplier: the largest one, beyond the unit circle. by_structure: whether no pair slips, opens or closes, so that
-    the linear structure alone is unstable. frequency: Hz, of the excitation.
+    multiplier: the largest one, beyond the unit circle. frequency: Hz, of the excitation. by_structure: whether no pair
+    slips, opens or closes, so that the linear structure alone is unstable. driven: whether the structure without its
+    joint has vibrations that grow.
     """
 
     multiplier: complex
-    by_structure: bool
     frequency: float
+    by_structure: bool
+    driven: bool
 
     @property
     def outcome(self) -> Outcome:
@@ -53,13 +55,13 @@ class Instability:
     @property
     def sentence(self) -> str:
         """How fast a disturbance grows, and what it does."""
-        grows = f"a small disturbance grows by the factor {abs(self.multiplier):.3g} in each period of the excitation"
+        said = f"a small disturbance grows by the factor {abs(self.multiplier):.3g} in each period of the excitation"
         if self.by_structure:
-            return f"{grows}, in the linear structure alone: look for negative damping or stiffness"
-        turn = abs(np.angle(self.multiplier)) / (2.0 * np.pi)
-        if self.multiplier.imag == 0.0:
-            return grows
-        return f"{grows} and brings a second frequency, {turn * self.frequency:.4g} Hz beside that of the excitation"
+            said = f"{said}, in the linear structure alone"
+        elif self.multiplier.imag != 0.0:
+            turn = abs(np.angle(self.multiplier)) / (2.0 * np.pi)
+            said = f"{said} and brings a second frequency, {turn * self.frequency:.4g} Hz beside that of the excitation"
+        return f"{said}: look for negative damping or stiffness of the structure" if self.driven else said
 
 
 def find_instability(
@@ -89,8 +91,7 @@ def find_instability(
     frequency = joint.omega / (2.0 * np.pi)
     if not switching.any():
         exponents = growing_exponents(joint.model.harmonic_structure(1)[0], moving(joint, stuck))
-        multipliers = np.exp(exponents / frequency)
-        return _largest(multipliers, 0.0, True, frequency)
+        return _judge(np.exp(exponents / frequency), 0.0, joint, by_structure=True)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
         return None
@@ -102,12 +103,12 @@ def find_instability(
         joint, at = _sharper(case, joint, at, effort)
     n_samples = _samples(joint, linear, (stuck, stuck | switching), small)
     first = multipliers_of(build_monodromy(joint, linear, at, n_samples), small)
-    if _largest(first, 0.0, False, frequency) is None:
+    if _judge(first, 0.0, joint) is None:
         return None
     second = multipliers_of(build_monodromy(joint, linear, at, 2 * n_samples), small)
     # what the samples change of it is its error
     error = abs(float(np.abs(second).max()) - float(np.abs(first).max()))
-    return _largest(second, 2.0 * error, False, frequency)
+    return _judge(second, 2.0 * error, joint)
 
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[Joint, Evaluation]:
@@ -122,12 +123,16 @@ def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[
     return (joint, at) if moved is None else (finer, moved.evaluation)
 
 
-def _largest(multipliers: ComplexArray, error: float, by_structure: bool, frequency: float) -> Instability | None:
+def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: bool = False) -> Instability | None:
+    """What the largest multiplier says where it lies beyond the unit circle by more than its error."""
     if not multipliers.size:
         return None
     largest = complex(multipliers[np.argmax(np.abs(multipliers))])
-    grows = abs(largest) - 1.0 > max(error, STABILITY.smallest_growth)
-    return Instability(largest, by_structure, frequency) if grows else None
+    if abs(largest) - 1.0 <= max(error, STABILITY.smallest_growth):
+        return None
+    linear = joint.model.harmonic_structure(1)[0]
+    driven = growing_exponents(linear, np.ones(len(linear.mass), bool)).size > 0
+    return Instability(largest, joint.omega / (2.0 * np.pi), by_structure, driven)
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:

@@ -199,6 +199,7 @@ def test_a_growing_vibration_is_no_result(
     assert start.outcome is Outcome.UNSTABLE
     assert start.state is None
     assert "in each period of the excitation" in start.message
+    assert start.message.endswith("look for negative damping or stiffness of the structure")
     history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SolverSettings())
     assert (history.outcome, history.message) == (start.outcome, start.message)
     assert np.isnan(history.response).all()
