@@ -36,6 +36,7 @@ from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
+from studyrunner.system.endings import begin_ending, is_ending, raise_ending
 from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_progress import TaskProgress, fault_of
@@ -181,14 +182,19 @@ def serve_study(
                 run_tasks(ranks, completion, evaluate, progress)
             progress.say("writing the result")
             summary = write()
-        except KeyboardInterrupt:
+        except BaseException as error:
+            if not is_ending(error):
+                raise
+            begin_ending()
             raise Interrupted(write()) from None
         if summary.n_left == 0:
             forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
             completion.prune(0.0 if prune else MOST_OF_OTHERS)
             # the result stands: what an ending keeps from being packed is packed by the next run
-            with contextlib.suppress(KeyboardInterrupt):
+            try:
                 completion.pack()
+            except KeyboardInterrupt:
+                begin_ending()
     return summary
 
 
@@ -277,6 +283,8 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
                 n_given += 1
                 yield result
         except Exception as error:
+            # what an ending has broken off is none of the task
+            raise_ending()
             yield from failed_results(task, n_given, error)
 
     return note_tasks(evaluate, job.folder, rank)
