@@ -7,6 +7,7 @@ and receives results, a second thread computes. Which rank gets which task is de
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import queue
 import threading
@@ -128,8 +129,14 @@ class _LocalWorker(Generic[Task, Result]):
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Nobody wants any more results: leaves the time to the main thread as soon as it can."""
+        """Nobody wants any more results: the thread ends as soon as what it calls returns.
+
+        The main thread may have to wait for the interpreter as long as each of these calls takes, at each of its own.
+        """
         self._ended = True
+        if self._thread.ident is not None:
+            number, error = ctypes.c_ulong(self._thread.ident), ctypes.py_object(KeyboardInterrupt)
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(number, error)
 
     def _compute(self) -> None:
         try:
