@@ -194,9 +194,11 @@ def _check(study: Study) -> int:
 
 def _write_scene(study: Study, path: Path) -> int:
     from studyrunner.netcdf.output import check_output
+    from studyrunner.netcdf.standing import check_scene_file
     from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
+    check_scene_file("--write-scene", target)
     write_study_scene(study, target, _SlowSteps().say)
     print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
@@ -206,12 +208,13 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.mpi.hand_out import HandOut
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
+    from studyrunner.netcdf.standing import check_result
     from studyrunner.run import Interrupted, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
-    target = check_output("-o", path, study.files)
+    target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
     model = HandOut(ranks, machines, build_study_scene(study, _SlowSteps().say))
