@@ -79,7 +79,8 @@ def run_study(
     ------
     UserError
         Where something in the study or the scene is wrong, the output cannot be written, is that of another study or
-        of something else, or another run is at work there, or a launcher has started several processes: each would compute all of it. Nothing is computed then.
+        of something else, another run is at work there, or a launcher has started several processes: each would compute
+        all of it. Nothing is computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
     KeyboardInterrupt

@@ -246,4 +246,3 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     untouched = [] if summary.written else [f"{path} is the finished result that it was"]
     print(head, summary.certificates, *summary.findings, *untouched, sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
-

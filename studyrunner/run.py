@@ -109,7 +109,7 @@ def serve_study(
     hand_out
         The reduced model of the study's scene, which every rank gets.
     target
-        The result file, as `check_result` gives it. Beside it is the folder in which an earlier run has left what it had.
+        The result file, as `check_result` gives it; beside it is the folder of what an earlier run has left.
     progress
         What the user sees on the way.
     fresh

@@ -46,7 +46,7 @@ class StorageError(Exception):
     def __init__(self, path: Path, error: Exception, remedy: str = "") -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         number = error.errno if isinstance(error, OSError) else None
-        remedy = remedy or f"{_REMEDIES.get(number, 'mend that')} or give another result file with -o"
+        remedy = remedy or f"{_REMEDIES.get(number or 0, 'mend that')} or give another result file with -o"
         super().__init__(
             f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"

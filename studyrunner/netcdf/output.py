@@ -38,7 +38,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
         target = Path(os.path.realpath(path))
         # the libraries that write it are given a text, not bytes
         str(target).encode(sys.getfilesystemencoding())
-        remedy = _obstacle(path, target, inputs)
+        remedy = _obstacle(option, path, target, inputs)
         if not remedy:
             parts = parts_folder(target)
             for trial in (target, parts / target.name) if parts.is_dir() else (target,):
@@ -52,7 +52,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     return target
 
 
-def _obstacle(path: Path, target: Path, inputs: Sequence[Path]) -> str:
+def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
     """What would have to be another way for a file to be written to `target`, which `path` stands for; "" for nothing.
 
     Raises OSError.
@@ -70,7 +70,7 @@ def _obstacle(path: Path, target: Path, inputs: Sequence[Path]) -> str:
         if not os.access(target, os.W_OK):
             return "give a file that may be written: this one is write-protected"
         if any(source.exists() and target.samefile(source) for source in inputs):
-            return "give another file: this one is read by the run"
+            return f"give another file with {option}: this one is read by the run"
     if os.path.lexists(parts_folder(target)) and not parts_folder(target).is_dir():
         return f"give another name: {parts_folder(target).name}, which the run needs, is a file"
     return ""

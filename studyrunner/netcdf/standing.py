@@ -16,7 +16,7 @@ from studyrunner.netcdf.provenance import POINTS_LEFT
 from studyrunner.study.archive import SCENE_GROUP
 from studyrunner.study.toml_text import read_toml
 from studyrunner.system.files import NotPlainError, create, new_partial, open_plain
-from studyrunner.user_error import UserError, Verbatim
+from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
