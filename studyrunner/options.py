@@ -47,6 +47,7 @@ class Options:
     overrides: list[str]
     write_scene: Path | None
     fresh: bool
+    overwrite: bool
     retry_failed: bool
     prune: bool
     date: str | None
@@ -112,6 +113,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="print what a bundled scene is, and its parameters",
     )
     parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
+    parser.add_argument("--overwrite", action="store_true", help="replace the result of another study")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
     )
