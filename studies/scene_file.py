@@ -24,7 +24,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import (
+    BoolArray,
+    ComplexArray,
+    ContactInterface,
+    FloatArray,
+    IntArray,
+    LinearModel,
+    Matrix,
+    ReducedModel,
+)
 from studies.guards.hdf5_guard import (
     LARGEST_FILE,
     LARGEST_RESULT,
@@ -292,7 +301,15 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         position=position,
         surface=_read_text(datasets, "contact/surface") if labelled else ("",) * n_contact,
         friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
+        edge=_flags("contact/edge", _read_numbers(datasets, "contact/edge")) if "contact/edge" in datasets else None,
     )
+
+
+def _flags(key: str, values: NDArray[Any]) -> BoolArray:
+    wrong = values[(values != 0) & (values != 1)]
+    if wrong.size:
+        raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
+    return np.asarray(values == 1)
 
 
 def _whole(key: str, values: NDArray[Any]) -> IntArray:

@@ -218,8 +218,9 @@ def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
             yield f"{nodal_diameter} {name}", getattr(linear, name)
     for name in ("dofs", "area", "gap", "normal_load", "position"):
         yield name, getattr(model.contact, name)
-    if model.contact.friction_coefficient is not None:
-        yield "friction_coefficient", model.contact.friction_coefficient
+    for name in ("friction_coefficient", "edge"):
+        if getattr(model.contact, name) is not None:
+            yield name, getattr(model.contact, name)
     texts = "\n".join((*model.contact.surface, "", *model.response_names))
     yield "texts", np.frombuffer(texts.encode(), dtype=np.uint8)
     yield "sectors", np.array([model.n_sectors, model.nodal_diameter], dtype=np.int64)
