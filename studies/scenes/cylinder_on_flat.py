@@ -134,11 +134,7 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     middle = 0.5 * (edges[1:] + edges[:-1])
     compliance = strip_compliance(edges, composite_modulus(p.E, p.nu), p.length, reference_depth(p))
     position = np.stack([middle, np.zeros_like(middle), np.zeros_like(middle)], axis=1)
-    area, gap, last = (
-        2.0 * np.diff(edges) * p.length,
-        middle**2 / (2.0 * p.R),
-        np.arange(len(middle)) == len(middle) - 1,
-    )
+    area, gap, last = 2.0 * np.diff(edges) * p.length, middle**2 / (2.0 * p.R), middle == middle[-1]
     contact = pairs_of_patches(position, area, gap, "flat/cylinder", last)
     force = tangential_force(p) * p.length if p.stroke is None else None
     return press_body((compliance, compliance), contact, p.P * p.length, force, p.stroke, "cylinder")

@@ -61,8 +61,8 @@ class Parameters(BaseModel):
         None,
         gt=0,
         description="radius of the patched circle, m; if not given somewhat more than wear makes of the contact, so"
-        " that the patches within the stick zone are as large as it is; where a stroke slides a study chooses it by what"
-        " it will wear, and without a study it is 1.4 times that of the unworn contact",
+        " that the patches within the stick zone are as large as it is; where a stroke slides a study chooses it by"
+        " what it will wear, and without a study it is 1.4 times that of the unworn contact",
     )
 
     @model_validator(mode="after")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import cast
 
 from studies.scenes import scene_with_room
 from studies.scenes.half_space.room_for_wear import ExpectedWear
@@ -46,9 +45,7 @@ def describe_room(study: Study) -> str:
     if not study.scene.is_bundled or given.get("half_width") is None:
         return ""
     free = study.scene.parameters.model_copy(update={"half_width": None})
-    needed = dict(cast("dict[str, object]", scene_with_room(study.scene.model, free, expected_wear(study))))[
-        "half_width"
-    ]
+    needed = dict(scene_with_room(study.scene.model, free, expected_wear(study)))["half_width"]
     if not isinstance(needed, float) or needed <= given["half_width"]:
         return ""
     name = "strips" if "strips" in given else "patches"

@@ -44,7 +44,7 @@ class Scar:
     def half_width(self, volume: float, depth: float) -> float:
         """Where both volume, m3, and depth, m, are at most these: with a margin; inf where neither has an end."""
         n = self.exponent
-        by_volume = (self.contact**n + self.form * self.radius * volume) ** (1.0 / n)
+        by_volume = math.pow(self.contact**n + self.form * self.radius * volume, 1.0 / n)
         by_depth = math.sqrt(self.contact**2 + 2.0 * self.radius * depth)
         return _MARGIN * min(by_volume, by_depth)
 
