@@ -22,7 +22,7 @@ _SAME_PLACE = 1e-6
 _WIDEST_GAP = 0.75 * np.pi
 """Angle between one neighbour and the next, from which on a pair is at the edge. Inside at most a right angle on a
 structured mesh, 1.9 on random points; at a straight edge pi, less where the triangulation closes a hollow."""
-_LONGEST = 4.0
+_LONGEST = 2.5
 """Over the median distance to its neighbours: what is farther is across a hole or a notch."""
 
 
