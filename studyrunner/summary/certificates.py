@@ -91,9 +91,10 @@ class CertificateTable:
         self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
 
     def format(self) -> str:
-        """Table in lines: how well the worn volume is known, whether wear is small, wear at the edge, outcomes where loads
-        and wear vary; the largest value of each certificate over all points computed to the end, with its place, then
-        how many folds, jumps, too long steps, oscillating wear rates and unstable states there are.
+        """Table in lines: how well the worn volume is known, whether wear is small, how much of it is at the edge,
+        outcomes where loads and wear vary; the largest value of each certificate over all points computed to the end,
+        with its place, then how many folds, jumps, too long steps, oscillating wear rates and unstable states there
+        are.
         """
         rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
         rows.extend(self._edge.rows())

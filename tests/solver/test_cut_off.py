@@ -1,4 +1,4 @@
-"""A contact that reaches an edge of its pairs where the bodies go on: told by the outcome, and never where it does not."""
+"""A contact that reaches an edge of its pairs where the bodies go on is told by the outcome, and no other one is."""
 
 from __future__ import annotations
 

@@ -96,6 +96,7 @@ def test_pairs_at_one_place_are_alike() -> None:
     assert found.sum() == 32
 
 
+GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=adaptive", "outputs.variables=['wear_depth']")
 AREA = np.array([1.0, 2.0, 1.0, 1.0, 2.0, 1.0]) * 1e-4
 BY_SIX = replace(
     FACTS,
@@ -108,10 +109,7 @@ BY_SIX = replace(
 
 def row_of(depths: list[float], edge: np.ndarray | None = BY_SIX.edge, **outcome: int) -> list[tuple[str, str]]:
     """The rows where the second of three frequencies has these last depths, um, and the others wear in the middle."""
-    study = read_study(
-        "sdof_slider",
-        ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=adaptive", "outputs.variables=['wear_depth']"),
-    )
+    study = read_study("sdof_slider", GRID)
     facts, n = replace(BY_SIX, edge=edge), len(study.cycles_kept)
 
     def depth(point: tuple[int, ...]) -> FloatArray:
