@@ -4,7 +4,7 @@ Numbers may be of any integer or floating type; complex ones are compounds `{r, 
 them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
 following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
 other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
-of mass and stiffness.
+of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
 
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;

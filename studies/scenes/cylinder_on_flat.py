@@ -108,8 +108,8 @@ def with_room_for_wear(parameters: Parameters, expected: ExpectedWear) -> Parame
     stick = line_stick_under_stroke(stroke, p.friction_coefficient, p.P, contact, modulus, reference_depth(p))
     if stick > 0.0:
         worn = min(worn, 1.1 * line_worn_edge(contact, stick))
-    # the last strip of each half stays open
-    needed = min(worn * p.strips / (p.strips - 2), _WIDEST * reference_depth(p))
+    # the middle of the last strip is half a strip before its end
+    needed = min(worn * p.strips / (p.strips - 1), _WIDEST * reference_depth(p))
     if not np.isfinite(worn) or needed <= strips_half_width(p):
         return p
     return p.model_copy(update={"half_width": round_up(needed)})

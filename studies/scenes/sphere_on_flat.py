@@ -118,8 +118,8 @@ def with_room_for_wear(parameters: Parameters, expected: ExpectedWear) -> Parame
     stick = point_stick_under_stroke(stroke, p.friction_coefficient, p.P, contact, p.E, p.nu)
     if stick > 0.0:
         worn = min(worn, 1.1 * point_worn_edge(contact, stick))
-    # the patches at the edge stay open: their middles are less than two widths from it
-    needed = min(worn * p.patches / max(p.patches - 2, 1), _WIDEST * p.R)
+    # middles of the patches at the edge are less than a patch from it
+    needed = min(worn * p.patches / (p.patches - 1), _WIDEST * p.R)
     if not np.isfinite(worn) or needed <= patched_radius(p):
         return p
     return p.model_copy(update={"half_width": round_up(needed)})
