@@ -31,6 +31,7 @@ class Outcome(IntEnum):
     SENSITIVE = 15
     STEP_TOO_LONG = 16
     NO_FINAL_STATE = 17
+    CONTACT_CUT_OFF = 18
 
     @property
     def complete(self) -> bool:
@@ -73,6 +74,9 @@ _SENTENCES = {
     " of the joint would move: its end is no result. The variable message says which step, and how long it may be.",
     Outcome.NO_FINAL_STATE: "Wear goes on without end: the point has no final state, and message says at which rate it"
     " wears. Give slow_time.cycles or slow_time.until an end.",
+    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the pairs that model it: a pair at their edge carries load or"
+    " wears, so that the scar is cut off, too narrow and too deep. Give the model pairs farther out: of a bundled scene"
+    " a larger half_width, or none and let the study choose it.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",

@@ -14,6 +14,7 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
+from solver.results.cut_off import describe_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.plan.places import describe_reach, known_to, show_count
@@ -237,6 +238,8 @@ def scaled_outcome(
     ended = history.outcome
     if place == 0 or not whole:
         return ended
+    if history.cycles[known[-1]] >= history.cut_off_cycle:
+        return Outcome.CONTACT_CUT_OFF
     if history.worn_volume_error[known[-1]] > SENSITIVE_ERROR:
         return Outcome.SENSITIVE
     settings = task.settings
@@ -278,6 +281,8 @@ def _message(
     worn = float(history.worn_volume_error[known[-1]])
     if outcome is Outcome.NO_FINAL_STATE:
         return f"at cycle {show_count(last)} the joint wears on at {slower * history.wear_rate[-1]:.6g} m3 a cycle"
+    if outcome is Outcome.CONTACT_CUT_OFF:
+        return describe_cut_off(history.cut_off_cycle / slower)
     if not outcome.complete:
         return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
     if outcome is Outcome.SENSITIVE:

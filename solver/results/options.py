@@ -37,6 +37,10 @@ class ResultOptions:
     calming: float = 0.98
     """Increment over the one before, below which an oscillation calms."""
 
+    edge_load: float = 1e-6
+    """Of the largest pressure or depth of all pairs: more than this at an edge of the modelled contact is no round-off.
+    Strips that are open carry exactly 0; cylinder under a stroke, cut off: the edge carries 0.3 to 1 of the largest."""
+
     target_resolution: float = 1e-12
     """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""
 

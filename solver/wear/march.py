@@ -13,6 +13,7 @@ from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
+from solver.results.cut_off import judge_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
 from solver.results.trail import TrailRecorder
@@ -180,7 +181,7 @@ def march_wear(
         outcome, message = _judge(march, history, recorder.compared)
     elif outcome in (Outcome.UNSTABLE, Outcome.PERIOD_DOUBLED):
         message = march.reason
-    return replace(
+    ended = replace(
         history,
         outcome=outcome,
         branch=start.branch,
@@ -190,6 +191,7 @@ def march_wear(
         # what alternates with the other schemes are small corners of the wear rate, not the steps
         oscillates=scheme == "explicit" and march.oscillates(),
     )
+    return judge_cut_off(ended)
 
 
 def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tuple[Outcome, str]:

@@ -12,6 +12,7 @@ from solver.outcome import COMPLETE
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
+from studyrunner.summary.edge_wear import EdgeWear
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
@@ -57,6 +58,7 @@ class CertificateTable:
         self._study = study
         self._volumes = WornVolumes(study)
         self._small = SmallWear(study, facts)
+        self._edge = EdgeWear(study, facts)
         self._outcomes = OutcomeTable(study)
         self._doubts = Doubts(study, facts)
         self._n_complete = 0
@@ -69,7 +71,7 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        for collected in (self._volumes, self._small, self._outcomes, self._doubts):
+        for collected in (self._volumes, self._small, self._edge, self._outcomes, self._doubts):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -89,11 +91,13 @@ class CertificateTable:
         self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
 
     def format(self) -> str:
-        """Table in lines: how well the worn volume is known, whether wear is small, outcomes where loads and wear vary;
-        the largest value of each certificate over all points computed to the end, with its place, then how many folds,
-        jumps, too long steps, oscillating wear rates and unstable states there are.
+        """Table in lines: how well the worn volume is known, whether wear is small, how much of it is at the edge,
+        outcomes where loads and wear vary; the largest value of each certificate over all points computed to the end,
+        with its place, then how many folds, jumps, too long steps, oscillating wear rates and unstable states there
+        are.
         """
         rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
+        rows.extend(self._edge.rows())
         rows.extend(self._outcomes.rows())
         rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the last cycle"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())

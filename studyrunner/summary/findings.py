@@ -13,6 +13,7 @@ from solver.outcome import COMPLETE, Outcome
 from studyrunner.plan.places import describe_point, describe_reach
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.room_for_wear import describe_room
 from studyrunner.study.study import AUTO, Study
 
 MOST_NAMED = 10
@@ -78,7 +79,10 @@ class Findings:
         return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
 
     def _remark(self, number: int) -> str:
-        """Where a travelling wave has no nodal diameters for more harmonics, more of them are no use of the solver."""
+        """What the study makes of it: the width that has room, or that a travelling wave has no more harmonics."""
+        if number == Outcome.CONTACT_CUT_OFF:
+            room = describe_room(self._study)
+            return f" Here {room}." if room else ""
         if number != Outcome.INACCURATE or self._largest_harmonics is None:
             return ""
         return (

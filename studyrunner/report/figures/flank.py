@@ -22,7 +22,7 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.isolines import add_colour_bar, add_isolines
-from studyrunner.report.reading.flanks import LONE, Flank, cell_edges, find_flanks
+from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
@@ -249,8 +249,7 @@ def _draw_field(panel: Axes, flank: Flank, values: NDArray[np.float64], norm: No
     if flank.grid is not None:
         grid = flank.grid
         panel.pcolormesh(
-            cell_edges(grid.along, LONE) * 1e3,
-            cell_edges(grid.across, LONE) * 1e3,
+            *(edges * 1e3 for edges in flank.edges),
             values[grid.pair],
             norm=norm,
             rasterized=values.size > _MANY_CELLS,
