@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
-from studyrunner.plan.places import describe_reach, known_to, show_count
+from studyrunner.plan.places import describe_reach, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import AUTO
@@ -281,7 +281,7 @@ def _message(
     if not outcome.complete:
         return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
     if outcome is Outcome.SENSITIVE:
-        return f"the worn volume {known_to(worn)}"
+        return f"the worn volume {known_to(worn, task.settings.rtol)}"
     above = np.flatnonzero(_state_errors(history, known) > task.settings.rtol)
     if not above.size:
         return ""
@@ -289,7 +289,8 @@ def _message(
     response, rate = (float(np.nan_to_num(one[behind], posinf=np.inf).max()) for one in _estimated(history))
     cycle = float(history.cycles[behind[0]]) / slower
     begin = f"from cycle {show_count(cycle)} on " if cycle > 0.0 else ""
-    return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
+    what = "wear rate" if rate >= response else "response"
+    return f"{begin}the {what} {known_to(max(rate, response), task.settings.rtol)}"
 
 
 def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, *, whole: bool) -> str:
