@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
+from studyrunner.percent import known_to
 from studyrunner.plan.places import describe_reach, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask

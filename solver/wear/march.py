@@ -11,7 +11,7 @@ from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to, show_percent
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
@@ -201,9 +201,7 @@ def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tup
         # one that has reached its target has no last count
         area, last = march.joint.contact.area, int(np.flatnonzero(np.isfinite(history.wear_depth).all(axis=1))[-1])
         volume, other = (1e9 * float(depth[last] @ area) for depth in (history.wear_depth, compared))
-        known = (
-            "not known" if history.error_estimate >= 1.0 else f"known to {show_percent(history.error_estimate)} only"
-        )
+        known = "not known" if history.error_estimate >= 1.0 else f"known to {100 * history.error_estimate:.2g} % only"
         coarser = "steps twice as long from the start state of a coarser sweep"
         if not np.isfinite(other):
             return Outcome.SENSITIVE, f"worn volume {volume:.3g} mm3, {known}: {coarser} do not lead so far"

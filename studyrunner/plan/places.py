@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from solver.advice import Used
-from solver.outcome import show_percent
+from studyrunner.advice import Used
+from studyrunner.percent import show_percent
 from studyrunner.study.study import Study
 from studyrunner.variables import COORDINATES
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.advice import advise_steps
 from solver.outcome import COMPLETE
+from studyrunner.advice import advise_steps
 from studyrunner.plan.places import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.advice import advise
 from solver.outcome import COMPLETE, Outcome
+from studyrunner.advice import advise
 from studyrunner.plan.places import describe_point, describe_reach, settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
@@ -22,7 +22,7 @@ MOST_NAMED = 10
 
 @dataclass
 class _Ended:
-    """Points of one outcome and one advice: how many, and the first in the order of the file with what is to be said."""
+    """Points of one outcome and one advice: how many, and the first in the order of the file with what to say."""
 
     n: int = 0
     first: list[tuple[Index, str]] = field(default_factory=list)
@@ -47,7 +47,7 @@ class Findings:
         for row in np.flatnonzero(records["outcome"] != Outcome.CONVERGED).tolist():
             outcome, said = Outcome(records["outcome"][row]), self._say(records[row])
             # points that share a history were computed in one way
-            advice = advise(outcome, settings_of(self._study, min(points[row])))
+            advice = advise(outcome.meaning, settings_of(self._study, min(points[row])))
             self._ended.setdefault((outcome, advice), _Ended()).add(points[row], said)
 
     def format(self, outcomes: Mapping[int, int]) -> tuple[str, ...]:

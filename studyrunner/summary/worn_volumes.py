@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.advice import advise_error
-from solver.outcome import COMPLETE, show_percent, show_rtol
+from solver.outcome import COMPLETE
+from studyrunner.advice import advise_error
+from studyrunner.percent import show_percent, show_rtol
 from studyrunner.plan.places import describe_point, settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.study.study import Study

@@ -57,7 +57,7 @@ def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert main(SMALL) == 0
     first, *table = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    assert table[0].split(maxsplit=2) == ["worn", "volume", "3 of 3 points within rtol = 1 %; worst 1 % at 100 Hz"]
+    assert table[0].split(maxsplit=2) == ["worn", "volume", "3 of 3 points known to rtol = 1 %; worst 1 % at 100 Hz"]
     with xr.open_dataset("out.nc") as result:
         assert table == result.attrs["certificate_summary"].splitlines()
 
@@ -70,8 +70,8 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     assert main(SMALL) == 3
     first, volume, *_, outcome, point = capsys.readouterr().out.splitlines()
     assert "2 computed, 1 failed" in first
-    assert "2 of 3 points within rtol = 1 %, 1 without one at the last cycle" in volume
-    assert outcome == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    assert "2 of 3 points known to rtol = 1 %, 1 not computed to the end" in volume
+    assert outcome == f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.'
     assert point == "  110 Hz: no state was found"
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
@@ -94,9 +94,9 @@ def test_points_above_rtol_are_computed_points(
     assert main(SMALL) == 0
     first, volume, *_, head, point = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    remedy = 'scheme = "adaptive" or a smaller step'
-    assert volume.endswith(f"2 of 3 points within rtol = 1 %, 1 above it; worst 15 % at 110 Hz: {remedy}")
-    assert head == f"1 x {outcome.meaning}: {outcome.sentence}"
+    assert volume.endswith("2 of 3 points known to rtol = 1 %, 1 less well; worst 15 % at 110 Hz: a smaller rtol")
+    advice = ' Try scheme = "adaptive" or a smaller step.' if outcome is Outcome.SENSITIVE else ""
+    assert head == f"1 x {outcome.meaning}: {outcome.sentence}{advice}"
     assert point == f"  110 Hz: {message}"
     with xr.open_dataset("out.nc") as result:
         there = result.sel(frequency=110.0).squeeze()

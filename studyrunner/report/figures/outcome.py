@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
-from solver.advice import advise_steps
+from studyrunner.advice import advise_steps
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds

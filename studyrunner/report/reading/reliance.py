@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.advice import Used, advise, advise_error
-from solver.outcome import Outcome, show_percent, show_rtol
+from studyrunner.advice import Used, advise, advise_error
+from studyrunner.percent import show_percent, show_rtol
 from studyrunner.report.reading.result import Point, Result
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
@@ -93,9 +93,8 @@ def advise_ended(result: Result, number: int) -> list[str]:
 
 def advise_point(result: Result, place: tuple[int, ...]) -> str:
     """What may help a point that ended otherwise than `converged`; empty where there is nothing to say."""
-    word = result.endings[int(result.dataset["outcome"].values[place])].word.upper()
-    # files of other versions may hold other words
-    return advise(Outcome[word], settings_of(result, place)) if word in Outcome.__members__ else ""
+    ending = result.endings[int(result.dataset["outcome"].values[place])]
+    return advise(ending.word, settings_of(result, place))
 
 
 def advise_volume(result: Result, place: tuple[int, ...]) -> str:

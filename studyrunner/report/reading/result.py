@@ -115,7 +115,7 @@ class Result:
 
     @cached_property
     def above(self) -> NDArray[np.bool_]:
-        """Which points were computed to the end, but with an error of the worn volume above `rtol`; shape of the axes."""
+        """Which points were computed to the end, their worn volume known less well than to rtol; shape of the axes."""
         return np.asarray(self.computed & (self.errors > self.rtol))
 
     @cached_property

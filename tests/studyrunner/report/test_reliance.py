@@ -22,7 +22,7 @@ EARLY, ABOVE, SENSITIVE, LOST = 2, 4, 5, 7
 
 
 def mixed() -> Result:
-    """One point ended early, one is above rtol, one sensitive and one has no state; others are to tolerance or not."""
+    """One point ended early, one is above rtol, one sensitive and one has no state; others are known to rtol or not."""
     endings = {EARLY: (3, 6000.0), ABOVE: (6, 20_000.0), SENSITIVE: (15, 20_000.0)}
     messages = {ABOVE: "from cycle 1000 on the wear rate is known to 2.6 % only", EARLY: "it broke off"}
     return with_endings(make_result(failed=[LOST]), endings, messages)
@@ -43,12 +43,11 @@ def test_points_are_told_apart() -> None:
 def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
     result = mixed()
     assert tell_volumes(result) == (
-        "The worn volume of 2 of 8 points is known within rtol = 1 %, of 4 less well; the worst is known to 2 %, at 202"
-        " Hz, implicit scheme."
+        "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the worst"
+        " is known to 2 %, at 202 Hz, implicit scheme. What may help: rtol = 0.005."
     )
     assert tell_ends(result) == (
-        "8 points, 6 computed to the last cycle, 1 ended early and hold what was computed until then, 1 without a"
-        " result."
+        "8 points, 6 computed to the end, 1 ended early and hold what was computed until then, 1 without a result."
     )
     write_page(result, [], tmp_path / "index.html")
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -172,7 +171,9 @@ def test_the_page_knows_which_points_hold_what() -> None:
     assert content["ends"] == {str(EARLY): 6000.0}
     remarks = content["remarks"]
     assert isinstance(remarks, dict)
-    assert set(remarks) == {"3", "6", str(EARLY), str(ABOVE), str(SENSITIVE)}
+    assert set(remarks) == {"3", "6", str(EARLY), str(ABOVE), str(SENSITIVE), str(LOST)}
+    assert remarks[str(LOST)] == 'Try sweep = "down" or sweep = "ramp".'
     assert remarks[str(ABOVE)] == (
-        "from cycle 1000 on the wear rate is known to 2.6 % only. Its worn volume is known to 2 %"
+        "from cycle 1000 on the wear rate is known to 2.6 % only. Its worn volume is known to 2 % only. What may help:"
+        " rtol = 0.005."
     )

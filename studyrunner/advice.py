@@ -6,10 +6,9 @@ harmonics cannot be made more. The summary of a run and the report take all of t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-from solver.outcome import Outcome
 
 _SWEEPS = ("up", "down", "ramp")
 _OF_ADAPTIVE_STEPS = ("adaptive", "final")
@@ -44,27 +43,30 @@ class Used:
     until: bool = False
 
 
-def advise(outcome: Outcome, used: Used) -> str:
-    """A sentence on what may help against an outcome; empty where it says all itself, or where nothing is left."""
-    if outcome in (Outcome.START_FAILED, Outcome.BRANCH_LOST, Outcome.UNSTABLE):
+def advise(outcome: str, used: Used) -> str:
+    """A sentence on what may help against an outcome, which is a word of `flag_meanings`.
+
+    Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
+    """
+    if outcome in ("start_failed", "branch_lost", "unstable"):
         # more harmonics make no state stable
-        finer = () if outcome is Outcome.UNSTABLE else _given(used)
+        finer = () if outcome == "unstable" else _given(used)
         return _try(*finer, *_other_sweeps(used))
-    if outcome is Outcome.MARCH_FAILED:
+    if outcome == "march_failed":
         return _try(*_given(used), *_other_steps(used))
-    if outcome is Outcome.SENSITIVE:
+    if outcome == "sensitive":
         if used.scheme not in _OF_ADAPTIVE_STEPS:
             return _try(*_other_steps(used))
-        return _try("a smaller solver.rtol") + (
+        return _try("a smaller rtol") + (
             " Where that leaves both apart, the joint itself is that sensitive: its friction coefficient and load,"
             " varied a little, say more than one number."
         )
-    if outcome is Outcome.INACCURATE:
+    if outcome == "inaccurate":
         return _try(*_given(used))
-    if outcome is Outcome.CERTIFICATE_FAILED:
-        return _try(*_given(used), "a smaller solver.tolerance")
-    if outcome is Outcome.NO_FINAL_STATE:
-        other = 'scheme = "adaptive" with ' if used.scheme == "final" else ""
+    if outcome == "certificate_failed":
+        return _try(*_given(used), "a smaller tolerance")
+    if outcome == "no_final_state":
+        other = "another scheme with " if used.scheme == "final" else ""
         target = "" if used.until else " or slow_time.until"
         return _try(f"{other}an end in slow_time.cycles{target}")
     return ""
@@ -76,16 +78,16 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
     error: of the last worn volume, relative, above `rtol`. wear_rate_error: of the states, the first of the start state
     (NaN: not estimated); empty where they are not known.
     """
-    rates = [value if value == value else 0.0 for value in wear_rate_error]
+    rates = [0.0 if math.isnan(value) else value for value in wear_rate_error]
     if _given(used) and max(rates, default=0.0) >= _OF_STATES * error > 0.0:
         return " and ".join(_given(used))
     of_start = bool(rates) and rates[0] >= _OF_START * error
     if used.scheme not in _OF_ADAPTIVE_STEPS and not of_start:
         return " or ".join(_other_steps(used))
     if error >= _FAR * used.rtol:
-        return "a smaller solver.rtol"
+        return "a smaller rtol"
     # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
-    return f"solver.rtol = {_rounded_down(used.rtol**2 / error)}"
+    return f"rtol = {_rounded_down(used.rtol**2 / error)}"
 
 
 def advise_steps(used: Used) -> str:
@@ -105,7 +107,7 @@ def _other_sweeps(used: Used) -> tuple[str, ...]:
 def _other_steps(used: Used) -> tuple[str, ...]:
     """Steps that are shorter than those that were used, and schemes that the study does not have."""
     if used.scheme in _OF_ADAPTIVE_STEPS:
-        shorter, other = "a smaller solver.rtol, which makes the steps shorter,", "implicit"
+        shorter, other = "a smaller rtol, which makes the steps shorter,", "implicit"
         return (
             (shorter, 'scheme = "implicit" with a small step') if other not in used.schemes else (shorter.rstrip(","),)
         )
