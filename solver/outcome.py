@@ -53,7 +53,8 @@ COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to the end."""
 
 _SENTENCES = {
-    Outcome.CONVERGED: "The point was computed to the end. How well its worn volume is known says error_estimate.",
+    Outcome.CONVERGED: "The point was computed to the end. How well it is known say error_estimate (worn volume) and"
+    " response_error (vibration).",
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
     Outcome.START_FAILED: "No periodic state was found at the start of the sweep, not even with the excitation raised"
     " gradually.",
@@ -73,7 +74,8 @@ _SENTENCES = {
     " wears.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
-    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",
+    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"
+    " with a larger one.",
     Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
     Outcome.NOT_COMPUTED: "The run ended before this point was computed: the same command goes on from here.",

@@ -209,13 +209,13 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
-    errors, depths = history.worn_volume_error[known], history.wear_depth[known]
+    depths = history.wear_depth[known]
     message = _message(task, history, outcome, place, slower, known, last)
     of_its_own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,
         "cycles_to_target": target,
-        "error_estimate": float(errors[-1]) if known.size else math.nan,
+        "error_estimate": _last_error(history, known, last),
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
@@ -225,6 +225,17 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
     return MarchResult(scaled.points, {**variables, **of_march, **of_its_own}, place)
+
+
+def _last_error(history: WearHistory, known: NDArray[np.intp], last: float) -> float:
+    """Estimated relative error of the last worn volume that the result holds; NaN where there is none.
+
+    The unworn joint has no volume to be wrong, but where it is all that is held of a history that went on (a target may
+    be reached before the first count) what has worn there is not known. last: count that the march has come to.
+    """
+    if not known.size or (history.cycles[known[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[known[-1]] > 0.0)):
+        return math.nan
+    return float(history.worn_volume_error[known[-1]])
 
 
 def scaled_outcome(

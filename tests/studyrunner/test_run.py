@@ -201,6 +201,16 @@ def test_what_was_computed_of_a_point_that_failed_is_kept() -> None:
     assert result.message == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
 
 
+def test_what_wears_before_the_first_count_that_is_kept_has_no_error_of_none() -> None:
+    """A target is reached at once: the unworn joint is all that is held, whose volume of 0 says nothing of it."""
+    at_target = replace(ended_at(0.0, history([0.0, 1e5]), Outcome.CONVERGED), last_cycle=30.0, cycles_to_target=25.0)
+    task = march_task("slow_time.outputs=2")
+    wears = build_result(task, replace(at_target, wear_rate=np.array([1e-15, np.nan])))
+    assert np.isnan(wears.values["error_estimate"])
+    rests = build_result(task, replace(at_target, wear_rate=np.array([0.0, np.nan])))
+    assert rests.values["error_estimate"] == 0.0
+
+
 def test_a_point_without_a_state_holds_no_numbers() -> None:
     nothing = ended_at(-1.0, history([0.0, 1e5]), Outcome.START_FAILED)
     result = build_result(march_task("slow_time.outputs=2"), replace(nothing, last_cycle=np.nan))

@@ -153,6 +153,13 @@ class Result:
         own = np.asarray(self.at("cycle_count", point).values, dtype=float)
         return own if np.isfinite(own).all() and (np.diff(own) > 0.0).all() else numbers
 
+    def last_kept(self, point: Point) -> int:
+        """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
+        counts = self.counts(point)
+        last = self.last_cycle[tuple(point[name] for name in self.axes)]
+        reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
+        return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
+
     @cached_property
     def title(self) -> str:
         """Title of the study, or the name of the file."""
