@@ -29,18 +29,12 @@ _UNITS = {"1/MPa or mm2/N": 1e-6, "mm3/(N m) or mm3/J": 1e-9}
 
 
 def doubts_of_study(study: Study) -> tuple[str, ...]:
-    """Lines on wear coefficients far off, before anything is computed; the one farthest off speaks for all.
-
-    With a wear table it is the coefficient times the factors of the table.
-    """
-    table = study.wear_law.table
-    factors = [1.0] if table is None else [factor for row in table.factor for factor in row if factor > 0.0]
-    values = [value * factor for value in study.axes.wear_coefficient if value > 0.0 for factor in factors]
-    off = [value for value in values if not _is_plausible(value)]
+    """Lines on wear coefficients far off, before anything is computed; the one farthest off speaks for all."""
+    off = [value for value in _coefficients(study) if not _is_plausible(value)]
     if not off:
         return ()
     worst = max(off, key=lambda value: abs(math.log(value / OF_THE_PAPER)))
-    what = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
+    what = "wear_coefficient" if study.wear_law.table is None else "wear_coefficient times wear.factor"
     times, side = (worst / OF_THE_PAPER, "larger") if worst > OF_THE_PAPER else (OF_THE_PAPER / worst, "smaller")
     text = f"{what} {worst:.3g} 1/Pa is {times:.1g} times {side} than the default, {OF_THE_PAPER:g} 1/Pa"
     units = [
@@ -49,6 +43,18 @@ def doubts_of_study(study: Study) -> tuple[str, ...]:
         if worst > OF_THE_PAPER and _is_plausible(worst * factor)
     ]
     return (f"{text}: is it {' or '.join(units)}?" if units else text,)
+
+
+def wears_too_fast(study: Study) -> bool:
+    """Whether a wear coefficient of the study is larger than any that is plausible."""
+    return max(_coefficients(study), default=0.0) > PLAUSIBLE[1]
+
+
+def _coefficients(study: Study) -> list[float]:
+    """Wear coefficients above 0, 1/Pa; with a wear table times each of its factors."""
+    table = study.wear_law.table
+    factors = [1.0] if table is None else [factor for row in table.factor for factor in row if factor > 0.0]
+    return [value * factor for value in study.axes.wear_coefficient if value > 0.0 for factor in factors]
 
 
 def _is_plausible(value: float) -> bool:

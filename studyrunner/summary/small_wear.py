@@ -17,7 +17,7 @@ from studyrunner.plan.places import describe_point
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
-from studyrunner.summary.plausibility import doubts_of_study
+from studyrunner.summary.plausibility import wears_too_fast
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
@@ -55,8 +55,8 @@ class SmallWear:
         where = describe_point(self._study, point)
         at = f" at {where}" if where else ""
         all_of_them = f", above {SMALL:g} at {self._n_beyond} points" if self._n_beyond > 1 else ""
-        # wear that deep comes from a sensible coefficient as well; one that is none is asked about by its own line
-        remedy = "see wear_coefficient" if doubts_of_study(self._study) else "take fewer cycles"
+        # wear that deep comes from a sensible coefficient as well
+        remedy = "is wear_coefficient in 1/Pa?" if wears_too_fast(self._study) else "take fewer cycles"
         return f"NOT MET: depth over contact width ({self._width:.2g} m) is {ratio:.2g}{at}{all_of_them}: {remedy}"
 
     @property

@@ -37,10 +37,10 @@ def test_small_wear_is_one_number() -> None:
     assert line_of({(1, 0): SMALL * 0.01}) == "depth over contact width at most 0.1"
 
 
-def test_large_wear_says_where_and_points_to_a_coefficient_that_is_far_off() -> None:
+def test_large_wear_says_where_and_asks_for_the_unit() -> None:
     assert line_of({(1, 1): 0.014, (2, 1): 0.002}) == (
         "NOT MET: depth over contact width (0.01 m) is 1.4 at 211.25 Hz, wear_coefficient 1e-05 1/Pa, above 0.1 at"
-        " 2 points: see wear_coefficient"
+        " 2 points: is wear_coefficient in 1/Pa?"
     )
     assert "points" not in line_of({(1, 1): 0.014})
 
@@ -48,6 +48,9 @@ def test_large_wear_says_where_and_points_to_a_coefficient_that_is_far_off() -> 
 def test_no_unit_is_asked_about_where_the_coefficient_is_sensible() -> None:
     sensible = (GRID[0], "axes.wear_coefficient=[1e-14, 1e-11]", GRID[2])
     assert line_of({(1, 1): 0.014}, grid=sensible).endswith("wear_coefficient 1e-11 1/Pa: take fewer cycles")
+    # one that is far too small does not wear too much
+    tiny = (GRID[0], "axes.wear_coefficient=[1e-25, 1e-11]", GRID[2])
+    assert line_of({(1, 1): 0.014}, grid=tiny).endswith(": take fewer cycles")
 
 
 def test_points_without_a_state_say_nothing() -> None:
