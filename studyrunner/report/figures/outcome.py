@@ -14,6 +14,7 @@ from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
 from studyrunner.advice import advise_steps
+from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds
@@ -164,7 +165,7 @@ def draw_errors(result: Result, course: Course) -> Drawing | None:
         panel.plot(course.values, errors, label=label, **course.line_style(number))
         top = int(np.nanargmax(errors))
         at = result.describe({course.axis: int(course.index[top])}, [course.axis])
-        worst.append(f"{label} {errors[top]:.1e} at {at}")
+        worst.append(f"{label} {show_percent(errors[top], aim)} at {at}")
     if not worst:
         return None
     panel.set_yscale("log")
@@ -179,8 +180,8 @@ def draw_errors(result: Result, course: Course) -> Drawing | None:
     others = result.describe(point, [name for name in result.varying if name != course.axis])
     caption = as_sentences(
         f"Estimated relative errors{f' ({others})' if others else ''}; the largest: {'; '.join(worst)}",
-        f"Gaps: points without a result, errors below {floor:.0e} or not estimated, and for the wear points that hardly"
-        " wear",
+        f"Gaps: points without a result, errors below {show_percent(floor)} or not estimated, and for the wear"
+        " points that hardly wear",
         "Horizontal line: rtol, what automatic settings aim at" if aim is not None else "",
     )
     return Drawing("estimated_errors", "Estimated errors", caption, figure)
