@@ -38,6 +38,8 @@ def tell_volumes(result: Result) -> str:
     text += f", {n_short} not computed to the end" if n_short else ""
     n_unknown = int(np.count_nonzero(result.computed & ~known))
     text += f", of {n_unknown} it was never estimated" if n_unknown else ""
+    if not known.any():
+        return f"{text}."
     # each is held against its own rtol: one that is above it is worse than any that is not
     worst = np.where(result.above if n_less else known, result.errors, -1.0)
     place = tuple(int(index) for index in np.unravel_index(int(np.argmax(worst)), worst.shape))

@@ -127,7 +127,7 @@ class Result:
     def tells_volumes(self) -> bool:
         """Whether the file says how well worn volumes are known: with an rtol, and not of unworn states only."""
         wears = self.has("cycle_count") or self.dataset["cycle"].values[-1] > 0.0
-        return bool(wears and np.isfinite(self.rtol).any() and (self.computed & np.isfinite(self.errors)).any())
+        return bool(wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
 
     @cached_property
     def worn(self) -> NDArray[np.float64]:
