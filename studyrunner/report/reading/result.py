@@ -184,7 +184,9 @@ class Result:
         attributes = self.dataset["outcome"].attrs
         numbers = np.atleast_1d(attributes.get("flag_values", ())).tolist()
         words = str(attributes.get("flag_meanings", "")).split()
-        sentences = str(attributes.get("sentences", "")).splitlines()
+        # versions before 0.5 said so of every point that was computed to the end
+        claimed = str(attributes.get("sentences", "")).replace("computed to tolerance", "computed to the end")
+        sentences = claimed.splitlines()
         sentences += [""] * (len(words) - len(sentences))
         named = {
             int(number): Ending(int(number), word, sentence or word.replace("_", " "))

@@ -80,7 +80,8 @@ def test_errors_that_were_never_estimated_say_so() -> None:
     assert "of 2 it was never estimated" in tell_volumes(unknown)
     none = Result(result.path, result.dataset.assign(error_estimate=estimates * np.nan))
     assert tell_volumes(none) == (
-        "The worn volume of 0 of 8 points is known to rtol = 1 %, 2 not computed to the end, of 6 it was never estimated."
+        "The worn volume of 0 of 8 points is known to rtol = 1 %, 2 not computed to the end, of 6 it was never"
+        " estimated."
     )
 
 
