@@ -11,7 +11,7 @@ from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed, pack, unpack
 from solver.results.cut_off import judge_cut_off
 from solver.results.history import StartState, WearHistory
@@ -219,8 +219,8 @@ def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tup
     if march.inaccurate_from < float("inf"):
         what = "wear rate" if march.worst.wear_rate >= march.worst.response else "response"
         return Outcome.INACCURATE, (
-            f"from cycle {march.inaccurate_from:,.0f} on the {what} is known to "
-            f"{100.0 * march.worst.largest:.2g} % only".replace(",", " ")
+            f"from cycle {march.inaccurate_from:,.0f} on the {what} ".replace(",", " ")
+            + known_to(march.worst.largest, march.case.settings.rtol)
         )
     return Outcome.CONVERGED, ""
 

@@ -15,6 +15,7 @@ from solver.contact.wear_law import surface_factors
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
+from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import AUTO, Study
@@ -32,8 +33,8 @@ class SceneFacts:
     position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
     digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
+    static_response: to the harmonic load, None where it is not known or not asked for.
     edge (n_contact,): whether the pair is at the edge of the contact (`edge_pairs`); False where that is not known.
-    static_response (n_response,): m per unit excitation amplitude, None where it is not known or not asked for.
     """
 
     n_displacements: int
@@ -43,7 +44,7 @@ class SceneFacts:
     response_names: tuple[str, ...]
     digest: str
     largest_harmonics: int | None = None
-    static_response: NDArray[np.float64] | None = None
+    static_response: StaticResponse | None = None
     edge: NDArray[np.bool_] | None = None
 
 

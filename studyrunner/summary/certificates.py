@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
+from studyrunner.advice import advise_steps
+from studyrunner.plan.places import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
@@ -99,13 +101,12 @@ class CertificateTable:
         rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
         rows.extend(self._edge.rows())
         rows.extend(self._outcomes.rows())
-        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the last cycle"))
+        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the end"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())
         rows.append(("folds in the sweeps", self._format_folds()))
         rows.append(("jumps while wearing", self._format_jumps()))
         rows.append(("explicit steps too long", self._format_noted("too long", "longer than step_limit")))
-        remedy = "use a smaller step or the implicit scheme"
-        rows.append(("oscillating wear rate", self._format_noted("oscillating", remedy)))
+        rows.append(("oscillating wear rate", self._format_noted("oscillating", self._steps())))
         rows.append(("unstable states", self._format_noted("unstable", "see the variable stable")))
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
@@ -179,6 +180,11 @@ class CertificateTable:
         cycle, point = self._first_jump
         where = _where(self._study, _Place(point))
         return f"{self._n_jumps}, the first at cycle {cycle:g}" + (f" at {where}" if where else "")
+
+    def _steps(self) -> str:
+        """What to do about the first wear rate that oscillates."""
+        first = self._noted["oscillating"].first
+        return "" if first is None else advise_steps(settings_of(self._study, first))
 
     def _format_noted(self, what: str, remedy: str) -> str:
         """How many of them, where the first is, and what there is to say."""

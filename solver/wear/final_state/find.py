@@ -13,7 +13,7 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import OutOfTimeError, move_point
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed
 from solver.results.cut_off import judge_cut_off
 from solver.results.history import StartState, WearHistory
@@ -179,7 +179,7 @@ def _finished(history: WearHistory, trajectory: Trajectory, start: StartState, e
         outcome, message = Outcome.SENSITIVE, "the worn volume is another one with fewer harmonics and a coarser sweep"
     elif outcome is Outcome.CONVERGED and not trajectory.accurate:
         outcome = Outcome.INACCURATE
-        message = f"the final state is known to {100 * trajectory.estimate.largest:.2g} % only"
+        message = f"the final state {known_to(trajectory.estimate.largest, trajectory.case.settings.rtol)}"
     ended = replace(
         history,
         outcome=outcome,
