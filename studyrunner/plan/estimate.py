@@ -54,6 +54,11 @@ def seconds_an_iteration(n_unknowns: int) -> float:
     return 7e-4 + 4e-6 * n_unknowns + 1.8e-9 * float(n_unknowns) ** 2
 
 
+def iterations_of_branch(n_frequencies: int) -> int:
+    """Newton iterations of a sweep through so many frequencies."""
+    return ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * n_frequencies
+
+
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
     """Newton iterations of a march over so many cycles where the joint wears."""
     if cycles > 0.0 and scheme == "final":

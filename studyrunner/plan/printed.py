@@ -61,7 +61,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
 
 def _cycles(study: Study) -> str:
     if study.to_the_end:
-        kept = f"{len(study.cycles_kept)} states are kept, equally spaced in worn volume"
+        kept = f"{len(study.cycles_kept)} states are kept, spaced evenly in worn volume and cycles"
         return f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest; {kept}"
     return f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept"
 

@@ -15,6 +15,7 @@ from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
     ITERATIONS_AT_FIRST,
+    iterations_of_branch,
     iterations_of_march,
     seconds_an_iteration,
 )
@@ -74,6 +75,11 @@ class BranchTask:
     def n_results(self) -> int:
         """Start states that it gives."""
         return len(self.frequencies) - len(self.known)
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated seconds of the first state, with all of the way to it, or of one of the others."""
+        others = 1.0 - (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE) / iterations_of_branch(self.n_results)
+        return self.cost * (1.0 - others if first else others / max(1, self.n_results - 1))
 
     @property
     def opens_others(self) -> bool:
@@ -153,6 +159,11 @@ class MarchTask:
             return (0.0,) * len(self.cycles)
         return march_counts(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
 
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated seconds of a history; all come with the first one, and are not told apart."""
+        del first
+        return self.cost / self.n_results
+
     @property
     def opens_others(self) -> bool:
         """Nothing."""
@@ -226,7 +237,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
                     sweep=sweep,
                     settings=settings,
                     frequencies=tuple(study.axes.frequency[place] for place in places),
-                    cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(places)),
+                    cost=seconds * iterations_of_branch(len(places)),
                 )
             )
             marches.append(

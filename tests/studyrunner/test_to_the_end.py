@@ -51,7 +51,7 @@ def test_the_effective_study_is_to_the_end_too(tmp_path: Path) -> None:
     ("override", "key", "remedy"),
     [
         ("axes.scheme=[adaptive, explicit]", "axes.scheme", 'give "adaptive" or "implicit"'),
-        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "equally spaced in worn volume"),
+        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "spaced evenly in worn volume and cycles"),
         ("slow_time.outputs=1", "slow_time.outputs", "at least 2"),
         ("slow_time.cycles=nan", "slow_time.cycles", "or inf"),
         ("slow_time.cycles=-inf", "slow_time.cycles", "or inf"),
@@ -144,7 +144,7 @@ def test_the_report_draws_it(tmp_path: Path) -> None:
     last = [float(line.get_xdata()[-1]) for line in lines]  # type: ignore[index, arg-type]
     ends = result.dataset.cycle_count.isel(cycle=-1).values.ravel()
     assert np.array(last) / np.array(ends) == pytest.approx(last[0] / ends[0])
-    assert any("equally spaced in worn volume" in note for note in build_page_data(result, 1e6).notes)
+    assert any("spaced evenly in worn volume and cycles" in note for note in build_page_data(result, 1e6).notes)
     result.close()
 
 

@@ -95,7 +95,7 @@ def draw_depths(result: Result) -> Drawing:
         f"{scale.show(float(np.nanmax(d)))} at pair {pairs[np.nanargmax(d)]}{f' ({k})' if k else ''}" for d, k in series
     ]
     text = as_sentences(
-        f"Wear depth of each contact pair after {result.cycle_label(-1)}"
+        f"Wear depth of each contact pair {result.after(-1)}"
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
@@ -153,10 +153,12 @@ def draw_pressure_history(result: Result) -> Drawing:
     scale, cycles = scale_for("Pa", values), scale_for("cycles", result.cycles)
     figure = new_figure(3.2)
     panel: Axes = figure.subplots()
-    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values.T, strict=True)):
-        panel.plot(cycles(result.cycles), scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
+    counted = np.isfinite(result.cycles)
+    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values[counted].T, strict=True)):
+        at = cycles(result.cycles[counted])
+        panel.plot(at, scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
     set_from_zero(panel, scale(np.nanmax(values, initial=0.0)).item())
-    panel.set_xlim(0.0, cycles(result.cycles[-1]).item())
+    panel.set_xlim(0.0, cycles(result.cycles[counted][-1]).item())
     panel.set_xlabel(cycles.label("vibration cycles"))
     panel.set_ylabel(scale.label("mean pressure"))
     if values.shape[1] > 1:
