@@ -85,7 +85,7 @@ def draw_depths(result: Result) -> Drawing:
     set_from_zero(panel, scale(highest).item())
     panel.set_xlim(pairs[0] - 0.8, pairs[-1] + 0.8)
     panel.set_xlabel("contact pair")
-    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(-1)}"))
+    panel.set_ylabel(scale.label(f"wear depth {result.when(-1)}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
     _shade_surfaces(panel, result, pairs)
@@ -95,7 +95,7 @@ def draw_depths(result: Result) -> Drawing:
         f"{scale.show(float(np.nanmax(d)))} at pair {pairs[np.nanargmax(d)]}{f' ({k})' if k else ''}" for d, k in series
     ]
     text = as_sentences(
-        f"Wear depth of each contact pair {result.after(-1)}"
+        f"Wear depth of each contact pair {result.when(-1, 'after')}"
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
@@ -188,7 +188,7 @@ def draw_profile(result: Result) -> Drawing:
     ]
     deepest = int(result.dataset["contact"].values[np.nanargmax(depth)])
     text = as_sentences(
-        f"Wear depth of {_surfaces(flanks)} after {label} at {result.describe(shown)}",
+        f"Wear depth of {_surfaces(flanks)} {result.when(-1, 'after')} at {result.describe(shown)}",
         f"Deepest: {scale.show(float(np.nanmax(depth)))} at pair {deepest}",
         f"Mean over the area: {', '.join(mean)}",
         "Below, the depth along the flank, one line for each row of pairs" if on_grid else "",

@@ -253,7 +253,7 @@ def _where_largest(result: Result, course: Course, choice: Choice, fields: list[
 
 def _when(result: Result) -> str:
     """When the last worn volumes are."""
-    return "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
+    return "at the end" if result.has("cycle_count") else result.when(-1)
 
 
 def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:

@@ -101,8 +101,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
     notes: list[str] = []
     if result.has("cycle_count"):
         notes.append(
-            "Each point has cycle counts of its own, spaced evenly in worn volume and cycles: shown are those of the point"
-            " that is picked, and the slider runs through the numbers of the outputs."
+            "Each point has cycle counts of its own, spaced evenly in worn volume and cycles: those of the point"
+            " that is picked are shown; the slider runs through the outputs."
         )
     floats = limit / _CHARACTERS_A_FLOAT
     points, last = _point_numbers(result), result.last_cycle

@@ -322,9 +322,9 @@ class Result:
         """A kept cycle count in words."""
         return show_cycles(float(self.cycles[index]))
 
-    def after(self, index: int) -> str:
-        """When a kept cycle count is over, in words."""
-        return f"after {self.cycle_label(index)}" if np.isfinite(self.cycles[index]) else "in the final state"
+    def when(self, index: int, before: str = "at") -> str:
+        """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
+        return "in the final state" if np.isinf(self.cycles[index]) else f"{before} {self.cycle_label(index)}"
 
     def close(self) -> None:
         """Close the file."""
