@@ -14,7 +14,6 @@ from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
-    ITERATIONS_AT_FIRST,
     iterations_of_branch,
     iterations_of_march,
     seconds_an_iteration,
@@ -78,8 +77,8 @@ class BranchTask:
 
     def cost_of(self, *, first: bool) -> float:
         """Estimated seconds of the first state, with all of the way to it, or of one of the others."""
-        others = 1.0 - (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE) / iterations_of_branch(self.n_results)
-        return self.cost * (1.0 - others if first else others / max(1, self.n_results - 1))
+        share = iterations_of_branch(self.sweep, 1) if first else ITERATIONS_A_STATE
+        return self.cost * share / iterations_of_branch(self.sweep, self.n_results)
 
     @property
     def opens_others(self) -> bool:
@@ -198,10 +197,14 @@ class TaskPlan:
     n_unknowns: int
 
     @property
+    def cost_of_branches(self) -> float:
+        """Estimated seconds of all start states."""
+        return sum(task.cost for task in self.branches)
+
+    @property
     def cost(self) -> float:
-        """Estimated seconds on one rank."""
-        marches = itertools.chain.from_iterable(self.marches)
-        return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
+        """Estimated seconds on one rank, where every point wears."""
+        return self.cost_of_branches + sum(task.cost for task in itertools.chain.from_iterable(self.marches))
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """The marches from one start state."""
@@ -237,7 +240,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
                     sweep=sweep,
                     settings=settings,
                     frequencies=tuple(study.axes.frequency[place] for place in places),
-                    cost=seconds * iterations_of_branch(len(places)),
+                    cost=seconds * iterations_of_branch(sweep, len(places)),
                 )
             )
             marches.append(

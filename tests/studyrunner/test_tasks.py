@@ -222,7 +222,7 @@ def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines["tasks"].startswith("128: 8 branches")
     assert lines["unknowns"].startswith("22 ")
     assert lines["left out"].startswith("72 points: wear_coefficient = 0")
-    assert lines["time"].endswith("on two, if every point wears (rough)")
+    assert lines["time"].endswith("on two, to a factor of two, if every point wears;")
     assert "ms or less a step" in lines["assumed"]
     assert "GB a rank" in lines["memory"]
 
