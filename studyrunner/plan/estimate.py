@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-ITERATIONS_AT_FIRST = 1000
+ITERATIONS_AT_FIRST = 1400
 """For the walk to the first state of a sweep (the dovetail to the foot of its resonance 660, to its top 1500; the root
 of the deck `blade_root` to its top 1990; two masses and a slider 180)."""
 
@@ -32,7 +32,7 @@ STEPS_TO_THE_END = 100
 ITERATIONS_TO_A_FINAL_STATE = 50
 """Of the scheme "final" where it needs no march (4 to 35 pairs: 15 to 60)."""
 
-ITERATIONS_AN_ADAPTIVE_STEP = 25
+ITERATIONS_AN_ADAPTIVE_STEP = 20
 """For one of them, steps that are refused, estimates of errors (with more harmonics) and the coarser history included,
 beside the resonance (48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away from it."""
 
