@@ -197,14 +197,10 @@ class TaskPlan:
     n_unknowns: int
 
     @property
-    def cost_of_branches(self) -> float:
-        """Estimated seconds of all start states."""
-        return sum(task.cost for task in self.branches)
-
-    @property
     def cost(self) -> float:
         """Estimated seconds on one rank, where every point wears."""
-        return self.cost_of_branches + sum(task.cost for task in itertools.chain.from_iterable(self.marches))
+        marches = itertools.chain.from_iterable(self.marches)
+        return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """The marches from one start state."""

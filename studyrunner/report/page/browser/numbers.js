@@ -87,7 +87,12 @@ function held(group, point, cycle) {
   return { row, column: nearest, cycle: group.cycles[nearest] };
 }
 
-const countText = (point, cycle) => (countAt(point, cycle) === Infinity ? "final state" : Number.isNaN(countAt(point, cycle)) ? "none" : digits(countAt(point, cycle)));
-const cycleText = (cycle) => (countAt(state.point, cycle) === Infinity ? "the final state" : `cycle ${countText(state.point, cycle)}`);
+const countText = (point, cycle) => (countAt(point, cycle) === Infinity ? "final state" : digits(countAt(point, cycle)));
+function cycleText(cycle) {
+  const count = countAt(state.point, cycle);
+  if (Number.isNaN(count)) return `output ${cycles[cycle]}`;
+  return count === Infinity ? "the final state" : `cycle ${digits(count)}`;
+}
+
 // Why nothing is known of a point at an output.
 const lacking = (point, cycle) => (Number.isNaN(countAt(point, cycle)) && !without.has(point) ? "The final state was found without slow time: nothing is known between the unworn state and it." : sentence(point));
