@@ -207,7 +207,7 @@ COUNTS = {
         ("cycle",),
         "1",
         "number of vibration cycles of the output",
-        comment="Of each point its own: its outputs are equally spaced in worn volume.",
+        comment="Of each point its own: its outputs are spaced evenly in worn volume and cycles.",
     )
 }
 """That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""

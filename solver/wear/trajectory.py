@@ -96,6 +96,8 @@ class Trajectory:
         self.jumps = 0
         # whether a step that is too long ends it; that of a companion only shows in the error
         self.bounded = True
+        # N m, against which the slip work of a state in which next to nothing wears is judged
+        self.usual_work = 0.0
         self.failure, self.reason = Outcome.MARCH_FAILED, ""
         self.step_limit = float("nan")
         # m3 per cycle, of every pair and of all together
@@ -194,7 +196,8 @@ class Trajectory:
 
     def _refine(self) -> bool:
         """Estimate the errors of the current state; False where they cannot be brought below rtol."""
-        refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
+        at = self.case, self.joint.omega, self.joint.excitation_amplitude, self.point
+        refined = refine(*at, self.effort, usual_work=self.usual_work)
         self.estimate, self.point = refined.estimate, refined.point
         if refined.case is not self.case:
             self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
-from studyrunner.plan.places import describe_point, show_percent
+from studyrunner.percent import show_percent
+from studyrunner.plan.places import describe_point
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study

@@ -110,6 +110,8 @@ def _directly(
     recorder = Recorder(model, counts, start.newton_iterations, start.run_time, "implicit", len(loops))
     recorder.add(0.0, trajectory.report(), wear_coefficient)
     unworn = trajectory.point
+    # the wear rate of the final state is round-off: its error counts for what it is beside that of the unworn one
+    trajectory.usual_work = float(unworn.evaluation.slip_work.sum())
     none = np.zeros(model.contact.n_contact, bool)
     off = wear_off(trajectory, unworn.evaluation.wear_depth, none, share)
     reason = failure(trajectory, unworn, off, share)
@@ -125,7 +127,9 @@ def _directly(
     if outcome is not Outcome.CONVERGED:
         reason = reason or f"its final state is {outcome.meaning}"
     recorder.add(1.0, trajectory.report(), wear_coefficient, 0.0)
-    error = np.abs(_coarser(trajectory, start, share) - trajectory.point.evaluation.wear_depth)
+    depth = trajectory.point.evaluation.wear_depth
+    # no depth is known better than the states are solved
+    error = np.abs(_coarser(trajectory, start, share) - depth) + settings.tolerance * depth
     history = recorder.finish(
         outcome,
         np.nan,
@@ -179,7 +183,8 @@ def _finished(history: WearHistory, trajectory: Trajectory, start: StartState, e
         outcome, message = Outcome.SENSITIVE, "the worn volume is another one with fewer harmonics and a coarser sweep"
     elif outcome is Outcome.CONVERGED and not trajectory.accurate:
         outcome = Outcome.INACCURATE
-        message = f"the final state {known_to(trajectory.estimate.largest, trajectory.case.settings.rtol)}"
+        rtol = trajectory.case.settings.rtol
+        message = f"the response in the final state {known_to(trajectory.estimate.response, rtol)}"
     ended = replace(
         history,
         outcome=outcome,

@@ -86,7 +86,7 @@ def draw_depths(result: Result) -> Drawing:
     set_from_zero(panel, scale(highest).item())
     panel.set_xlim(pairs[0] - 0.8, pairs[-1] + 0.8)
     panel.set_xlabel("contact pair")
-    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(last)}"))
+    panel.set_ylabel(scale.label(f"wear depth {result.when(last)}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
     _shade_surfaces(panel, result, pairs)
@@ -96,7 +96,7 @@ def draw_depths(result: Result) -> Drawing:
         f"{scale.show(float(np.nanmax(d)))} at pair {pairs[np.nanargmax(d)]}{f' ({k})' if k else ''}" for d, k in series
     ]
     text = as_sentences(
-        f"Wear depth of each contact pair after {result.cycle_label(last)}"
+        f"Wear depth of each contact pair {result.when(last, 'after')}"
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
@@ -154,10 +154,12 @@ def draw_pressure_history(result: Result) -> Drawing:
     scale, cycles = scale_for("Pa", values), scale_for("cycles", result.cycles)
     figure = new_figure(3.2)
     panel: Axes = figure.subplots()
-    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values.T, strict=True)):
-        panel.plot(cycles(result.cycles), scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
+    counted = np.isfinite(result.cycles)
+    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values[counted].T, strict=True)):
+        at = cycles(result.cycles[counted])
+        panel.plot(at, scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
     set_from_zero(panel, scale(np.nanmax(values, initial=0.0)).item())
-    panel.set_xlim(0.0, cycles(result.cycles[-1]).item())
+    panel.set_xlim(0.0, cycles(result.cycles[counted][-1]).item())
     panel.set_xlabel(cycles.label("vibration cycles"))
     panel.set_ylabel(scale.label("mean pressure"))
     if values.shape[1] > 1:
@@ -188,7 +190,7 @@ def draw_profile(result: Result) -> Drawing:
     ]
     deepest = int(result.dataset["contact"].values[np.nanargmax(depth)])
     text = as_sentences(
-        f"Wear depth of {_surfaces(flanks)} after {label} at {result.describe(shown)}",
+        f"Wear depth of {_surfaces(flanks)} {result.when(last, 'after')} at {result.describe(shown)}",
         f"Deepest: {scale.show(float(np.nanmax(depth)))} at pair {deepest}",
         f"Mean over the area: {', '.join(mean)}",
         "Below, the depth along the flank, one line for each row of pairs" if on_grid else "",

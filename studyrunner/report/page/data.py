@@ -102,7 +102,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
     notes: list[str] = []
     if result.has("cycle_count"):
         notes.append(
-            "Cycle counts are those of the point shown first: the outputs of a point are equally spaced in worn volume."
+            "Each point has cycle counts of its own, spaced evenly in worn volume and cycles: those of the point"
+            " that is picked are shown; the slider runs through the outputs."
         )
     floats = limit / _CHARACTERS_A_FLOAT
     points, last = _point_numbers(result), result.last_cycle
@@ -126,15 +127,16 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "horizontal": result.axes.index(result.course_axis or result.axes[0]),
         "lines": [result.axes.index(name) for name in _LINES if name in result.varying],
         "colours": COLOURS,
-        "cycles": result.cycles[kept.cycles].tolist(),
+        "cycles": result.dataset["cycle"].values[kept.cycles].tolist(),
+        "counts": _counts(result, kept) if result.has("cycle_count") else None,
         "responses": result.responses,
         "shown": int(np.ravel_multi_index(shown, result.held.shape)),
         "outcome": result.dataset["outcome"].values.ravel().tolist(),
         "without": np.flatnonzero(~result.held).tolist(),
         "ends": {
             str(place): float(last.flat[place])
+            # of counts of their own each says whether it is known
             for place in np.flatnonzero(result.held & (~result.computed | (last < result.cycles[-1]))).tolist()
-            # of counts of their own all are known
             if not result.has("cycle_count")
         },
         "remarks": remarks,
@@ -163,6 +165,13 @@ def _remarks(result: Result) -> Iterator[tuple[int, str]]:
             yield flat, text
 
 
+def _counts(result: Result, kept: _Kept) -> str:
+    """Cycle counts of the points, infinite of a final state that has none, NaN where there is no such output."""
+    points = np.stack(np.unravel_index(kept.points, result.held.shape), axis=-1).tolist()
+    counts = [result.counts(dict(zip(result.axes, place, strict=True))) for place in points]
+    return encode_floats(np.array(counts)[:, kept.cycles])
+
+
 def thin_out(count: int, keep: int) -> NDArray[np.int64]:
     """`keep` of the places 0 to `count` - 1, evenly, first and last among them; all where `keep` is no less."""
     if keep >= count:
@@ -172,13 +181,17 @@ def thin_out(count: int, keep: int) -> NDArray[np.int64]:
 
 def _fit_courses(result: Result, floats: float, notes: list[str]) -> _Kept | None:
     """Cycles at which the numbers of all points fit; None where not even two of them do."""
-    n_cycles, n_points = result.dataset.sizes.get("cycle", 1), result.held.size
+    told = np.arange(result.dataset.sizes.get("cycle", 1))
+    if result.has("cycle_count"):
+        # final states have no outputs on the way to them
+        told = np.flatnonzero(result.dataset["cycle_count"].notnull().any(result.axes).values)
+    n_cycles, n_points = len(told), result.held.size
     names = [name for name in COURSES if result.has(name)]
     per_cycle = sum(math.prod(_inner_shape(result.dataset[name])[1:]) for name in names) * n_points
     keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
     if keep < min(2, n_cycles):
         return None
-    cycles = thin_out(n_cycles, keep)
+    cycles = told[thin_out(n_cycles, keep)]
     if len(cycles) < n_cycles:
         notes.append(f"The slider runs through {len(cycles)} of the {n_cycles} cycle counts of the file.")
     return _Kept(np.arange(n_points), cycles)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+import numpy as np
+
 from studyrunner.report.reading.reliance import advise_ended, describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Ending, Result
 from studyrunner.report.reading.units import show_cycles, show_number, units_of
@@ -41,7 +43,8 @@ def describe_study(result: Result) -> StudyFacts:
     attributes = result.dataset.attrs
     facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
     cycles = result.cycles
-    kept = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}, {len(cycles)} kept"
+    ends = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}"
+    kept = f"{ends}, {np.count_nonzero(~np.isnan(cycles))} kept"
     facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
     facts.append(("scene", _scene(result)))
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}

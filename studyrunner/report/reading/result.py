@@ -146,12 +146,21 @@ class Result:
         return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
 
     def counts(self, point: Point) -> NDArray[np.float64]:
-        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend."""
+        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend.
+
+        Infinite is that of a final state that was found without slow time; NaN those of outputs the point has not.
+        """
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
             return numbers
         own = np.asarray(self.at("cycle_count", point).values, dtype=float)
-        return own if np.isfinite(own).all() and (np.diff(own) > 0.0).all() else numbers
+        ascend = own.size > 1 and (np.diff(own[~np.isnan(own)]) > 0.0).all()
+        return own if ascend else numbers
+
+    @property
+    def has_history(self) -> bool:
+        """Whether anything is known of the shown point between the first state and a final one."""
+        return len(self.cycles) > 1 and bool(np.isfinite(self.cycles[1:]).any())
 
     def last_kept(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
@@ -266,13 +275,17 @@ class Result:
 
     @property
     def _trusted(self) -> NDArray[np.bool_]:
-        """Histories that are neither explicit nor sensitive and do not oscillate; in the shape of the axes."""
+        """Histories that are neither explicit nor sensitive and do not oscillate, no final states without a history; in
+        the shape of the axes.
+        """
         outcome = self.dataset["outcome"]
         trusted = xr.ones_like(outcome, dtype=bool)
         if "scheme" in outcome.dims:
             trusted = trusted & (self.dataset["scheme"] != "explicit")
         if self.has("oscillates"):
             trusted = trusted & (self.dataset["oscillates"] == 0)
+        if self.has("cycle_count"):
+            trusted = trusted & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1))
         found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
         return found
 
@@ -327,6 +340,10 @@ class Result:
     def cycle_label(self, index: int) -> str:
         """A kept cycle count in words."""
         return show_cycles(float(self.cycles[index]))
+
+    def when(self, index: int, before: str = "at") -> str:
+        """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
+        return "in the final state" if np.isinf(self.cycles[index]) else f"{before} {self.cycle_label(index)}"
 
     def close(self) -> None:
         """Close the file."""
