@@ -54,6 +54,8 @@ def advise(outcome: str, used: Used) -> str:
         return _try(*finer, *_other_sweeps(used))
     if outcome == "march_failed":
         return _try(*_given(used), *_other_steps(used))
+    if outcome == "step_too_long":
+        return _try(*_other_steps(used))
     if outcome == "sensitive":
         if used.scheme not in _OF_ADAPTIVE_STEPS:
             return _try(*_other_steps(used))
