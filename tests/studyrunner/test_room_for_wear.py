@@ -159,7 +159,7 @@ def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path: Path, caps
 
 @pytest.mark.slow
 def test_mccoll_ding_and_leen_have_room_by_default(path: Path) -> None:
-    # 0.9382e-3 mm2 and 2.713 um of the flat after 18 000 cycles. With 40, 80 and 160 strips: 2.930, 2.935, 2.936 um and
+    # 0.9382e-3 mm2 and 2.713 um of the flat after 18 000 cycles. With 40, 80 and 160 strips: 2.932, 2.936, 2.936 um and
     # 0.9502, 0.9514, 0.9516e-3 mm2; the finite elements slide by 24.3 um, these half-planes 24.6
     overrides = {"scene.P": 18.5e3, "scene.stroke": 25e-6, "scene.strips": 32, "scene.friction_coefficient": 0.9}
     overrides |= {"axes.wear_coefficient": 1.0, "wear.surfaces": {"flat": 2.9e-14, "cylinder": 1.9e-14}}
