@@ -75,7 +75,7 @@ _SENTENCES = {
     " wears.",
     Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the pairs that model it: a pair at their edge carries load or"
     " wears, so that the scar is cut off, too narrow and too deep. Give the model pairs farther out: of a bundled scene"
-    " a larger half_width, or none and let the study choose it.",
+    " a larger half_width, or none so that it is chosen, and as many more strips or patches.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"

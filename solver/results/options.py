@@ -39,7 +39,8 @@ class ResultOptions:
 
     edge_load: float = 1e-6
     """Of the largest pressure or depth of all pairs: more than this at an edge of the modelled contact is no round-off.
-    Strips that are open carry exactly 0; cylinder under a stroke, cut off: the edge carries 0.3 to 1 of the largest."""
+    Strips that are open carry exactly 0; under a stroke whose scar is cut off the last one carries 0.96 of the largest
+    pressure and has 0.88 of the largest depth."""
 
     target_resolution: float = 1e-12
     """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""

@@ -89,7 +89,10 @@ def strips_half_width(parameters: Parameters) -> float:
     if share >= 1.0:
         return 1.5 * contact
     stick = line_stick_width(contact, share)
-    within = max(round(0.5 * p.strips * stick / (1.2 * line_worn_edge(contact, stick))), 1)
+    worn = line_worn_edge(contact, stick)
+    # not so many that the scar reaches the last strip, as it would where there are few
+    most = int(0.5 * (p.strips - 1) * stick / (1.02 * worn) + _WIDER)
+    within = max(min(round(0.5 * p.strips * stick / (1.2 * worn)), most), 1)
     return 0.5 * p.strips * stick / (within - _WIDER)
 
 

@@ -88,13 +88,18 @@ def patched_radius(parameters: Parameters) -> float:
     if share >= 1.0:
         return 1.4 * contact
     stick = point_stick_radius(contact, share)
-    wanted = 1.2 * point_worn_edge(contact, stick)
+    worn = point_worn_edge(contact, stick)
+    wanted = 1.2 * worn
     # in widths of a patch: distances of the middles, and how many lie nearer than the next one
     along = np.arange(2 * p.patches) + 0.5
     distance, count = np.unique(np.round(np.hypot(along[:, None], along[None, :]), 9), return_counts=True)
     within = np.sqrt(4.0 * np.cumsum(count) / np.pi) - _WIDER
     holds = np.flatnonzero((distance[:-1] < within[:-1]) & (within[:-1] < distance[1:]))
     change = stick / within[holds] * p.patches / wanted - 1.0
+    # not so narrow that the scar reaches the last patches, as few patches would be
+    roomy = stick / within[holds] * (p.patches - 0.5) > 1.02 * worn
+    if roomy.any():
+        holds, change = holds[roomy], change[roomy]
     near = holds[np.abs(change) < _NEAR]
     if not near.size:
         return float(stick / within[holds[np.argmin(np.abs(change))]] * p.patches)
@@ -118,8 +123,8 @@ def with_room_for_wear(parameters: Parameters, expected: ExpectedWear) -> Parame
     stick = point_stick_under_stroke(stroke, p.friction_coefficient, p.P, contact, p.E, p.nu)
     if stick > 0.0:
         worn = min(worn, 1.1 * point_worn_edge(contact, stick))
-    # middles of the patches at the edge are less than a patch from it
-    needed = min(worn * p.patches / (p.patches - 1), _WIDEST * p.R)
+    # middles of the patches at the edge are half a patch from it, or less
+    needed = min(worn * p.patches / (p.patches - 0.5), _WIDEST * p.R)
     if not np.isfinite(worn) or needed <= patched_radius(p):
         return p
     return p.model_copy(update={"half_width": round_up(needed)})
@@ -134,8 +139,8 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     along = (np.arange(p.patches) + 0.5) * width
     middle = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
     middle = middle[np.linalg.norm(middle, axis=1) < radius]
-    # the patch beside it, farther out along x or y, is missing
-    edge = np.linalg.norm(middle, axis=1) ** 2 + 2.0 * width * middle.max(axis=1) + width**2 >= radius**2
+    # within half a patch, as the middle of a last strip; all around there are some
+    edge = np.linalg.norm(middle, axis=1) >= radius - 0.5 * width
     position = np.column_stack([middle, np.zeros(len(middle))])
     gap = (middle**2).sum(axis=1) / (2.0 * p.R)
     contact = pairs_of_patches(position, np.full(len(middle), 4.0 * width**2), gap, "flat/sphere", edge)

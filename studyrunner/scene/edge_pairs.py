@@ -20,8 +20,9 @@ _FLAT = 0.1
 _SAME_PLACE = 1e-6
 """Of the extent of the surface: what is less is round-off."""
 _WIDEST_GAP = 0.75 * np.pi
-"""Angle between one neighbour and the next, from which on a pair is at the edge. Inside at most a right angle on a
-structured mesh, 1.9 on random points; at a straight edge pi, less where the triangulation closes a hollow."""
+"""Angle between one neighbour and the next, from which on a pair is at the edge. Measured inside: pi / 2 on meshes of
+rows and columns with side ratios of 0.05 to 20, at most 2.13 on random points that keep a distance; rows 20 times as
+dense as their shift, or such cells moved at random by a tenth, are taken for edge. At a straight edge it is pi."""
 _LONGEST = 2.5
 """Over the median distance to its neighbours: what is farther is across a hole or a notch."""
 

@@ -20,7 +20,7 @@ from studies.scenes.closed_forms.hertz import (
 )
 from studies.scenes.half_space.influence import composite_modulus
 from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
-from tests.studies.half_space_twin import compliances, pressed
+from tests.studies.half_space_twin import compliances, limit_depth, pressed
 
 MODULUS = composite_modulus(200e9, 0.3)
 A_LINE = line_half_width(1.2e5, 6e-3, MODULUS)
@@ -149,3 +149,22 @@ def test_widths_are_rounded_up_to_three_digits() -> None:
     assert round_up(1.23401e-4) == 1.24e-4
     assert round_up(1.24e-4) == 1.24e-4
     assert round_up(9.999e-4) == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "fewest"), [("cylinder_on_flat", "strips", 10), ("sphere_on_flat", "patches", 4)]
+)
+def test_a_few_pairs_hold_what_partial_slip_wears(name: str, key: str, fewest: int) -> None:
+    load, contact = (1.2e5, A_LINE) if key == "strips" else (100.0, A_POINT)
+    for share in (0.1, 0.5, 0.8, 0.9):
+        for number in range(fewest, 25, 2):
+            model = build_scene(name, Q=share * 0.6 * load, **{key: number})
+            whole = float(model.linear[0].load_static[2 * model.contact.n_contact])
+            stuck = pressed(model, (1.0 - share) * whole)[0] > 0.0
+            if key == "strips":
+                stuck = model.contact.position[:, 0] < contact * math.sqrt(1.0 - share)
+            edge = model.contact.edge
+            assert edge is not None
+            assert edge.any()
+            assert not pressed(model, whole)[0][edge].any()
+            assert not limit_depth(model, stuck)[edge].any(), (share, number)

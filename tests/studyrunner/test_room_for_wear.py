@@ -74,6 +74,17 @@ def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path: 
     assert describe_scene(build_scene("cylinder_on_flat", **given)).digest == digest
 
 
+def test_a_result_that_keeps_its_scene_keeps_the_edge_and_is_run_again_from_it(path: Path) -> None:
+    unworn = {"slow_time.cycles": 0, "slow_time.outputs": 1, "outputs.scene": True, "scene.half_width": 1e-5}
+    with run_study(path, path.with_name("kept.nc"), overrides=unworn, progress=False) as result:
+        assert result.outcome.values.item() == Outcome.CONTACT_CUT_OFF
+    assert main([str(path.with_name("kept.nc")), "-o", str(path.with_name("again.nc"))]) == 3
+    again = read_study(path.with_name("again.nc"))
+    assert again.scene.path is not None
+    assert build_study_scene(again).contact.edge is not None
+    assert build_study_scene(again).contact.edge.tolist() == [False] * 5 + [True]
+
+
 @pytest.mark.parametrize(
     ("overrides", "factor"),
     [
@@ -159,7 +170,7 @@ def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path: Path, caps
 
 @pytest.mark.slow
 def test_mccoll_ding_and_leen_have_room_by_default(path: Path) -> None:
-    # 0.9382e-3 mm2 and 2.713 um of the flat after 18 000 cycles. With 40, 80 and 160 strips: 2.930, 2.935, 2.936 um and
+    # 0.9382e-3 mm2 and 2.713 um of the flat after 18 000 cycles. With 40, 80 and 160 strips: 2.932, 2.936, 2.936 um and
     # 0.9502, 0.9514, 0.9516e-3 mm2; the finite elements slide by 24.3 um, these half-planes 24.6
     overrides = {"scene.P": 18.5e3, "scene.stroke": 25e-6, "scene.strips": 32, "scene.friction_coefficient": 0.9}
     overrides |= {"axes.wear_coefficient": 1.0, "wear.surfaces": {"flat": 2.9e-14, "cylinder": 1.9e-14}}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 _MARGIN = 1.1
 """Over b from volume and unworn contact, `b^3 = a^3 + 3 R A / 2` or `b^4 = a^4 + 4 R V / pi`. Measured with uniform
-slip: up to 6 a the scar is 0.96 to 1.041 times that wide; from the depth, `b^2 = a^2 + 2 R W`, 0.90 to 1.012 times."""
+slip: up to 5 a the scar is 0.93 to 1.041 times that wide; from the depth, `b^2 = a^2 + 2 R W`, 0.90 to 1.012 times."""
 
 
 @dataclass(frozen=True)
