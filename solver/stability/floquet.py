@@ -70,7 +70,8 @@ def find_instability(
     """Why the vibration does not stay at a state whose wear is held; None where it stays, or where that is not known.
 
     Not looked for: in a travelling wave, where a pair slips or opens, as a disturbance moves in other nodal diameters;
-    in joints of more than `STABILITY.most_rows` displacements of pairs that switch.
+    in joints of more than `STABILITY.most_rows` displacements of pairs that switch; in a small joint that opens and
+    closes where no state with `STABILITY.opening_harmonics` is found: with few harmonics its impacts are others.
 
     Parameters
     ----------
@@ -100,7 +101,10 @@ def find_instability(
     if not (small or every):
         return None
     if small:
-        joint, at = _sharper(case, joint, at, effort)
+        sharper = _sharper(case, joint, at, effort)
+        if sharper is None and not _is_driven(joint):
+            return None
+        joint, at = sharper or (joint, at)
     n_samples = _samples(joint, linear, (stuck, stuck | switching), small)
     first = multipliers_of(build_monodromy(joint, linear, at, n_samples), small)
     if _judge(first, 0.0, joint) is None:
@@ -111,8 +115,8 @@ def find_instability(
     return _judge(second, 2.0 * error, joint)
 
 
-def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[Joint, Evaluation]:
-    """The state with the harmonics that a joint that opens and closes is judged with; itself where none is found."""
+def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[Joint, Evaluation] | None:
+    """The state with the harmonics that a joint that opens and closes is judged with; None where it is not found."""
     opens = at.status_t == SEPARATED
     least = Resolution(all_orders(STABILITY.opening_harmonics), case.resolution.samples)
     if case.resolution.highest >= least.highest or not (opens.any(axis=1) & ~opens.all(axis=1)).any():
@@ -120,7 +124,7 @@ def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[
     sharp = case.at(replace(least, samples=max(least.samples, STABILITY.opening_samples)))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
     moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), effort)
-    return (joint, at) if moved is None else (finer, moved.evaluation)
+    return None if moved is None else (finer, moved.evaluation)
 
 
 def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: bool = False) -> Instability | None:
@@ -130,9 +134,13 @@ def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: 
     largest = complex(multipliers[np.argmax(np.abs(multipliers))])
     if abs(largest) - 1.0 <= max(error, STABILITY.smallest_growth):
         return None
+    return Instability(largest, joint.omega / (2.0 * np.pi), by_structure, _is_driven(joint))
+
+
+def _is_driven(joint: Joint) -> bool:
+    """Whether the structure without its joint has vibrations that grow."""
     linear = joint.model.harmonic_structure(1)[0]
-    driven = growing_exponents(linear, np.ones(len(linear.mass), bool)).size > 0
-    return Instability(largest, joint.omega / (2.0 * np.pi), by_structure, driven)
+    return growing_exponents(linear, np.ones(len(linear.mass), bool)).size > 0
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:

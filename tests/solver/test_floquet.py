@@ -153,12 +153,15 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_harmonics", [3, 5, 9, 13])
+@pytest.mark.parametrize("n_samples", [128, 256])
+@pytest.mark.parametrize("n_harmonics", [3, 5, 9])
 @pytest.mark.parametrize("omega", [1.0, 1.2, 1.5])
-def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega: float, n_harmonics: int) -> None:
+def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
+    omega: float, n_harmonics: int, n_samples: int
+) -> None:
     """Its multipliers lie within the unit circle: the mass comes to this motion by itself, see `tests.event_driven`."""
     case, joint, at = state_at(
-        bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, 128)
+        bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, n_samples)
     )
     assert (at.status_t == SEPARATED).any()
     assert not (at.status_t == SEPARATED).all()
