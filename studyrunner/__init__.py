@@ -16,6 +16,7 @@ ground: `variables`, `user_error`.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,12 @@ if TYPE_CHECKING:
     from studyrunner.api import StorageError, Study, UserError, open_result, read_study, run_study
 
 __all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
+
+
+# Before the libraries of HDF5 are loaded: they do without locks where the system has none, but refuse a file where the
+# file system has none (ENOLCK, EOPNOTSUPP). Results need none: they are written under a name that no other run has, and
+# renamed. A user who wants locks says so.
+os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 
 
 # Loaded when first asked for: the commands import this package before numpy may be loaded.

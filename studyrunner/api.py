@@ -16,6 +16,7 @@ from studyrunner.mpi.ranks import Alone
 from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.output import check_output
+from studyrunner.netcdf.standing import Target, check_result
 from studyrunner.report.reading.door import check_dataset, reading_errors
 from studyrunner.report.reading.result import open_vetted
 from studyrunner.run import Interrupted, serve_study
@@ -34,6 +35,7 @@ def run_study(
     *,
     overrides: Sequence[str] | Mapping[str, object] = (),
     fresh: bool = False,
+    overwrite: bool = False,
     retry_failed: bool = False,
     prune: bool = False,
     date: str | None = None,
@@ -57,6 +59,8 @@ def run_study(
         As in `read_study`, where the study is not read yet.
     fresh
         Start over: forget what an earlier run of this study has left.
+    overwrite
+        Replace a result that is of another study: one of another name or of another scene.
     retry_failed
         Compute points that failed in an earlier run once more.
     prune
@@ -74,8 +78,9 @@ def run_study(
     Raises
     ------
     UserError
-        Where something in the study or the scene is wrong, the output cannot be written or another run is at work
-        there, or a launcher has started several processes: each would compute all of it. Nothing is computed then.
+        Where something in the study or the scene is wrong, the output cannot be written, is that of another study or
+        of something else, another run is at work there, or a launcher has started several processes: each would compute
+        all of it. Nothing is computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
     KeyboardInterrupt
@@ -89,7 +94,8 @@ def run_study(
     elif overrides:
         raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
     checked = None if date is None else check_date(date, "run_study", "date")
-    target = _check_output(Path(f"{study.study.name}.nc" if output is None else output), study)
+    path = Path(f"{study.study.name}.nc" if output is None else output)
+    target = _check_output(path, study, overwrite=overwrite)
     try:
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
         with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
@@ -109,10 +115,10 @@ def run_study(
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left
-        where = f"{target} holds them" if summary.written else f"{target} is the finished result that it was"
+        where = f"{target.path} holds them" if summary.written else f"{target.path} is the finished result that it was"
         kept = f"{n_done} of {summary.n_points} points are kept, {where}"
         raise KeyboardInterrupt(f"interrupted: {kept}, the same call goes on") from None
-    return open_result(target)
+    return open_result(target.path)
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -137,8 +143,9 @@ def open_result(path: str | Path) -> xr.Dataset:
     return opened
 
 
-def _check_output(path: Path, study: Study) -> Path:
+def _check_output(path: Path, study: Study, *, overwrite: bool) -> Target:
     try:
-        return check_output("output", path, study.files)
+        found = check_output("output", path, study.files)
+        return check_result("output", found, study, overwrite=overwrite, how="overwrite=True")
     except UserError as error:
         raise UserError("run_study", error.key, error.value, error.remedy) from None

@@ -1,51 +1,14 @@
-"""The command `run-study`."""
+"""The command `run-study`: an ending in good order from the first moment, before all that takes time is loaded."""
 
 from __future__ import annotations
 
 import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
 
 # isort: split
-import os
 import sys
-import time
-import traceback
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
-from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
-from studyrunner.options import Options, parse_options
-from studyrunner.system.endings import take_endings
-from studyrunner.system.streams import keep_talking, last_error
-from studyrunner.user_error import StorageError, UserError, show_text
-
-if TYPE_CHECKING:
-    from studyrunner.mpi.version_check import Machine
-    from studyrunner.study.study import Study
-
-CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
-"""Exit statuses."""
-
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-
-_SECONDS_FOR_RANK_0 = 60.0
-"""Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
-
-_SECONDS_FOR_A_LINE = 2.0
-_SECONDS_WITHOUT_A_WORD = 3.0
-
-
-class _SlowSteps:
-    """Lines on stderr about a scene that takes long to build; none where it is built, or refused, at once."""
-
-    def __init__(self) -> None:
-        self._began = time.monotonic()
-
-    def say(self, doing: str) -> None:
-        seconds = time.monotonic() - self._began
-        if seconds > _SECONDS_WITHOUT_A_WORD:
-            print(f"[{seconds:5.0f} s] {doing}", file=sys.stderr, flush=True)
+from studyrunner.system.endings import INTERRUPTED, begin_ending, is_ending, take_endings
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,196 +19,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments
         None for those of the process, which ends here if the run did not come to its end.
     """
-    keep_talking()
-    # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    take_endings()
     try:
-        ranks = start_ranks()
-    except LauncherError as error:
-        if launcher_rank() == 0:
-            print(f"run-study: launcher: {error}", file=sys.stderr)
-        else:
-            # a launcher may pass nothing on once another process has failed
-            time.sleep(_SECONDS_FOR_A_LINE)
-        return BAD_INPUT
-    except KeyboardInterrupt:
+        take_endings()
+        from studyrunner.command import run_command
+
+        return run_command(arguments)
+    except BaseException as error:
+        if not is_ending(error):
+            raise
+        begin_ending()
+        from studyrunner.mpi.launcher import launcher_rank
+
         if launcher_rank() == 0:
             print("run-study: interrupted", file=sys.stderr)
         return INTERRUPTED
-    try:
-        status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
-        ranks.close()
-    except BaseException as error:
-        # One rank's end must be the end of all: the others would wait for ever.
-        if isinstance(error, KeyboardInterrupt):
-            if ranks.rank > 0 and _leave_to_rank_0(ranks):
-                ranks.close()
-                return CONVERGED
-            print(f"run-study: {str(error) or 'interrupted'}", file=sys.stderr)
-            status = INTERRUPTED
-        elif isinstance(error, StorageError):
-            print(f"run-study: {error}", file=sys.stderr)
-            status = UNEXPECTED
-        else:
-            print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
-            traceback.print_exc()
-            status = UNEXPECTED
-        ranks.abort(status)
-        if arguments is None:
-            # The thread that computes is still at it, which an interpreter on its way out does not always survive.
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(status)
-    return status
-
-
-def _leave_to_rank_0(ranks: Ranks) -> bool:
-    """Waits for rank 0 to write what there is and to end all ranks; it is told, if the launcher has not told all.
-
-    Whether it had come to its end already, with nothing left to do here.
-    """
-    from studyrunner.mpi.schedule import RankInterrupted
-
-    ranks.send(RankInterrupted(), 0)
-    latest = time.monotonic() + _SECONDS_FOR_RANK_0
-    while time.monotonic() < latest:
-        # a message moves only while its sender is in the MPI library
-        received = ranks.receive()
-        if received is not None and received[1] is None:
-            return True
-        time.sleep(POLL_SECONDS)
-    return False
-
-
-def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
-    try:
-        from studyrunner.mpi.version_check import check_versions
-
-        machines = check_versions(ranks)
-        options = parse_options(arguments)
-        from studyrunner.study.study_file import read_study
-
-        study = read_study(options.study, options.overrides)
-        if options.plan:
-            status = _show_plan(study)
-        elif options.check:
-            status = _check(study)
-        elif options.write_scene is not None:
-            status = _write_scene(study, options.write_scene)
-        else:
-            return _compute(ranks, machines, study, options)
-    except UserError as error:
-        print(f"run-study: {error}", file=sys.stderr)
-        status = BAD_INPUT
-    except LauncherError as error:
-        print(f"run-study: launcher: {error}", file=sys.stderr)
-        status = BAD_INPUT
-    except SystemExit:
-        status = CONVERGED
-    for rank in range(1, ranks.size):
-        ranks.send(None, rank)
-    return status
-
-
-def _follow(ranks: Ranks) -> int:
-    """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.mpi.hand_out import LostError, take_over
-    from studyrunner.mpi.version_check import report_version
-
-    report_version(ranks)
-    try:
-        model = take_over(ranks)
-    except LostError:
-        # it is gone with what this rank was to compute with; where the others go on, they do so without both
-        os._exit(UNEXPECTED)
-    if model is not None:
-        from studyrunner.run import work_on_job
-
-        work_on_job(ranks, model)
-    return CONVERGED
-
-
-def _show_plan(study: Study) -> int:
-    from studyrunner.plan.estimate import largest_memory
-    from studyrunner.plan.printed import format_plan
-    from studyrunner.plan.tasks import build_tasks
-    from studyrunner.scene.scene import build_study_scene, describe_scene
-
-    before = largest_memory()
-    facts = describe_scene(build_study_scene(study, _SlowSteps().say))
-    built_with = largest_memory() - before
-    plan = build_tasks(study, facts.n_displacements)
-    print(format_plan(study, facts, plan, built_with, time.process_time()), flush=True)
-    error = last_error(sys.stdout)
-    if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
-        raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
-    return CONVERGED
-
-
-def _check(study: Study) -> int:
-    from studyrunner.netcdf.output import check_output
-    from studyrunner.scene.model_check import check_study_model
-
-    picture = Path(f"{study.study.name}.check.png")
-    target = check_output("--check", picture, study.files)
-    print(check_study_model(study, target, _SlowSteps().say), flush=True)
-    print(f"{picture}: the contact pairs and their frames", flush=True)
-    return CONVERGED
-
-
-def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.netcdf.output import check_output
-    from studyrunner.scene.scene import write_study_scene
-
-    target = check_output("--write-scene", path, study.files)
-    write_study_scene(study, target, _SlowSteps().say)
-    print(f"{path}: the scene of study {study.study.name}", flush=True)
-    return CONVERGED
-
-
-def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
-    from studyrunner.mpi.hand_out import HandOut
-    from studyrunner.netcdf.output import check_output
-    from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, serve_study
-    from studyrunner.scene.scene import build_study_scene
-    from studyrunner.system.progress import ProgressDisplay, format_seconds
-
-    path = Path(f"{study.study.name}.nc") if options.output is None else options.output
-    target = check_output("-o", path, study.files)
-    progress = ProgressDisplay()
-    # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = HandOut(ranks, machines, build_study_scene(study, _SlowSteps().say))
-    for line in compare_with_archived(study, model.value):
-        print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
-    try:
-        with progress:
-            if ranks.size == 1 and (announced := job_size()) > 1:
-                progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
-            summary = serve_study(
-                ranks,
-                study,
-                model,
-                target,
-                progress,
-                fresh=options.fresh,
-                retry_failed=options.retry_failed,
-                prune=options.prune,
-                date=options.date,
-            )
-    except Interrupted as ended:
-        done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
-        kept = f"{done} are kept, {path} is the finished result that it was"
-        what = f"{path} holds {done}" if ended.summary.written else kept
-        raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
-    failed = summary.n_points - summary.n_complete
-    counts = f"{summary.n_points} points, {summary.n_complete} computed, {failed} failed"
-    head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
-    untouched = [] if summary.written else [f"{path} is the finished result that it was"]
-    print(head, summary.certificates, *summary.findings, *untouched, sep="\n", flush=True)
-    return SOME_FAILED if failed else CONVERGED
 
 
 if __name__ == "__main__":

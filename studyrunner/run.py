@@ -25,9 +25,10 @@ from studyrunner.mpi.crashes import (
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
-from studyrunner.netcdf.output import holds_finished_result, parts_folder, remove_leftovers
+from studyrunner.netcdf.output import parts_folder, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.software import describe_software
+from studyrunner.netcdf.standing import Target, note_study
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
@@ -36,6 +37,7 @@ from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
+from studyrunner.system.endings import begin_ending, is_ending, raise_ending
 from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_progress import TaskProgress, fault_of
@@ -69,7 +71,7 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_complete: points computed to their last cycle. n_left: those that are not computed yet.
+    """How a run ended. n_complete: points computed to the end. n_left: those that are not computed yet.
 
     n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
     certificates: the table that begins with the worn volume. written: whether the file holds this, or is as it was.
@@ -88,7 +90,7 @@ def serve_study(
     ranks: Ranks,
     study: Study,
     hand_out: HandOut[ReducedModel],
-    path: Path,
+    target: Target,
     progress: ProgressDisplay,
     *,
     fresh: bool = False,
@@ -96,7 +98,7 @@ def serve_study(
     prune: bool = False,
     date: str | None = None,
 ) -> RunSummary:
-    """Rank 0: computes the study of this model together with the other ranks and writes the file `path`.
+    """Rank 0: computes the study of this model together with the other ranks and writes the file `target.path`.
 
     A finished result that stands there already is replaced by one without missing points only.
 
@@ -106,8 +108,8 @@ def serve_study(
         The ranks, and what they are to compute.
     hand_out
         The reduced model of the study's scene, which every rank gets.
-    path
-        The result file. Beside it is the folder in which an earlier run has left what it had.
+    target
+        The result file, as `check_result` gives it; beside it is the folder of what an earlier run has left.
     progress
         What the user sees on the way.
     fresh
@@ -122,7 +124,7 @@ def serve_study(
     Raises
     ------
     UserError
-        Where another run is at work there or `path` is a file of something else.
+        Where another run is at work there.
     StorageError
         Where something cannot be written.
     Interrupted
@@ -136,12 +138,13 @@ def serve_study(
         progress.say("finding the natural frequencies of the scene")
     of_scene = build_scene_variables(study, model)
     kept_scene = scene_to_keep(study, model)
-    keep_finished = holds_finished_result(path)
+    path = target.path
     # as it is when the run begins: a checkout may be another one at its end
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
     store = _open_store(parts_folder(path), kind)
     with contextlib.closing(store):
+        note_study(path, study)
         said = doubts_of_study(study)
         for note in (*store.notes, *said):
             progress.note(note)
@@ -166,11 +169,11 @@ def serve_study(
 
             store.flush()
             origin = {**software, **describe_date(date)}
-            gathered = gather(study, facts, completion, path, of_scene, kept_scene, keep_finished, origin)
+            gathered = gather(study, facts, completion, path, of_scene, kept_scene, target.finished, origin)
             for doubt in gathered.doubts:
                 if doubt not in said:
                     progress.note(doubt)
-            return _summarise(plan, n_found, gathered, keep_finished)
+            return _summarise(plan, n_found, gathered, target.finished)
 
         try:
             hand_out.send()
@@ -181,14 +184,19 @@ def serve_study(
                 run_tasks(ranks, completion, evaluate, progress)
             progress.say("writing the result")
             summary = write()
-        except KeyboardInterrupt:
+        except BaseException as error:
+            if not is_ending(error):
+                raise
+            begin_ending()
             raise Interrupted(write()) from None
         if summary.n_left == 0:
             forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
             completion.prune(0.0 if prune else MOST_OF_OTHERS)
             # the result stands: what an ending keeps from being packed is packed by the next run
-            with contextlib.suppress(KeyboardInterrupt):
+            try:
                 completion.pack()
+            except KeyboardInterrupt:
+                begin_ending()
     return summary
 
 
@@ -277,6 +285,8 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
                 n_given += 1
                 yield result
         except Exception as error:
+            # what an ending has broken off is none of the task
+            raise_ending()
             yield from failed_results(task, n_given, error)
 
     return note_tasks(evaluate, job.folder, rank)

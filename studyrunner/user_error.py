@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
+
+_REMEDIES = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room there"),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "see that it may be written"),
+    errno.EIO: "see whether the disk, or the way to it, is at fault",
+}
 
 
 class UserError(Exception):
@@ -32,13 +39,14 @@ class UserError(Exception):
 class StorageError(Exception):
     """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
 
-    What was written before is kept, and the same command goes on from there. remedy: what would help.
+    What was written before is kept, and the same command goes on from there. remedy: what would help, "" for what helps
+    against that error.
     """
 
-    def __init__(
-        self, path: Path, error: Exception, remedy: str = "make room there or give another result file with -o"
-    ) -> None:
+    def __init__(self, path: Path, error: Exception, remedy: str = "") -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        number = error.errno if isinstance(error, OSError) else None
+        remedy = remedy or f"{_REMEDIES.get(number or 0, 'mend that')} or give another result file with -o"
         super().__init__(
             f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"

@@ -275,7 +275,7 @@ KEPT = {
         (),
         "m",
         "largest wear depth of any pair at any count",
-        comment="The joint is taken as it was designed: small against the distance between pairs, wear leaves it so.",
+        comment="The joint is taken as it was designed: small against the width of the contact, wear leaves it so.",
     ),
     "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
     "fold_frequency": Variable(

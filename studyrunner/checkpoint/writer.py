@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from studyrunner.system.endings import uninterrupted
+from studyrunner.system.mailbox import Mailbox
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
@@ -23,9 +23,7 @@ class Writer(Generic[Job, Done]):
     def __init__(self, do: Callable[[Job], Done]) -> None:
         self._do = do
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._ended: deque[tuple[Job, Done | BaseException]] = deque()
-        # A lock written in Python, as that of an Event, may stay taken where its owner is interrupted.
-        self._news: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._ended: Mailbox[tuple[Job, Done | BaseException]] = Mailbox()
         self._n_begun = self._n_taken = 0
         # A daemon: a process that ends in disorder does not wait for a disk that hangs.
         self._thread = threading.Thread(target=self._work, name="writer", daemon=True)
@@ -55,25 +53,25 @@ class Writer(Generic[Job, Done]):
             Whether to wait until there is nothing more to take note of.
         """
         while True:
-            while self._ended:
-                job, done = self._ended[0]
+            while (ended := self._ended.first()) is not None:
+                job, done = ended
                 if isinstance(done, BaseException):
                     refuse(job)
                 else:
                     accept(job, done)
-                self._ended.popleft()
+                self._ended.take()
                 self._n_taken += 1
                 if isinstance(done, BaseException):
                     raise done
             if not wait or not self.busy:
                 return
-            # of jobs that were taken note of before it came, in part
-            self._news.get()
+            self._ended.wait()
 
     def close(self) -> None:
         """Ends the thread, after the jobs that it has."""
         self._jobs.put(None)
-        self._thread.join()
+        with uninterrupted():
+            self._thread.join()
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
@@ -81,5 +79,4 @@ class Writer(Generic[Job, Done]):
                 done: Done | BaseException = self._do(job)
             except BaseException as error:  # handed to the other thread, which raises it
                 done = error
-            self._ended.append((job, done))
-            self._news.put(None)
+            self._ended.put((job, done))

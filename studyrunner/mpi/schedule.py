@@ -7,6 +7,7 @@ and receives results, a second thread computes. Which rank gets which task is de
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import queue
 import threading
@@ -18,7 +19,8 @@ from typing import Generic, TypeVar
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
 from studyrunner.plan.costs import LearnedCosts
-from studyrunner.system.endings import ignore_endings, uninterrupted
+from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
+from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 
 SECONDS_TO_PROGRESS = 3.0
 """A task says how far it is at most so often, with many ranks less often.
@@ -77,6 +79,7 @@ def _work(
 
     def keep(progress: object) -> None:
         nonlocal sent
+        raise_ending()
         # a task that has given all its results has no progress
         if n_given < task.n_results and time.perf_counter() > sent + seconds_to_progress:
             send(_Progress(assignment.number, progress))
@@ -100,7 +103,7 @@ class _LocalWorker(Generic[Task, Result]):
         self._ended = False
         self._seconds_to_progress = seconds_to_progress
         self._waiting: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
-        self._sent: queue.SimpleQueue[object] = queue.SimpleQueue()
+        self._sent: Mailbox[object] = Mailbox()
         # A daemon: an exception in the main thread ends the process although a task still runs.
         self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
         self._thread.start()
@@ -111,10 +114,9 @@ class _LocalWorker(Generic[Task, Result]):
 
     def receive(self, seconds: float) -> object:
         """What it sends next, None where nothing comes within `seconds`. Raises what a task raised."""
-        try:
-            message = self._sent.get(timeout=seconds)
-        except queue.Empty:
-            return None
+        if seconds:
+            self._sent.wait(seconds)
+        message = self._sent.take()
         if isinstance(message, BaseException):
             raise message
         return message
@@ -122,12 +124,19 @@ class _LocalWorker(Generic[Task, Result]):
     def stop(self) -> None:
         """Ends the thread; it has nothing left to do. Raises what its last task raised after the last result."""
         self._waiting.put(None)
-        self._thread.join()
+        with uninterrupted():
+            self._thread.join()
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Nobody wants any more results: leaves the time to the main thread as soon as it can."""
+        """Nobody wants any more results: the thread ends as soon as what it calls returns.
+
+        The main thread may have to wait for the interpreter as long as each of these calls takes, at each of its own.
+        """
         self._ended = True
+        if self._thread.ident is not None:
+            number, error = ctypes.c_ulong(self._thread.ident), ctypes.py_object(KeyboardInterrupt)
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(number, error)
 
     def _compute(self) -> None:
         try:
@@ -220,7 +229,7 @@ def serve_tasks(
             keep(dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
-            ignore_endings()
+            begin_ending()
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
@@ -247,7 +256,7 @@ def serve_tasks(
                 break
         dispatcher.watch()
         tick(dispatcher.running)
-        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else 50 * POLL_SECONDS)) is not None:
+        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else LONGEST_WAIT)) is not None:
             accept(0, message)
 
     try:

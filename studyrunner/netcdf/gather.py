@@ -5,6 +5,7 @@ The file is written slab by slab from the files of a run: only a slab is ever in
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections import Counter
@@ -30,7 +31,7 @@ from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.summary.certificates import CertificateTable
 from studyrunner.summary.findings import Findings
-from studyrunner.system.files import replacing
+from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, COORDINATES, COUNTS, KEPT, LOOPS, Variable
 
@@ -118,7 +119,7 @@ def gather(
     if left and keep_finished:
         return gathered
     try:
-        with replacing(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+        with replacing(path) as temporary, _writing(temporary) as file:
             of_model = {} if scene is None else scene.origin
             file.setncatts({**describe_run(study, facts), **of_model, "certificate_summary": gathered.certificates})
             file.setncattr(POINTS_LEFT, np.int32(left))
@@ -130,10 +131,22 @@ def gather(
             _write_coordinates(file, study, facts)
             if scene is not None:
                 write_scene_group(file, scene)
-    except (OSError, RuntimeError) as error:
-        # the library says the one or the other where the disk is full
+    except OSError as error:
         raise StorageError(path, error) from error
     return gathered
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
+    """A new NetCDF file. Raises OSError with the reason that the system has.
+
+    Whatever that is, the library says that there is no permission, or that there is an error of HDF.
+    """
+    try:
+        with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+            yield file
+    except (OSError, RuntimeError) as error:
+        raise find_fault(path) or OSError(None, f"the NetCDF library cannot write it ({error})") from error
 
 
 def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[_Index, Gathered]:

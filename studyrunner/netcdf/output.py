@@ -1,21 +1,20 @@
-"""The files that a run writes: where they go and what stands there already, checked before anything is computed."""
+"""The files that a run writes: where they go and what stands in their way, found before anything is computed."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from studies.sandboxed_read import check_scene_readable, is_hdf5
-from studies.scene_error import SceneError
-from studyrunner.netcdf.provenance import POINTS_LEFT
-from studyrunner.study.archive import SCENE_GROUP
-from studyrunner.system.files import create, leftovers, new_partial
+from studyrunner.system.files import create, leftovers, new_partial, sync
 from studyrunner.user_error import UserError
 
 _SECONDS_TO_WRITE = 86400.0  # no run is at one file for so long
+_TRIAL = bytes(4096)  # a full disk has room for a name
+_STREAMS = (0, 1, 2)
 
 
 def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
@@ -35,36 +34,66 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     UserError
         Where it cannot be written, or is one of the inputs.
     """
-
-    def wrong(remedy: str) -> UserError:
-        return UserError("command line", option, str(path), remedy)
-
-    target = Path(os.path.realpath(path))
     try:
-        if target.is_dir():
-            raise wrong("give the name of a file: this is a folder")
-        if not target.parent.is_dir():
-            raise wrong(f"give a file in a folder that exists: there is no folder {path.parent}")
-        if target.exists():
-            if not target.is_file():
-                raise wrong("give the name of an ordinary file")
-            if not os.access(target, os.W_OK):
-                raise wrong("give a file that may be written: this one is write-protected")
-            if any(source.exists() and target.samefile(source) for source in inputs):
-                raise wrong(f"give another file with {option}: this one is read by the run")
-        if parts_folder(target).exists() and not parts_folder(target).is_dir():
-            raise wrong(f"give another name: {parts_folder(target).name}, which the run needs, is a file")
-        try_to_create(target)
+        target = Path(os.path.realpath(path))
+        # the libraries that write it are given a text, not bytes
+        str(target).encode(sys.getfilesystemencoding())
+        remedy = _obstacle(option, path, target, inputs)
+        if not remedy:
+            parts = parts_folder(target)
+            for trial in (target, parts / target.name) if parts.is_dir() else (target,):
+                try_to_create(trial)
     except OSError as error:
-        raise wrong(f"give a file that can be written: {error.strerror}") from None
+        remedy = f"give a file that can be written: {error.strerror}"
+    except ValueError:
+        remedy = f"give a name in {sys.getfilesystemencoding().upper()}, as those of its folders"
+    if remedy:
+        raise UserError("command line", option, str(path), remedy)
     return target
 
 
+def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
+    """What would have to be another way for a file to be written to `target`, which `path` stands for; "" for nothing.
+
+    Raises OSError.
+    """
+    if target.is_dir():
+        return "give the name of a file: this is a folder"
+    if not target.parent.is_dir():
+        no_folder = next((part for part in path.parents if os.path.lexists(part) and not part.is_dir()), None)
+        missing = f"there is no folder {path.parent}" if no_folder is None else f"{no_folder} is no folder"
+        return f"give a file in a folder that exists: {missing}"
+    # what leads to a stream, or to a file without a name, exists although its target does not
+    if os.path.lexists(target) or path.exists():
+        if not target.is_file() or _is_stream(target):
+            return "give the name of an ordinary file"
+        if not os.access(target, os.W_OK):
+            return "give a file that may be written: this one is write-protected"
+        if any(source.exists() and target.samefile(source) for source in inputs):
+            return f"give another file with {option}: this one is read by the run"
+    if os.path.lexists(parts_folder(target)) and not parts_folder(target).is_dir():
+        return f"give another name: {parts_folder(target).name}, which the run needs, is a file"
+    return ""
+
+
+def _is_stream(target: Path) -> bool:
+    """Whether stdin, stdout or stderr of this process are this file."""
+    for number in _STREAMS:
+        with contextlib.suppress(OSError):
+            if os.path.samestat(target.stat(), os.fstat(number)):
+                return True
+    return False
+
+
 def try_to_create(path: Path) -> None:
-    """Makes a new file beside `path` and removes it. Raises OSError."""
+    """Makes a new file beside `path`, with something in it, and removes it. Raises OSError."""
     trial = new_partial(path)
-    create(trial).close()
-    trial.unlink()
+    with create(trial) as file:
+        try:
+            file.write(_TRIAL)
+            sync(file)
+        finally:
+            trial.unlink()
 
 
 def remove_leftovers(path: Path, *, alone: bool) -> None:
@@ -85,31 +114,3 @@ def remove_leftovers(path: Path, *, alone: bool) -> None:
 def parts_folder(path: Path) -> Path:
     """The folder of results that are to go into the file `path`."""
     return path.with_name(f"{path.name}.parts")
-
-
-def holds_finished_result(path: Path) -> bool:
-    """Whether `path` is a result in which no point is missing.
-
-    Such a file is not replaced by one with less in it.
-
-    Raises
-    ------
-    UserError
-        Where it is no result of run-study at all, which is not replaced by anything.
-    """
-    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
-
-    try:
-        if not path.exists() or path.stat().st_size == 0:
-            return False
-        if is_hdf5(path):
-            check_scene_readable(path, SCENE_GROUP, ("study", POINTS_LEFT))
-            with open_hdf5(path, LARGEST_RESULT) as file:
-                if read_attribute(file, "study") is not None:
-                    left = read_attribute(file, POINTS_LEFT)
-                    return left is None or left.size != 1 or left.item() == 0
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError):
-        # damaged, or unreadable: it may be anything
-        pass
-    remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
-    raise UserError("command line", "-o", str(path), remedy)

@@ -99,10 +99,10 @@ def _if_automatic(study: Study) -> str:
 
 def _range(plan: TaskPlan) -> str:
     """What is known only when it is computed: how many points wear, and how often the joint jumps."""
-    of_states = format_seconds(sum(branch.cost for branch in plan.branches))
+    starts = format_seconds(sum(branch.cost for branch in plan.branches))
     return (
-        f"{of_states} of it for the start states; a history in which nothing slips takes"
-        " none, one in which the joint jumps up to five times as long"
+        f"{starts} of it for the start states; a history in which nothing slips takes none, one in which the joint"
+        " jumps up to five times as long"
     )
 
 

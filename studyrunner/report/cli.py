@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+from studyrunner.system.endings import raise_ending
 from studyrunner.system.own_process import CRASHES, run_in_own_process
 from studyrunner.system.streams import keep_talking
 from studyrunner.user_error import UserError, Verbatim
@@ -169,6 +170,7 @@ def _say(items: Iterable[Drawing | Missing | Table], status: Status) -> Iterator
     from rich.markup import escape
 
     for item in items:
+        raise_ending()
         status.update(f"drawing: {escape(item.title)}")
         yield item
     status.update("writing the page")

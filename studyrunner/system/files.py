@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 _NOT_PLAIN = (errno.ELOOP, errno.ENXIO, errno.EISDIR)
+_BYTES_OF_TRIAL = 2**22  # a disk is full for a library that writes a part of a result, not for a few bytes
 _NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
 
 
@@ -85,6 +86,17 @@ def replacing(path: Path) -> Iterator[Path]:
         sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def find_fault(path: Path) -> OSError | None:
+    """Why a file that is there cannot be written, as the system says it; None where it can be."""
+    try:
+        with path.open("ab") as file:
+            file.write(bytes(_BYTES_OF_TRIAL))
+            sync(file)
+    except OSError as error:
+        return error
+    return None
 
 
 def leftovers(path: Path) -> list[Path]:

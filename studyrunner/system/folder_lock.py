@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import socket
@@ -51,11 +52,13 @@ class FolderLock:
 
 
 def _take(file: IO[bytes]) -> bool | None:
-    """Whether the lock is ours now; None where there are no locks."""
+    """Whether the lock is ours now; None where there are no locks. Raises OSError where the disk is at fault."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except OSError:
+    except OSError as error:
+        if error.errno == errno.EIO:
+            raise
         return None
     return True

@@ -6,6 +6,7 @@ others wait for that.
 FAKE_TOGETHER: no march goes on before as many ranks have had one.
 FAKE_STEPS: every march takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
 takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
+FAKE_HOLDS: each step of a march keeps the interpreter from all other threads in so many calls, as of C, of a second.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
 FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
 to the fourth one where "in branch" stands behind.
@@ -119,10 +120,17 @@ def walk(task: MarchTask, n_steps: int, seconds: float, keep: Keep) -> float:
     carried = 0.1 + 0.01 * (task.number % 50) if task.resume is None else float(task.resume.arrays[0][1])
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
-        time.sleep(seconds)
+        compute(seconds)
         note_step(task, step)
         keep(Packed("march", (np.array([step + 1.0, carried]),)))
     return carried
+
+
+def compute(seconds: float) -> None:
+    """Takes so long."""
+    time.sleep(seconds)
+    for _ in range(int(os.environ.get("FAKE_HOLDS", "0"))):
+        ctypes.PyDLL(None).usleep(1_000_000)
 
 
 def note_step(task: BranchTask | MarchTask, number: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import h5py
 import pytest
 
 from studyrunner.cli import main
@@ -131,7 +132,8 @@ WRONG_KEYS = {
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
-    (tmp_path / "s.nc").write_text("an earlier result", encoding="utf-8")
+    with h5py.File(tmp_path / "s.nc", "w") as earlier:
+        earlier.attrs["study"] = STUDY
     return tmp_path
 
 
@@ -228,6 +230,9 @@ def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pyte
         (["s.toml", "-o", "/dev/null"], ("command line", "/dev/null", "ordinary file")),
         (["s.toml", "-o", "/proc/out.nc"], ("command line", "/proc/out.nc", "can be written")),
         (["s.toml", "-o", "x" * 300], ("command line", "-o", "can be written")),
+        (["s.toml", "-o", "s.toml/out.nc"], ("command line", "folder that exists", "s.toml is no folder")),
+        (["s.toml", "-o", "/dev/stdout"], ("command line", "/dev/stdout", "ordinary file")),
+        (["s.toml", "-o", "\udcff.nc"], ("command line", r"\udcff.nc", "give a name in UTF-8")),
         (["s.toml", "-o", "s.toml"], ("command line", "s.toml", "read by the run")),
         (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),
     ],

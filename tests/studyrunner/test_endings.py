@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -12,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from studyrunner.system.endings import take_endings, uninterrupted
+from studyrunner.system import endings
+from studyrunner.system.endings import begin_ending, is_ending, raise_ending, take_endings, uninterrupted
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,6 +48,7 @@ def _as_before() -> Iterator[None]:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
     handlers = [signal.getsignal(number) for number in numbers]
     yield
+    begin_ending()
     for number, handler in zip(numbers, handlers, strict=True):
         signal.signal(number, handler)
 
@@ -67,6 +70,41 @@ def test_an_ending_is_raised_once(end: Callable[[], None]) -> None:
     with pytest.raises(KeyboardInterrupt):
         end()
     end()
+    begin_ending()
+    end()
+    raise_ending()
+
+
+def test_an_ending_that_a_library_has_lost_is_raised_again(end: Callable[[], None]) -> None:
+    raise_ending()
+    # as in a callback of C
+    with contextlib.suppress(KeyboardInterrupt):
+        end()
+    assert is_ending(AssertionError())
+    with pytest.raises(KeyboardInterrupt):
+        raise_ending()
+    with pytest.raises(KeyboardInterrupt), uninterrupted():
+        pass
+    begin_ending()
+    assert not is_ending(AssertionError())
+    with uninterrupted():
+        raise_ending()
+
+
+def test_one_more_ends_the_process_at_once_after_a_while(
+    end: Callable[[], None], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    ended: list[int] = []
+    monkeypatch.setattr(endings.os, "_exit", ended.append)
+    endings.say_at_last("the last words")
+    with pytest.raises(KeyboardInterrupt):
+        end()
+    end()
+    assert not ended
+    monkeypatch.setattr(endings, "SECONDS_OF_GRACE", 0.0)
+    end()
+    assert ended == [130]
+    assert capfd.readouterr().err == "the last words\n"
 
 
 def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[], None]) -> None:
@@ -83,6 +121,7 @@ def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[
 
     with pytest.raises(KeyboardInterrupt):
         work()
+    begin_ending()
     assert done == ["inner", "outer"]
     with uninterrupted():
         # it was raised: what comes now is not disturbed by it
@@ -100,6 +139,7 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(
 
     with pytest.raises(KeyboardInterrupt):
         work()
+    begin_ending()
     with uninterrupted():
         pass
 

@@ -133,7 +133,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
         add_legend(figure)
     where = result.describe(shown, [course]) if course else ""
     amount = f"Worn {_when(result)}: {', '.join(ends)}." if ends else ""
-    amount = amount if largest > NO_VOLUME else "Nothing wears."
+    amount = amount if largest > NO_VOLUME else "Nothing is worn at the counts kept."
     bands = "Bands: estimated error" if any(found.get_gid() == "error" for found in panel.collections) else ""
     schemes = "" if "scheme" in result.varying else _tell_scheme(result)
     text = as_sentences(

@@ -21,7 +21,8 @@ from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.reliance import advise_point, advise_volume, show_error
+from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
 from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
@@ -151,15 +152,17 @@ def build_page_data(result: Result, limit: float) -> PageData:
 
 
 def _remarks(result: Result) -> Iterator[tuple[int, str]]:
-    """What there is to say of points beside their outcome, by number: messages, and errors above rtol."""
+    """What there is to say of points beside their outcome, by number: messages, errors above rtol, advice."""
     messages = result.dataset["message"].values.ravel() if result.has("message") else None
-    for place in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
-        message = "" if messages is None else str(messages[place])
-        error = float(result.errors.ravel()[place])
-        above = result.above.ravel()[place] and math.isfinite(error)
-        texts = (message, f"Its worn volume is known to {100.0 * error:.2g} %" if above else "")
-        if any(texts):
-            yield place, ". ".join(filter(None, texts))
+    for flat in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
+        place = tuple(int(index) for index in np.unravel_index(flat, result.above.shape))
+        texts = ["" if messages is None else str(messages[flat]), advise_point(result, place)]
+        if result.above[place] and math.isfinite(result.errors[place]):
+            texts.append(f"Its worn volume is known to {show_error(result, place)} only")
+            texts.append(f"What may help: {advise_volume(result, place)}")
+        text = as_sentences(*texts)
+        if text:
+            yield flat, text
 
 
 def _counts(result: Result, kept: _Kept) -> str:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
-from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.reliance import advise_ended, describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.result import CONVERGED, Ending, Result
 from studyrunner.report.reading.units import show_cycles, show_number, units_of
 from studyrunner.system.progress import count
 
@@ -17,7 +17,7 @@ _MOST_VALUES = 12
 
 @dataclass(frozen=True)
 class Ended:
-    """Points that ended in one way: how many, what that means, and the first of them, a line each."""
+    """Points that ended in one way: how many, what that means and what may help, and the first of them, a line each."""
 
     points: str
     sentence: str
@@ -51,12 +51,16 @@ def describe_study(result: Result) -> StudyFacts:
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
     numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
     endings = [
-        Ended(count(numbers[number], "point"), ending.sentence, describe_ended(result, number))
+        Ended(count(numbers[number], "point"), _with_advice(result, ending), describe_ended(result, number))
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     ]
     summary = " ".join(filter(None, (tell_volumes(result), tell_ends(result))))
     return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
+
+
+def _with_advice(result: Result, ending: Ending) -> str:
+    return " ".join((ending.sentence, *advise_ended(result, ending.number)))
 
 
 def _axis_values(result: Result, name: str) -> str:

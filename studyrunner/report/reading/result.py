@@ -20,10 +20,10 @@ from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 
 CONVERGED = 0
-"""The `outcome` of a point of which nothing else is to be said."""
+"""The `outcome` of a point that was computed to the end with nothing against it."""
 
 _COMPLETE = ("converged", "inaccurate", "sensitive")
-"""Words of the outcomes of points that were computed to the last cycle."""
+"""Words of the outcomes of points that were computed to the end."""
 
 NO_VOLUME = 1e-24
 """m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
@@ -79,7 +79,7 @@ class Result:
 
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
-        """Which points were computed to the last cycle, each with its error; in the shape of the axes."""
+        """Which points were computed to the end, each with its error; in the shape of the axes."""
         outcome = self.dataset["outcome"].values
         if not self.has("last_cycle"):
             # an older file holds nothing of any other point
@@ -115,9 +115,19 @@ class Result:
 
     @cached_property
     def above(self) -> NDArray[np.bool_]:
-        """Which points were computed with an error of the worn volume, or of their states, above `rtol`."""
-        inexact = self.dataset["outcome"].values != CONVERGED
-        return np.asarray(self.computed & (inexact | (self.errors > self.rtol)))
+        """Which points were computed to the end, their worn volume known less well than to rtol; shape of the axes."""
+        return np.asarray(self.computed & (self.errors > self.rtol))
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Which points were computed to the end, with a worn volume that is known to `rtol`; shape of the axes."""
+        return np.asarray(self.computed & (self.errors <= self.rtol))
+
+    @property
+    def tells_volumes(self) -> bool:
+        """Whether the file says how well worn volumes are known: with an rtol, and not of unworn states only."""
+        wears = self.has("cycle_count") or self.dataset["cycle"].values[-1] > 0.0
+        return bool(wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
 
     @cached_property
     def worn(self) -> NDArray[np.float64]:
@@ -152,6 +162,13 @@ class Result:
         """Whether anything is known of the shown point between the first state and a final one."""
         return len(self.cycles) > 1 and bool(np.isfinite(self.cycles[1:]).any())
 
+    def last_kept(self, point: Point) -> int:
+        """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
+        counts = self.counts(point)
+        last = self.last_cycle[tuple(point[name] for name in self.axes)]
+        reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
+        return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
+
     @cached_property
     def title(self) -> str:
         """Title of the study, or the name of the file."""
@@ -176,7 +193,9 @@ class Result:
         attributes = self.dataset["outcome"].attrs
         numbers = np.atleast_1d(attributes.get("flag_values", ())).tolist()
         words = str(attributes.get("flag_meanings", "")).split()
-        sentences = str(attributes.get("sentences", "")).splitlines()
+        # versions before 0.5 said so of every point that was computed to the end
+        claimed = str(attributes.get("sentences", "")).replace("computed to tolerance", "computed to the end")
+        sentences = claimed.splitlines()
         sentences += [""] * (len(words) - len(sentences))
         named = {
             int(number): Ending(int(number), word, sentence or word.replace("_", " "))
@@ -229,7 +248,7 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to the last cycle the one of the largest final worn volume; where nothing is worn, or
+        Among the points computed to the end the one of the largest final worn volume; where nothing is worn, or
         the file does not hold it, the one of the largest response at the first cycle count kept; else the first point
         that was computed; else the first. Explicit, oscillating and sensitive histories, which wear too much, only
         count where there is no other; those that ended early only where none was computed to the end.

@@ -97,7 +97,7 @@ function drawResponse() {
     });
     if (bad.length) {
       traces.push({
-        x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "failed",
+        x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "no result",
         text: bad.map((point) => plain(`${pointText(point)}: ${sentence(point)}`).replace(/(.{50,}?) /g, "$1<br>")),
         hovertemplate: "%{text}<extra></extra>", showlegend: !failures, legendrank: 3000, cliponaxis: false,
         marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } }, meta: "failed",

@@ -1,0 +1,106 @@
+"""Runs whose tasks keep the interpreter for seconds, as long calls of C do, end all the same, and soon."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.mpi.launching import CHEAP, FAKED, Running, results, run_to_end
+
+STUDY = [
+    *(FAKED, *CHEAP),
+    *("--set", "axes.frequency=[100, 110]"),
+    *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
+    *("--set", "axes.scheme=['implicit']"),
+    *("-o", "out.nc"),
+]
+HOLDS = 40
+"""Seconds that a step of a march takes, in which others get the interpreter once a second."""
+
+ENVIRONMENT = {"FAKE_STEPS": "2", "FAKE_SECONDS": "0.02", "FAKE_HOLDS": str(HOLDS)}
+N_SIGNALS = 200
+
+
+def wait_for_a_march(running: Running, folder: Path) -> None:
+    """Until the branch has taken its steps; what is computed then holds the interpreter."""
+    steps = folder / "steps.txt"
+    assert running.reaches(lambda: steps.exists() and steps.stat().st_size >= 2 * len("step\n")), running.said
+    time.sleep(1.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("n_ranks", [0, 2])
+def test_two_hundred_signals_end_it_with_a_result(n_ranks: int, number: int, tmp_path: Path) -> None:
+    began = []
+
+    def terminate(running: Running) -> None:
+        wait_for_a_march(running, tmp_path)
+        rank_0 = running.ranks()[0]
+        began.append(time.monotonic())
+        for _ in range(N_SIGNALS):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(rank_0, number)
+            time.sleep(0.01)
+
+    ended = run_to_end(n_ranks, STUDY, tmp_path, ENVIRONMENT, terminate)
+    seconds = time.monotonic() - began[0]
+    print(f"ended {seconds:.1f} s after the first signal")
+    assert ended.status == 130
+    assert ended.said.count("run-study: interrupted: out.nc holds 0 of 6 points, the same command goes on") == 1
+    assert "Traceback" not in ended.said
+    assert "worn_volume" in results(tmp_path / "out.nc")
+    assert seconds < 5.0 < HOLDS
+
+
+@pytest.mark.parametrize("victim", [0, 1])
+def test_the_launcher_is_gone_with_a_rank(victim: int, tmp_path: Path) -> None:
+    def kill(running: Running) -> None:
+        wait_for_a_march(running, tmp_path)
+        os.kill(running.ranks()[victim], signal.SIGKILL)
+
+    ended = run_to_end(3, STUDY, tmp_path, ENVIRONMENT, kill)
+    assert ended.status != 0
+    assert ended.seconds < 10.0
+
+
+STUCK = """
+import sys, time
+from studyrunner import run
+from studyrunner.checkpoint.writer import Writer
+from studyrunner.system import endings
+endings.SECONDS_OF_GRACE = 1.0
+
+def hang(*_, **__):
+    print("hangs", file=sys.stderr, flush=True)
+    while True:
+        time.sleep(600)
+
+Writer.take = hang
+from studyrunner.cli import main
+sys.exit(main())
+"""
+
+
+def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path: Path) -> None:
+    """A disk that does not answer, for one."""
+    script = tmp_path / "stuck.py"
+    script.write_text(STUCK, encoding="utf-8")
+    sent = []
+
+    def end_twice(running: Running) -> None:
+        for seconds in (0.0, 0.2, 2.0):
+            running.wait_for("hangs")
+            time.sleep(seconds)
+            sent.append(running.process.poll())
+            running.process.send_signal(signal.SIGTERM)
+
+    ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, {}, end_twice)
+    assert sent == [None, None, None]
+    assert ended.status == 130
+    assert ended.seconds < 10.0
+    assert "run-study: ended at once: the same command goes on where it was" in ended.said

@@ -1,0 +1,146 @@
+"""File systems without locks, and faults of a disk: the run works there, or says what the system says."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from studyrunner.user_error import StorageError
+
+ROOT = Path(__file__).parents[2]
+
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+static int wanted(const char *variable) {
+    const char *text = getenv(variable);
+    return text ? atoi(text) : 0;
+}
+
+/* a result on its way, but for its first kilobyte, which may be a trial */
+static int is_result(int file) {
+    char link[64], path[4096];
+    snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+    ssize_t length = readlink(link, path, sizeof path - 1);
+    if (length < 0) return 0;
+    path[length] = 0;
+    return strstr(path, "/.out.nc.") && lseek(file, 0, SEEK_END) > 0;
+}
+
+int flock(int file, int operation) {
+    if (!wanted("SHIM_FLOCK")) {
+        int (*own)(int, int) = dlsym(RTLD_NEXT, "flock");
+        return own(file, operation);
+    }
+    errno = wanted("SHIM_FLOCK");
+    return -1;
+}
+
+#define FAILING(name) \
+ssize_t name(int file, const void *data, size_t count, off_t place) { \
+    ssize_t (*own)(int, const void *, size_t, off_t) = dlsym(RTLD_NEXT, #name); \
+    if (wanted("SHIM_WRITE") && is_result(file)) { errno = wanted("SHIM_WRITE"); return -1; } \
+    return own(file, data, count, place); \
+}
+FAILING(pwrite)
+FAILING(pwrite64)
+
+ssize_t write(int file, const void *data, size_t count) {
+    ssize_t (*own)(int, const void *, size_t) = dlsym(RTLD_NEXT, "write");
+    if (wanted("SHIM_WRITE") && count > 4096 && is_result(file)) { errno = wanted("SHIM_WRITE"); return -1; }
+    return own(file, data, count);
+}
+"""
+
+STUDY = [
+    *("-m", "studyrunner.cli", "two_masses", "-o", "out.nc"),
+    *("--set", "axes.frequency=0.05", "--set", "axes.scheme=implicit", "--set", "slow_time.cycles=0"),
+]
+
+
+@pytest.fixture(scope="module")
+def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library that lets calls of the system fail."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None or sys.platform != "linux":
+        pytest.skip("there is no compiler for a library that stands in for the system's")
+    folder = tmp_path_factory.mktemp("shim")
+    (folder / "shim.c").write_text(SHIM, encoding="ascii")
+    command = [compiler, "-shared", "-fPIC", "-o", str(folder / "shim.so"), str(folder / "shim.c"), "-ldl"]
+    subprocess.run(command, check=True)
+    return folder / "shim.so"
+
+
+def run_with(shim: Path, folder: Path, **failing: int) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "LD_PRELOAD": str(shim)}
+    environment.pop("HDF5_USE_FILE_LOCKING", None)
+    environment |= {f"SHIM_{name.upper()}": str(number) for name, number in failing.items()}
+    return subprocess.run(
+        [sys.executable, *STUDY], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
+def test_a_run_works_where_there_are_no_locks(number: int, shim: Path, tmp_path: Path) -> None:
+    for _ in range(2):  # the second one reads what the first one has written
+        ended = run_with(shim, tmp_path, flock=number)
+        assert ended.returncode == 0, ended.stderr
+        assert ended.stderr.count("there are no locks on this file system") == 1
+    with xr.open_dataset(tmp_path / "out.nc") as result:
+        assert int(result.outcome.sum()) == 0
+
+
+@pytest.mark.slow
+def test_a_fault_of_the_disk_is_not_a_missing_lock(shim: Path, tmp_path: Path) -> None:
+    ended = run_with(shim, tmp_path, flock=errno.EIO)
+    assert ended.returncode == 1
+    assert "Input/output error: see whether the disk, or the way to it, is at fault" in ended.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.EIO, "Input/output error: see whether the disk, or the way to it, is at fault or give another"),
+        (errno.ENOSPC, "No space left on device: make room there or give another result file with -o"),
+        (errno.EDQUOT, "Disk quota exceeded: make room there or give another result file with -o"),
+    ],
+)
+def test_what_the_system_says_of_a_result_is_said(number: int, words: str, shim: Path, tmp_path: Path) -> None:
+    ended = run_with(shim, tmp_path, write=number)
+    assert ended.returncode == 1
+    (line,) = [line for line in ended.stderr.splitlines() if line.startswith("run-study: ")]
+    assert words in line
+    assert "Traceback" not in ended.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["out.nc.parts"]
+    assert run_with(shim, tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.EROFS, "Read-only file system"), "Read-only file system: see that it may be written or give"),
+        (
+            OSError(errno.ESTALE, "Stale file handle"),
+            "Stale file handle: mend that or give another result file with -o",
+        ),
+        (ValueError("odd"), "odd: mend that or give another result file with -o"),
+    ],
+)
+def test_other_faults_are_not_about_room(error: Exception, words: str) -> None:
+    assert words in str(StorageError(Path("out.nc"), error))

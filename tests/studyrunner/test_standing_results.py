@@ -1,0 +1,172 @@
+"""Nothing is replaced unasked: what stands where a result is to go, found before anything is computed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from studyrunner import UserError, run, run_study
+from studyrunner.cli import main
+from tests.studyrunner.faked_runs import SMALL, Solver
+
+OTHER = ["two_masses", "--set", "axes.scheme=implicit", "--set", "axes.frequency=0.05", "-o", "out.nc"]
+RENAMED = [*SMALL, "--set", "study.name=mine"]
+FINER = [*SMALL, "--set", "axes.frequency=[100, 105, 110]"]
+
+
+@pytest.fixture(autouse=True)
+def solver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Solver:
+    monkeypatch.chdir(tmp_path)
+    return Solver(monkeypatch)
+
+
+def name_in(path: str) -> str:
+    with xr.open_dataset(path) as result:
+        return str(result.attrs["study"]).split('"')[1]
+
+
+def end_at_once(solver: Solver) -> None:
+    """The first result of the next run is its last."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    solver.disturb = interrupt
+
+
+def finished(_: Solver) -> None:
+    assert main(SMALL) == 0
+
+
+def unfinished(solver: Solver) -> None:
+    end_at_once(solver)
+    assert main(SMALL) == 130
+    assert Path("out.nc").exists()
+
+
+def killed(solver: Solver) -> None:
+    unfinished(solver)
+    Path("out.nc").unlink()
+
+
+def without_folder(_: Solver) -> None:
+    assert main(SMALL) == 0
+    shutil.rmtree("out.nc.parts")
+
+
+@pytest.mark.parametrize("leave", [finished, unfinished, killed, without_folder])
+@pytest.mark.parametrize("other", [OTHER, RENAMED], ids=["another scene", "another name"])
+def test_what_is_left_of_another_study_stays(
+    leave: Callable[[Solver], None],
+    other: list[str],
+    solver: Solver,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    leave(solver)
+    before = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file() and path.name != "lock"}
+    solver.begin_again()
+    capsys.readouterr()
+    with monkeypatch.context() as early:
+        # found before the scene is built
+        early.setattr("studyrunner.scene.scene.build_study_scene", None)
+        assert main(other) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    for words in ('study "sdof_slider" (scene sdof_slider)', "--overwrite", "give another name", "out.nc"):
+        assert words in line
+    assert ('study "two_masses" (scene two_masses)' if other is OTHER else 'study "mine" (scene') in line
+    assert before == {path: path.read_bytes() for path in Path().rglob("*") if path.is_file() and path.name != "lock"}
+    assert not solver.tasks
+    assert main([*other, "--overwrite"]) == 0
+    assert name_in("out.nc") == ("two_masses" if other is OTHER else "mine")
+    # it is this one's now
+    assert main(other) == 0
+    assert main(SMALL) == 2
+
+
+def test_the_same_study_with_other_values_goes_on(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    n_tasks = len(solver.tasks)
+    assert main(FINER) == 0
+    assert len(solver.tasks) < 2 * n_tasks
+    with xr.open_dataset("out.nc") as result:
+        assert result.frequency.values.tolist() == [100.0, 105.0, 110.0]
+    # and so does the study that is in a result file
+    assert main(["out.nc", "-o", "again.nc"]) == 0
+    assert main([*FINER, "-o", "again.nc"]) == 0
+
+
+def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    end_at_once(solver)
+    assert main([*OTHER, "--overwrite"]) == 130
+    assert name_in("out.nc") == "sdof_slider"
+    solver.begin_again()
+    assert main([*OTHER, "--overwrite"]) == 0
+    assert name_in("out.nc") == "two_masses"
+
+
+def test_in_python(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(SMALL) == 0
+    overrides = {"axes.scheme": "implicit", "axes.frequency": 0.05}
+    with pytest.raises(UserError, match=r'run_study: output = .*overwrite=True.*"two_masses"'):
+        run_study("two_masses", "out.nc", overrides=overrides, progress=False)
+    with run_study("two_masses", "out.nc", overrides=overrides, progress=False, overwrite=True) as result:
+        assert 'name = "two_masses"' in result.attrs["study"]
+
+
+@pytest.mark.parametrize("content", [b"a text", b"\x89HDF\r\n\x1a\nand no more"])
+def test_what_is_no_result_is_not_replaced_at_all(
+    content: bytes, solver: Solver, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("out.nc").write_bytes(content)
+    for more in ([], ["--overwrite"], ["--fresh"]):
+        assert main([*SMALL, *more]) == 2
+        assert "it is no result of run-study" in capsys.readouterr().err
+    assert main(["sdof_slider", "--write-scene", "out.nc"]) == 2
+    assert "this is no scene file, and is left as it is" in capsys.readouterr().err
+    assert Path("out.nc").read_bytes() == content
+    assert not solver.tasks
+    assert list(Path().iterdir()) == [Path("out.nc")]
+
+
+def test_a_scene_replaces_scenes_only(capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):
+        assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
+    assert main(SMALL) == 0
+    before = Path("out.nc").read_bytes()
+    assert main(["sdof_slider", "--write-scene", "out.nc"]) == 2
+    assert Path("out.nc").read_bytes() == before
+
+
+def test_a_note_that_is_damaged_says_nothing(solver: Solver) -> None:
+    killed(solver)
+    solver.begin_again()
+    for content in (b"", b"[1]", b"\xff", b"[" * 10**5):
+        Path("out.nc.parts/study.json").write_bytes(content)
+        assert main(OTHER) == 0
+        Path("out.nc").unlink()
+
+
+def test_a_result_is_not_what_the_command_prints_into(tmp_path: Path) -> None:
+    with (tmp_path / "out.nc").open("wb") as stream:
+        command = [sys.executable, "-m", "studyrunner.cli", *SMALL]
+        ended = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+            stdout=stream,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert ended.returncode == 2
+    assert "give the name of an ordinary file" in ended.stderr
+    assert run.parts_folder(tmp_path / "out.nc").exists() is False
