@@ -32,6 +32,8 @@ class ContactInterface:
     position (n_contact, 3): m, NaN where unknown.
     surface: text label of each pair, e.g. "intrados".
     friction_coefficient (n_contact,): of each pair; None where one for all of them is given beside the scene.
+    edge (n_contact,): pairs at which the modelled contact ends though the bodies go on, as the last strip of a
+        half-space; load or wear there shows that the contact is cut off. None where the bodies end with their pairs.
     """
 
     dofs: IntArray
@@ -41,6 +43,7 @@ class ContactInterface:
     position: FloatArray
     surface: tuple[str, ...]
     friction_coefficient: FloatArray | None = None
+    edge: BoolArray | None = None
 
     @property
     def n_contact(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from enum import IntEnum
 from pathlib import Path
@@ -31,10 +32,11 @@ class Outcome(IntEnum):
     SENSITIVE = 15
     STEP_TOO_LONG = 16
     NO_FINAL_STATE = 17
+    CONTACT_CUT_OFF = 18
 
     @property
     def complete(self) -> bool:
-        """Whether the point was computed to its last cycle: its values are results, each with its error."""
+        """Whether the point was computed to the end: its values are results, each with its error, small or large."""
         return self in (Outcome.CONVERGED, Outcome.INACCURATE, Outcome.SENSITIVE)
 
     @property
@@ -44,44 +46,54 @@ class Outcome(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What a user reads."""
+        """What a user reads: what has happened. What may help depends on what was used, which is not known here."""
         return _SENTENCES[self]
 
 
 COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
-"""Outcomes of points that were computed to their last cycle."""
+"""Outcomes of points that were computed to the end."""
 
 _SENTENCES = {
-    Outcome.CONVERGED: "The point was computed to tolerance.",
+    Outcome.CONVERGED: "The point was computed to the end. How well it is known say error_estimate (worn volume) and"
+    " response_error (vibration).",
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
     Outcome.START_FAILED: "No periodic state was found at the start of the sweep, not even with the excitation raised"
-    " gradually: use more harmonics or start elsewhere.",
-    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency: use more harmonics or another sweep.",
-    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided: use a smaller"
-    " step or more harmonics.",
-    Outcome.INACCURATE: "Computed to the end, but the estimated error of response or wear rate stays above rtol for"
-    " some of the cycles, with as many harmonics as may be used: response_error and wear_rate_error say by how much.",
-    Outcome.SENSITIVE: "The worn volume depends so much on the step or on the start state that one number says little:"
-    ' two computations of nearly the same case differ by more than half; use scheme = "adaptive" or a smaller step.',
-    Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits:"
-    " use more samples or a smaller tolerance.",
-    Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays: sweep in the other"
-    " direction or raise the excitation at fixed frequency.",
+    " gradually.",
+    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency.",
+    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided.",
+    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of response or wear rate is above"
+    " rtol for some of the cycles: response_error and wear_rate_error say by how much.",
+    Outcome.SENSITIVE: "The point was computed to the end, but the worn volume depends so much on the step or on the"
+    " start state that one number says little: two computations of nearly the same case differ by more than half.",
+    Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
+    Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays.",
     Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two periods of the excitation or more,"
     " which is not computed: the state that repeats after one is unstable.",
     Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
     " of the joint would move: its end is no result. The variable message says which step, and how long it may be.",
     Outcome.NO_FINAL_STATE: "Wear goes on without end: the point has no final state, and message says at which rate it"
-    " wears. Give slow_time.cycles or slow_time.until an end.",
+    " wears.",
+    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the pairs that model it: a pair at their edge carries load or"
+    " wears, so that the scar is cut off, too narrow and too deep. Give the model pairs farther out: of a bundled scene"
+    " a larger half_width, or none so that it is chosen, and as many more strips or patches.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
-    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",
+    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"
+    " with a larger one.",
     Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
     Outcome.NOT_COMPUTED: "The run ended before this point was computed: the same command goes on from here.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
 }
+
+
+def known_to(error: float, rtol: float) -> str:
+    """What a relative error above `rtol` says: "is known to 2.6 % only", with digits that show it above."""
+    if math.isinf(error):
+        return "is not known"
+    short = f"{100.0 * error:.2g}"
+    return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 
 
 def describe_error(error: Exception) -> str:

@@ -34,7 +34,8 @@ class WearTarget:
 class ToTheEnd:
     """In place of cycle counts: a march until nothing wears any more.
 
-    n_outputs: states that are kept, the first and the last included, equally spaced in worn volume; at least 2.
+    n_outputs: states that are kept, the first and the last included, spaced evenly in worn volume and cycles; at
+        least 2.
     final_share: the march ends where the wear rate of every pair is below this share of the largest that it has had;
         what a pair has worn at is counted as at least that share of the largest of all pairs.
     """

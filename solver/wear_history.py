@@ -69,8 +69,8 @@ def march_wear(
     until
         Wear at which the march ends before the last of `cycles`; `cycles_to_target` of the history is that count.
     outputs, final_share
-        Of a march to the end: the states that are reported, equally spaced in worn volume, at counts that the history
-        says; and the share of the largest wear rate of each pair that this has to fall below.
+        Of a march to the end: the states that are reported, spaced evenly in worn volume and cycles, at counts that the
+        history says; and the share of the largest wear rate of each pair that this has to fall below.
 
     Raises
     ------

@@ -100,8 +100,9 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
         "normal_load": (contact.normal_load, (n_contact,)),
         "position": (contact.position, (n_contact, 3)),
     }
-    if contact.friction_coefficient is not None:
-        shapes["friction_coefficient"] = (contact.friction_coefficient, (n_contact,))
+    for name in ("friction_coefficient", "edge"):
+        if getattr(contact, name) is not None:
+            shapes[name] = (getattr(contact, name), (n_contact,))
     for name, (values, shape) in shapes.items():
         _check_shape(f"contact/{name}", values, shape)
         _check_finite(f"contact/{name}", values, nan_allowed=name == "position")

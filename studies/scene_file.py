@@ -4,7 +4,7 @@ Numbers may be of any integer or floating type; complex ones are compounds `{r, 
 them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
 following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
 other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
-of mass and stiffness.
+of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
 
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
@@ -24,7 +24,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import (
+    BoolArray,
+    ComplexArray,
+    ContactInterface,
+    FloatArray,
+    IntArray,
+    LinearModel,
+    Matrix,
+    ReducedModel,
+)
 from studies.guards.hdf5_guard import (
     LARGEST_FILE,
     LARGEST_RESULT,
@@ -292,7 +301,15 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         position=position,
         surface=_read_text(datasets, "contact/surface") if labelled else ("",) * n_contact,
         friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
+        edge=_flags("contact/edge", _read_numbers(datasets, "contact/edge")) if "contact/edge" in datasets else None,
     )
+
+
+def _flags(key: str, values: NDArray[Any]) -> BoolArray:
+    wrong = values[(values != 0) & (values != 1)]
+    if wrong.size:
+        raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
+    return np.asarray(values == 1)
 
 
 def _whole(key: str, values: NDArray[Any]) -> IntArray:

@@ -11,7 +11,7 @@ from solver.model import ReducedModel
 from studies.model_check import is_grouped
 from studies.scene_answers import SurfaceMesh
 
-CONTACT = ("dofs", "area", "gap", "normal_load", "friction_coefficient", "position", "surface")
+CONTACT = ("dofs", "area", "gap", "normal_load", "friction_coefficient", "position", "edge", "surface")
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
@@ -30,9 +30,11 @@ def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tu
     """Name with its groups and values of each dataset; texts as arrays of numpy's type U."""
     contact = model.contact
     for name in CONTACT[:-1]:
-        # without friction coefficients of its own a scene has no such dataset
-        if getattr(contact, name) is not None:
-            yield f"contact/{name}", getattr(contact, name)
+        values = getattr(contact, name)
+        # without friction coefficients or edges of its own a scene has no such dataset
+        if values is not None:
+            # HDF5 has no boolean numbers
+            yield f"contact/{name}", values.astype(np.int8) if values.dtype.kind == "b" else values
     yield "contact/surface", np.array(contact.surface, dtype=np.str_)
     for k, linear in model.linear.items():
         prefix = f"nd/{k}/" if is_grouped(model) else ""

@@ -174,7 +174,8 @@ def _show_plan(study: Study) -> int:
     before = largest_memory()
     facts = describe_scene(build_study_scene(study, _SlowSteps().say))
     built_with = largest_memory() - before
-    print(format_plan(study, facts, build_tasks(study, facts.n_displacements), built_with), flush=True)
+    plan = build_tasks(study, facts.n_displacements)
+    print(format_plan(study, facts, plan, built_with, time.process_time()), flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")

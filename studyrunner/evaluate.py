@@ -14,9 +14,11 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
 from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
 from solver.packing import Packed, pack, unpack
+from solver.results.cut_off import describe_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
-from studyrunner.plan.places import describe_reach, known_to, show_count
+from studyrunner.percent import known_to
+from studyrunner.plan.places import describe_reach, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import AUTO
@@ -208,13 +210,13 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         last = min(history.last_cycle / slower, last)
     elif not outcome.complete and not task.held:
         last = min(history.last_cycle, last)
-    errors, depths = history.worn_volume_error[known], history.wear_depth[known]
+    depths = history.wear_depth[known]
     message = _message(task, history, outcome, place, slower, known, last)
     of_its_own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,
         "cycles_to_target": target,
-        "error_estimate": float(errors[-1]) if known.size else math.nan,
+        "error_estimate": _last_error(history, known, last),
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
@@ -224,6 +226,17 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
     return MarchResult(scaled.points, {**variables, **of_march, **of_its_own}, place)
+
+
+def _last_error(history: WearHistory, known: NDArray[np.intp], last: float) -> float:
+    """Estimated relative error of the last worn volume that the result holds; NaN where there is none.
+
+    The unworn joint has no volume to be wrong, but where it is all that is held of a history that went on (a target may
+    be reached before the first count) what has worn there is not known. last: count that the march has come to.
+    """
+    if not known.size or (history.cycles[known[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[known[-1]] > 0.0)):
+        return math.nan
+    return float(history.worn_volume_error[known[-1]])
 
 
 def scaled_outcome(
@@ -237,6 +250,8 @@ def scaled_outcome(
     ended = history.outcome
     if place == 0 or not whole:
         return ended
+    if history.cycles[known[-1]] >= history.cut_off_cycle:
+        return Outcome.CONTACT_CUT_OFF
     if history.worn_volume_error[known[-1]] > SENSITIVE_ERROR:
         return Outcome.SENSITIVE
     settings = task.settings
@@ -278,10 +293,12 @@ def _message(
     worn = float(history.worn_volume_error[known[-1]])
     if outcome is Outcome.NO_FINAL_STATE:
         return f"at cycle {show_count(last)} the joint wears on at {slower * history.wear_rate[-1]:.6g} m3 a cycle"
+    if outcome is Outcome.CONTACT_CUT_OFF:
+        return describe_cut_off(history.cut_off_cycle / slower)
     if not outcome.complete:
         return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
     if outcome is Outcome.SENSITIVE:
-        return f"the worn volume {known_to(worn)}"
+        return f"the worn volume {known_to(worn, task.settings.rtol)}"
     above = np.flatnonzero(_state_errors(history, known) > task.settings.rtol)
     if not above.size:
         return ""
@@ -289,7 +306,8 @@ def _message(
     response, rate = (float(np.nan_to_num(one[behind], posinf=np.inf).max()) for one in _estimated(history))
     cycle = float(history.cycles[behind[0]]) / slower
     begin = f"from cycle {show_count(cycle)} on " if cycle > 0.0 else ""
-    return f"{begin}the {'wear rate' if rate >= response else 'response'} {known_to(max(rate, response))}"
+    what = "wear rate" if rate >= response else "response"
+    return f"{begin}the {what} {known_to(max(rate, response), task.settings.rtol)}"
 
 
 def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, *, whole: bool) -> str:

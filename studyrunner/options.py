@@ -26,10 +26,10 @@ examples:
   run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
 
 exit status:
-  0  all points were computed, each with its error; the last lines say how many are within rtol
+  0  all points were computed to the end, each with its error; the last lines say how many are known to rtol
   1  unexpected failure
   2  bad input, nothing was computed: one line says what is wrong
-  3  finished and saved, but some points failed; their `outcome` says why
+  3  finished and saved, but some points failed, not computed to the end; their `outcome` says why
   130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
 
 A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that

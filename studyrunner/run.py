@@ -71,7 +71,7 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_complete: points computed to their last cycle. n_left: those that are not computed yet.
+    """How a run ended. n_complete: points computed to the end. n_left: those that are not computed yet.
 
     n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
     certificates: the table that begins with the worn volume. written: whether the file holds this, or is as it was.

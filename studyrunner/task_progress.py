@@ -20,7 +20,9 @@ _TRIES_AGAIN = 1
 _COST_AT_REST = 0.01
 """Estimated time of a march where nothing wears, over that of one that takes its steps."""
 
-_LATE = 1.0  # a task that takes longer than expected goes on for such a fraction of the time that it has taken
+_LATE = 0.3
+"""A task that takes longer than expected goes on for such a fraction of the time that it has taken: what is known to a
+factor of two and is late by that factor has, on the mean, so much of it before it."""
 
 
 class TaskProgress:
@@ -53,7 +55,7 @@ class TaskProgress:
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         """Takes a result; returns the tasks that it makes possible, or that are to be done again."""
-        self._left[task.kind] -= task.cost / task.n_results
+        self._left[task.kind] -= task.cost_of(first=_is_first(task, result))
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
             last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
@@ -75,7 +77,7 @@ class TaskProgress:
             return ()
         again = self._completion.renew(task)
         if isinstance(again, BranchTask):
-            again = replace(again, cost=task.cost * again.n_results / task.n_results)
+            again = replace(again, cost=_cost_left(task, again.n_results))
             self.n_starts_left += again.n_results
         else:
             # it gives all of its histories again
@@ -111,17 +113,17 @@ class TaskProgress:
                 if crash is not None and crash.position is not None:
                     behind = again.order[again.order.index(crash.position) :]
                     again = replace(again, known=again.known.union(behind))
-                again = replace(again, cost=task.cost * again.n_results / task.n_results)
-                self._left[task.kind] -= task.cost * n_left / task.n_results - again.cost
+                again = replace(again, cost=_cost_left(task, again.n_results))
+                self._left[task.kind] -= _cost_left(task, n_left) - again.cost
                 self.n_starts_left -= n_left - again.n_results
                 left += [again] if again.n_results else []
             elif crash is not None:
-                self._left[task.kind] -= task.cost * n_left / task.n_results
+                self._left[task.kind] -= _cost_left(task, n_left)
             else:
                 # it gives all of its histories again
                 n_given = task.n_results - n_left
                 self.n_points -= sum(len(scaled.points) for scaled in again.histories[:n_given])
-                self._left[task.kind] += task.cost * n_given / task.n_results
+                self._left[task.kind] += task.cost - _cost_left(task, n_left)
                 left.append(again)
         return left
 
@@ -138,8 +140,8 @@ class TaskProgress:
         factors = {kind: self.costs.correction(((kind,),)) for kind in self._left}
         left = sum(max(0.0, seconds) * factors[kind] for kind, seconds in self._left.items())
         longest = 0.0
-        for task, _, elapsed in running:
-            expected = task.cost / task.n_results * factors[task.kind]
+        for task, n_left, elapsed in running:
+            expected = task.cost_of(first=n_left == task.n_results) * factors[task.kind]
             # one that is late takes some time more, nobody knows how much
             still = max(expected - elapsed, _LATE * elapsed)
             left += still - expected
@@ -158,6 +160,18 @@ class TaskProgress:
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             return f"{how} to {task.frequencies[place]:.6g} Hz"
         return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
+
+
+def _is_first(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> bool:
+    """Whether a result is the first one of its task."""
+    if isinstance(task, BranchTask) and isinstance(result, StartResult):
+        return result.position == next(place for place in task.order if place not in task.known)
+    return isinstance(result, MarchResult) and result.place == 0
+
+
+def _cost_left(task: BranchTask | MarchTask, n_left: int) -> float:
+    """Estimated seconds of the last results of a task."""
+    return task.cost if n_left == task.n_results else n_left * task.cost_of(first=False)
 
 
 def fault_of(result: StartResult | MarchResult) -> str:

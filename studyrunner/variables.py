@@ -207,7 +207,7 @@ COUNTS = {
         ("cycle",),
         "1",
         "number of vibration cycles of the output",
-        comment="Of each point its own: its outputs are equally spaced in worn volume.",
+        comment="Of each point its own: its outputs are spaced evenly in worn volume and cycles.",
     )
 }
 """That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
@@ -275,7 +275,7 @@ KEPT = {
         (),
         "m",
         "largest wear depth of any pair at any count",
-        comment="The joint is taken as it was designed: small against the distance between pairs, wear leaves it so.",
+        comment="The joint is taken as it was designed: small against the width of the contact, wear leaves it so.",
     ),
     "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
     "fold_frequency": Variable(

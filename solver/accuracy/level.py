@@ -31,11 +31,15 @@ from solver.structure.joint import Case, Joint
 
 @dataclass(frozen=True)
 class Level:
-    """A state with the case that it was solved in."""
+    """A state with the case that it was solved in.
+
+    usual_work: N m, slip work against which that of the state is judged where it is less; 0 where it counts by itself.
+    """
 
     case: Case
     joint: Joint
     point: PathPoint
+    usual_work: float = 0.0
 
     def solve_at(self, resolution: Resolution, effort: Effort) -> Level | None:
         """The same state with other harmonics and samples; None where it is not found."""
@@ -82,7 +86,7 @@ class Level:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
         # the mean position of a mass depends a little on the harmonics
-        return Level(case, joint, point).at_rest(effort)
+        return replace(self, case=case, joint=joint, point=point).at_rest(effort)
 
     def at_rest(self, effort: Effort) -> Level:
         """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
@@ -91,14 +95,16 @@ class Level:
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         rested = shake_down(self.joint, self.point, fraction, settings.tolerance, effort)
-        return Level(self.case, self.joint, rested)
+        return replace(self, point=rested)
 
     def least_work(self) -> float:
-        """Slip work, N m, below which a relative error of it weighs less: a fraction of what the excitation does."""
+        """Slip work, N m, below which a relative error of it weighs less: the usual one, or a part of the work of the
+        excitation.
+        """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         cheap = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
         small = ACCURACY.small_slip_work if cheap else ACCURACY.dear_small_slip_work
-        return small * abs(self.joint.structure.input_work(motion))
+        return max(small * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, effort: Effort) -> Level | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""

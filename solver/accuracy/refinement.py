@@ -48,6 +48,7 @@ def refine(
     point: PathPoint,
     effort: Effort,
     most: float = ACCURACY.most_unknowns,
+    usual_work: float = 0.0,
 ) -> Refined:
     """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
 
@@ -63,6 +64,8 @@ def refine(
         Newton iterations spent are added to it.
     most
         Unknowns of a joint of 48 pairs up to which more harmonics are taken (`room_for`).
+    usual_work
+        N m, slip work against which a smaller one is judged: next to none has no relative error to speak of.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def refine(
         Behind the deadline of the effort.
     """
     settings = case.settings
-    here = Level(case, case.joint(omega, excitation_amplitude), point)
+    here = Level(case, case.joint(omega, excitation_amplitude), point, usual_work)
     here = here.at_rest(effort)
     begun = effort.iterations
     faint = False

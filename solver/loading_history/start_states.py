@@ -32,7 +32,7 @@ from solver.packing import Packed, pack, unpack
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
-from solver.stability.period_doubling import doubles_period
+from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 
 
@@ -110,7 +110,7 @@ def follow_branch(
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
-                message=message,
+                message=message or found.message,
             ),
         )
         started, counted = now, walks.n_iterations
@@ -131,6 +131,7 @@ class _Found:
         self.coarse: PeriodicState | None = None
         self.resolution: Resolution | None = None
         self.estimate = UNKNOWN
+        self.message = ""
 
 
 class FrequencySweepState(TypedDict):
@@ -258,8 +259,9 @@ class FrequencySweep:
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
             found.outcome, found.state, found.coarse = Outcome.CERTIFICATE_FAILED, None, None
-        elif doubles_period(refined.case, joint, refined.point.evaluation, self.effort):
-            found.outcome, found.state, found.coarse = Outcome.PERIOD_DOUBLED, None, None
+        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.effort):
+            found.outcome, found.state, found.coarse = unstable.outcome, None, None
+            found.message = unstable.sentence
         elif not refined.accurate:
             found.outcome = Outcome.INACCURATE
         return found

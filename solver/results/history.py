@@ -86,6 +86,8 @@ class WearHistory:
     oscillates: the wear rate went up and down from step to step without calming, as in an unstable explicit scheme.
     final_method: "active_set" or "march", how the scheme "final" has found the final state; empty with the others. A
         final state of an active set has the count inf, and nothing is known between the unworn one and it.
+    cut_off_cycle: first of the counts at which a pair at an edge of the modelled contact carries load or has worn
+        (`ContactInterface.edge`), NaN if never.
     message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
         longer and the error reached; empty where there is nothing to add.
     """
@@ -125,4 +127,5 @@ class WearHistory:
     step_limit: float = math.inf
     oscillates: bool = False
     final_method: str = ""
+    cut_off_cycle: float = math.nan
     message: str = ""

@@ -14,6 +14,7 @@ from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import attributes, set_attributes
+from solver.results.cut_off import first_cut_off
 from solver.results.history import WearHistory
 from solver.results.loops import LOOP_PHASES
 from solver.results.options import RESULTS
@@ -281,6 +282,7 @@ class Recorder:
             last_cycle=float("nan") if self.last is None else min(self.last[0], float(self.cycles[-1])),
             # adaptive steps go beyond the end
             cycles_to_target=self.reached if self.reached <= self.cycles[-1] else math.nan,
+            cut_off_cycle=first_cut_off(self.model.contact, self.cycles, kept["mean_pressure"], kept["wear_depth"]),
             **kept,
         )
 

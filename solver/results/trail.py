@@ -1,4 +1,4 @@
-"""Steps of a march whose length is not known beforehand: kept on the way, and read at equal steps of worn volume."""
+"""Steps of a march whose length is not known beforehand: kept on the way, and read evenly along the history."""
 
 from __future__ import annotations
 
@@ -32,9 +32,12 @@ class TrailState(RecorderState):
 
 @dataclass
 class TrailRecorder(Recorder):
-    """Takes the steps of a march to the end; in the end its counts are those at which equal volumes have worn.
+    """Takes the steps of a march to the end; in the end its counts divide the history evenly.
 
-    Where the steps become many those are left out that wear least. cycles (n_output,): all 0.
+    The way from one count to the next is what wears over all that has worn, and the cycles over all cycles: each is the
+    same, so that neither a burst of wear nor the long calm behind it falls between two outputs, and straight lines
+    between them show the history. Where the steps become many those are left out that go the least way.
+    cycles (n_output,): all 0.
     """
 
     wear_coefficient: float = field(init=False, default=0.0)
@@ -93,20 +96,21 @@ class TrailRecorder(Recorder):
         return np.array([report.wear_depth @ self.model.contact.area for _, report, _, _ in self.steps])
 
     def _thin(self) -> None:
-        """Leave out steps between which little has worn; their errors go to those that follow."""
-        volumes = self._volumes()
-        least = 2.0 * volumes[-1] / self._most
+        """Leave out steps that go a little way; their errors go to those that follow."""
+        at, volumes = np.array([step[0] for step in self.steps]), self._volumes()
+        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
+        least = 2.0 * way[-1] / self._most
         kept, error, left, difference = [self.steps[0]], 0.0, 0, None
         for place, (cycle, report, own, differs) in enumerate(self.steps[1:], start=1):
             error += own
             difference = differs if differs is not None else difference
-            if place == len(self.steps) - 1 or volumes[place + 1] - volumes[left] > least:
+            if place == len(self.steps) - 1 or way[place + 1] - way[left] > least:
                 kept.append((cycle, report, error, difference))
                 error, left, difference = 0.0, place, None
         self.steps = kept
 
     def _counts(self, end: float) -> FloatArray:
-        """Counts (n_output,) at which the worn volume has gone equal ways from none to that at the count `end`."""
+        """Counts (n_output,) that divide the way to the count `end` evenly."""
         at, volumes = np.array([step[0] for step in self.steps]), self._volumes()
         courses = [self._course(one, other) for one, other in pairwise(self.steps)]
         found = np.zeros(self.cycles.size)
@@ -115,10 +119,14 @@ class TrailRecorder(Recorder):
             return found
         last = int(np.clip(np.searchsorted(at, end), 1, len(courses)))
         whole = volumes[last - 1] + _cubic(courses[last - 1], (end - at[last - 1]) / (at[last] - at[last - 1]))
+        way = at / end + volumes / whole
         for place in range(1, found.size - 1):
-            wanted = whole * place / (found.size - 1)
-            step = int(np.clip(np.searchsorted(volumes, wanted), 1, last))
-            within = _solve_cubic(courses[step - 1], wanted - volumes[step - 1])
+            wanted = 2.0 * place / (found.size - 1)
+            step = int(np.clip(np.searchsorted(way, wanted), 1, last))
+            # the cycles of a step are a cubic with equal slopes
+            straight = (at[step] - at[step - 1]) / end
+            grown, first, behind = (value / whole + straight for value in courses[step - 1])
+            within = _solve_cubic((grown, first, behind), wanted - way[step - 1])
             found[place] = min(at[step - 1] + within * (at[step] - at[step - 1]), end)
         return found
 

@@ -11,8 +11,9 @@ from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed, pack, unpack
+from solver.results.cut_off import judge_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
 from solver.results.trail import TrailRecorder
@@ -178,7 +179,9 @@ def march_wear(
     )
     if outcome is Outcome.CONVERGED:
         outcome, message = _judge(march, history, recorder.compared)
-    return replace(
+    elif outcome in (Outcome.UNSTABLE, Outcome.PERIOD_DOUBLED):
+        message = march.reason
+    ended = replace(
         history,
         outcome=outcome,
         branch=start.branch,
@@ -188,6 +191,7 @@ def march_wear(
         # what alternates with the other schemes are small corners of the wear rate, not the steps
         oscillates=scheme == "explicit" and march.oscillates(),
     )
+    return judge_cut_off(ended)
 
 
 def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tuple[Outcome, str]:
@@ -215,8 +219,8 @@ def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tup
     if march.inaccurate_from < float("inf"):
         what = "wear rate" if march.worst.wear_rate >= march.worst.response else "response"
         return Outcome.INACCURATE, (
-            f"from cycle {march.inaccurate_from:,.0f} on the {what} is known to "
-            f"{100.0 * march.worst.largest:.2g} % only".replace(",", " ")
+            f"from cycle {march.inaccurate_from:,.0f} on the {what} ".replace(",", " ")
+            + known_to(march.worst.largest, march.case.settings.rtol)
         )
     return Outcome.CONVERGED, ""
 

@@ -139,5 +139,5 @@ def check_step(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: 
         advised = length * WEAR.advised_moved_load / fraction
         raise StepTooLongError(
             f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
-            f" normal forces of the joint: use steps of at most {advised:.2g} cycles"
+            f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
         )

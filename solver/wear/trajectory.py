@@ -28,7 +28,7 @@ from solver.results.history import StartState
 from solver.results.oscillation import RatesState, WearRates
 from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution, Scheme
-from solver.stability.period_doubling import doubles_period
+from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, Joint
 from solver.wear.branch_loss import state_after_fold, stays
 from solver.wear.euler import euler_step
@@ -96,7 +96,9 @@ class Trajectory:
         self.jumps = 0
         # whether a step that is too long ends it; that of a companion only shows in the error
         self.bounded = True
-        self.failure = Outcome.MARCH_FAILED
+        # N m, against which the slip work of a state in which next to nothing wears is judged
+        self.usual_work = 0.0
+        self.failure, self.reason = Outcome.MARCH_FAILED, ""
         self.step_limit = float("nan")
         # m3 per cycle, of every pair and of all together
         self.rates = WearRates(self.case.model.contact.n_contact + 1)
@@ -168,7 +170,7 @@ class Trajectory:
                 self.worst = self.estimate if known else UNKNOWN
         if not holds:
             return Outcome.CERTIFICATE_FAILED
-        return self._period_doubling() if anew else Outcome.CONVERGED
+        return self._judge(every=False) if anew else Outcome.CONVERGED
 
     def _wears_otherwise(self) -> bool:
         """Whether so much has worn at another rate that errors may have become others, however alike the vibration."""
@@ -194,7 +196,8 @@ class Trajectory:
 
     def _refine(self) -> bool:
         """Estimate the errors of the current state; False where they cannot be brought below rtol."""
-        refined = refine(self.case, self.joint.omega, self.joint.excitation_amplitude, self.point, self.effort)
+        at = self.case, self.joint.omega, self.joint.excitation_amplitude, self.point
+        refined = refine(*at, self.effort, usual_work=self.usual_work)
         self.estimate, self.point = refined.estimate, refined.point
         if refined.case is not self.case:
             self.case, self.solver, self.last_change = refined.case, JacobianSolver(), None
@@ -297,11 +300,15 @@ class Trajectory:
         """Whether the current state is one that the vibration stays at."""
         if not stays(self.joint, self.point.evaluation, self.solver):
             return Outcome.UNSTABLE
-        return self._period_doubling()
+        return self._judge(every=True)
 
-    def _period_doubling(self) -> Outcome:
-        doubled = doubles_period(self.case, self.joint, self.point.evaluation, self.effort)
-        return Outcome.PERIOD_DOUBLED if doubled else Outcome.CONVERGED
+    def _judge(self, every: bool) -> Outcome:
+        """Whether the vibration stays at the current state; `every`: as in `find_instability`."""
+        unstable = find_instability(self.case, self.joint, self.point.evaluation, self.effort, every)
+        if unstable is None:
+            return Outcome.CONVERGED
+        self.reason = unstable.sentence
+        return unstable.outcome
 
     def oscillates(self) -> bool:
         """Whether the wear rate of the joint or of a pair went up and down from step to step."""

@@ -5,6 +5,7 @@ Every bundled scene is a module of this package with a pydantic class `Parameter
 
 - `describe_mesh(parameters) -> SurfaceMesh`,
 - `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more of them than its reduced model,
+- `with_room_for_wear(parameters, expected) -> Parameters`, where its pairs end at an artificial edge,
 - `exact_answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles) -> ExactAnswer`.
 
 A module is imported when its scene is asked for, so that listing the scenes costs nothing.
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from solver.model import FloatArray, ReducedModel
     from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh
+    from studies.scenes.half_space.room_for_wear import ExpectedWear
 
 BUNDLED = ("cylinder_on_flat", "dovetail_sector", "sdof_slider", "sphere_on_flat", "two_masses", "vibro_impact")
 
@@ -71,6 +73,13 @@ def scene_frequencies(model: str, parameters: BaseModel) -> NaturalFrequencies:
     Raises SceneError where the parameters describe no possible structure.
     """
     return cast("NaturalFrequencies", _scene_attribute(model, "natural_frequencies")(parameters))
+
+
+def scene_with_room(model: str, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
+    """Parameters of a bundled scene whose pairs have room for what wears; as they are where it needs none."""
+    if not scene_has(model, "with_room_for_wear"):
+        return parameters
+    return cast("BaseModel", _scene_attribute(model, "with_room_for_wear")(parameters, expected))
 
 
 def scene_answer(

@@ -5,7 +5,7 @@ Strips of half of the contact carry uniform tractions on two elastic half-planes
 cylinder. `excitation_amplitude` multiplies Q or the stroke, and the frequency has no influence. Unworn, the pressure is
 Hertz's and the stick zone Cattaneo's, and partial slip wears to a profile that is known (`closed_forms.hertz`). The
 depth of a pair is that of flat and cylinder together; areas, forces and volumes are of both halves. The strips stay
-where they are: a stroke is small beside the contact.
+where they are: a stroke is small beside the contact. Load or wear on the last strip shows that they are too few.
 """
 
 from __future__ import annotations
@@ -15,14 +15,23 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from solver.model import ReducedModel
 from studies.scene_error import SceneError
-from studies.scenes.closed_forms.hertz import line_half_width, line_stick_width, line_worn_edge
+from studies.scenes.closed_forms.hertz import (
+    line_half_width,
+    line_stick_under_stroke,
+    line_stick_width,
+    line_worn_edge,
+)
 from studies.scenes.half_space.influence import composite_modulus, strip_compliance
 from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
+from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
 Measured: the area worn in the end is then within 0.2 % with 8 to 128 strips in half of the stick zone, with 0 it is 13
 to 0.9 % off, of first order."""
+
+_WIDEST = 0.45
+"""Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
 
 
 class Parameters(BaseModel):
@@ -51,7 +60,8 @@ class Parameters(BaseModel):
         None,
         gt=0,
         description="half of the width of all strips, m; if not given somewhat more than wear makes of the contact, so"
-        " that an edge of strips is at that of the stick zone",
+        " that an edge of strips is at that of the stick zone; where a stroke slides a study chooses it by what it will"
+        " wear, and without a study it is 1.5 times that of the unworn contact",
     )
     depth: float | None = Field(
         None,
@@ -79,8 +89,33 @@ def strips_half_width(parameters: Parameters) -> float:
     if share >= 1.0:
         return 1.5 * contact
     stick = line_stick_width(contact, share)
-    within = max(round(0.5 * p.strips * stick / (1.2 * line_worn_edge(contact, stick))), 1)
+    worn = line_worn_edge(contact, stick)
+    # not so many that the scar reaches the last strip, as it would where there are few
+    most = int(0.5 * (p.strips - 1) * stick / (1.02 * worn) + _WIDER)
+    within = max(min(round(0.5 * p.strips * stick / (1.2 * worn)), most), 1)
     return 0.5 * p.strips * stick / (within - _WIDER)
+
+
+def with_room_for_wear(parameters: Parameters, expected: ExpectedWear) -> Parameters:
+    """With the half-width that a stroke needs: where it slides by what is worn, below that by what can be.
+
+    As they are where the half-width is given, wear has no end, or no more is needed than is taken without it.
+    """
+    p = parameters
+    if p.half_width is not None or p.stroke is None:
+        return p
+    modulus, stroke = composite_modulus(p.E, p.nu), p.stroke * expected.amplitude
+    contact = line_half_width(p.P, p.R, modulus)
+    volume = min(4.0 * expected.per_slip_work * p.P * stroke, expected.volume / p.length)
+    worn = Scar(p.R, contact, 3, 1.5).half_width(volume, expected.depth)
+    stick = line_stick_under_stroke(stroke, p.friction_coefficient, p.P, contact, modulus, reference_depth(p))
+    if stick > 0.0:
+        worn = min(worn, 1.1 * line_worn_edge(contact, stick))
+    # the middle of the last strip is half a strip before its end
+    needed = min(worn * p.strips / (p.strips - 1), _WIDEST * reference_depth(p))
+    if not np.isfinite(worn) or needed <= strips_half_width(p):
+        return p
+    return p.model_copy(update={"half_width": round_up(needed)})
 
 
 def tangential_force(parameters: Parameters) -> float:
@@ -102,6 +137,7 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     middle = 0.5 * (edges[1:] + edges[:-1])
     compliance = strip_compliance(edges, composite_modulus(p.E, p.nu), p.length, reference_depth(p))
     position = np.stack([middle, np.zeros_like(middle), np.zeros_like(middle)], axis=1)
-    contact = pairs_of_patches(position, 2.0 * np.diff(edges) * p.length, middle**2 / (2.0 * p.R), "flat/cylinder")
+    area, gap, last = 2.0 * np.diff(edges) * p.length, middle**2 / (2.0 * p.R), middle == middle[-1]
+    contact = pairs_of_patches(position, area, gap, "flat/cylinder", last)
     force = tangential_force(p) * p.length if p.stroke is None else None
     return press_body((compliance, compliance), contact, p.P * p.length, force, p.stroke, "cylinder")

@@ -5,7 +5,8 @@ Square patches of a quarter of the contact carry uniform tractions; each stands 
 moves the sphere. `excitation_amplitude` multiplies Q or the stroke, and the frequency has no influence. Unworn, the
 pressure is Hertz's and the stick zone that of Cattaneo and Mindlin, whose tractions across the force are left out, and
 partial slip wears to a profile that is known (`closed_forms.hertz`). The depth of a pair is that of flat and sphere
-together; areas, forces and volumes are of all four quarters.
+together; areas, forces and volumes are of all four quarters. Load or wear
+on a patch at the edge shows that the patched circle is too small.
 """
 
 from __future__ import annotations
@@ -15,15 +16,24 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from solver.model import ReducedModel
 from studies.scene_error import SceneError
-from studies.scenes.closed_forms.hertz import point_radius, point_stick_radius, point_worn_edge
+from studies.scenes.closed_forms.hertz import (
+    point_radius,
+    point_stick_radius,
+    point_stick_under_stroke,
+    point_worn_edge,
+)
 from studies.scenes.half_space.influence import composite_modulus, patch_compliance
 from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
+from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.
 Measured: with 20 patches depth and volume worn in the end are then within 2 and 1 %."""
 _NEAR = 0.08
 """Relative change of the width of the patches within which one is looked for whose stuck patches are round."""
+
+_WIDEST = 0.5
+"""Of the radius of the sphere: beyond it is no paraboloid."""
 
 
 class Parameters(BaseModel):
@@ -51,7 +61,8 @@ class Parameters(BaseModel):
         None,
         gt=0,
         description="radius of the patched circle, m; if not given somewhat more than wear makes of the contact, so"
-        " that the patches within the stick zone are as large as it is",
+        " that the patches within the stick zone are as large as it is; where a stroke slides a study chooses it by"
+        " what it will wear, and without a study it is 1.4 times that of the unworn contact",
     )
 
     @model_validator(mode="after")
@@ -77,19 +88,46 @@ def patched_radius(parameters: Parameters) -> float:
     if share >= 1.0:
         return 1.4 * contact
     stick = point_stick_radius(contact, share)
-    wanted = 1.2 * point_worn_edge(contact, stick)
+    worn = point_worn_edge(contact, stick)
+    wanted = 1.2 * worn
     # in widths of a patch: distances of the middles, and how many lie nearer than the next one
     along = np.arange(2 * p.patches) + 0.5
     distance, count = np.unique(np.round(np.hypot(along[:, None], along[None, :]), 9), return_counts=True)
     within = np.sqrt(4.0 * np.cumsum(count) / np.pi) - _WIDER
     holds = np.flatnonzero((distance[:-1] < within[:-1]) & (within[:-1] < distance[1:]))
     change = stick / within[holds] * p.patches / wanted - 1.0
+    # not so narrow that the scar reaches the last patches, as few patches would be
+    roomy = stick / within[holds] * (p.patches - 0.5) > 1.02 * worn
+    if roomy.any():
+        holds, change = holds[roomy], change[roomy]
     near = holds[np.abs(change) < _NEAR]
     if not near.size:
         return float(stick / within[holds[np.argmin(np.abs(change))]] * p.patches)
     # the larger the step to the next distance, the rounder
     chosen = near[np.argmax(distance[near + 1] / distance[near])]
     return float(stick / within[chosen] * p.patches)
+
+
+def with_room_for_wear(parameters: Parameters, expected: ExpectedWear) -> Parameters:
+    """With the radius that a stroke needs: where it slides by what is worn, below that by what can be.
+
+    As they are where the radius is given, wear has no end, or no more is needed than is taken without it.
+    """
+    p = parameters
+    if p.half_width is not None or p.stroke is None:
+        return p
+    stroke = p.stroke * expected.amplitude
+    contact = point_radius(p.P, p.R, composite_modulus(p.E, p.nu))
+    volume = min(4.0 * expected.per_slip_work * p.P * stroke, expected.volume)
+    worn = Scar(p.R, contact, 4, 4.0 / np.pi).half_width(volume, expected.depth)
+    stick = point_stick_under_stroke(stroke, p.friction_coefficient, p.P, contact, p.E, p.nu)
+    if stick > 0.0:
+        worn = min(worn, 1.1 * point_worn_edge(contact, stick))
+    # middles of the patches at the edge are half a patch from it, or less
+    needed = min(worn * p.patches / (p.patches - 0.5), _WIDEST * p.R)
+    if not np.isfinite(worn) or needed <= patched_radius(p):
+        return p
+    return p.model_copy(update={"half_width": round_up(needed)})
 
 
 def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
@@ -101,8 +139,10 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     along = (np.arange(p.patches) + 0.5) * width
     middle = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
     middle = middle[np.linalg.norm(middle, axis=1) < radius]
+    # within half a patch, as the middle of a last strip; all around there are some
+    edge = np.linalg.norm(middle, axis=1) >= radius - 0.5 * width
     position = np.column_stack([middle, np.zeros(len(middle))])
     gap = (middle**2).sum(axis=1) / (2.0 * p.R)
-    contact = pairs_of_patches(position, np.full(len(middle), 4.0 * width**2), gap, "flat/sphere")
+    contact = pairs_of_patches(position, np.full(len(middle), 4.0 * width**2), gap, "flat/sphere", edge)
     force = tangential_force(p) if p.stroke is None else None
     return press_body(patch_compliance(middle, width, p.E, p.nu), contact, p.P, force, p.stroke, "sphere")

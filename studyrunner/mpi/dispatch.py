@@ -34,6 +34,9 @@ class Work(Protocol):
     def cost(self) -> float:
         """Estimated seconds, positive."""
 
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated seconds of its first result, or of one of the others."""
+
     @property
     def kin(self) -> Kin:
         """Which tasks it is like, see LearnedCosts."""
@@ -179,7 +182,7 @@ class Dispatcher(Generic[Task]):
             self._costs.forget(held.lesson)
             held.lesson = None
         if teaches:
-            self._costs.learn(task.kin, task.cost / task.n_results, seconds)
+            self._costs.learn(task.kin, task.cost_of(first=held.n_left == task.n_results), seconds)
             self._n_lessons += 1
         held.n_left -= 1
         held.began = self._clock()

@@ -38,7 +38,7 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
 def coordinate_entry(study: Study, name: str) -> Variable:
     """What a coordinate of this study is."""
     if name == "cycle" and study.to_the_end:
-        comment = "Equally spaced in worn volume, from none to the last; cycle_count has the counts of each point."
+        comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
     return COORDINATES[name]
 

@@ -18,6 +18,7 @@ _SAID = {
     "contact/normal_load": "constant normal force of pairs without a closing displacement, N, compression positive",
     "contact/friction_coefficient": "friction coefficient of the pair",
     "contact/position": "position of the pair, m",
+    "contact/edge": "1 where the bodies go on beyond the pair without pairs, 0 elsewhere",
     "contact/surface": "label of the surface of the pair",
     "mass": "mass matrix, kg",
     "damping": "viscous damping matrix, N s/m",

@@ -1,7 +1,7 @@
 """Rough figures of the work in a task: for the order of the tasks, the time left and `--plan`.
 
-They fit the bundled dovetail near its resonance on one core. A joint that jumps takes longer, and one in which nothing
-slips takes no step at all.
+They fit the bundled studies on one core within a factor of two. A joint that jumps takes longer, and one in which
+nothing slips takes no step at all.
 """
 
 from __future__ import annotations
@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-ITERATIONS_AT_FIRST = 400
-"""For the walk to the first state of a branch: 1000 to 1400 iterations to a resonance, half of them with few harmonics
-(48, 160 and 336 pairs: 375 to 650 of the usual ones)."""
+ITERATIONS_AT_FIRST = 1400
+"""For the walk to the first state of a sweep (the dovetail to the foot of its resonance 660, to its top 1500; the root
+of the deck `blade_root` to its top 1990; two masses and a slider 180)."""
 
-ITERATIONS_A_STATE = 20
-"""For each frequency of a branch (measured: 3 where nothing slips, 12 to 20 where the sweep shortens its steps)."""
+ITERATIONS_OF_RAMP = 400
+"""For the way to the only state of a ramp (30 and 52 pairs: 404 and 417)."""
+
+ITERATIONS_A_STATE = 50
+"""For each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the dovetail 65, 11 of a
+mass that hits a wall 130 to 260; 3 where nothing slips)."""
 
 ITERATIONS_A_STEP = 3
 """For one step on the slow time scale, explicit or implicit (measured: 2 to 4 where the joint slips)."""
@@ -29,8 +33,8 @@ ITERATIONS_TO_A_FINAL_STATE = 50
 """Of the scheme "final" where it needs no march (4 to 35 pairs: 15 to 60)."""
 
 ITERATIONS_AN_ADAPTIVE_STEP = 20
-"""For one of them, steps that are refused, estimates of errors and the coarser history included, beside the resonance
-(48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away from it."""
+"""For one of them, steps that are refused, estimates of errors (with more harmonics) and the coarser history included,
+beside the resonance (48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away from it."""
 
 AUTOMATIC_HARMONICS = 5
 """That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -49,9 +53,16 @@ _MATRICES_A_RANK = 1
 def seconds_an_iteration(n_unknowns: int) -> float:
     """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
 
-    Fits 7, 9, 35, 45 and 140 ms measured at 1008, 1584, 3360, 5280 and 7056 unknowns within a factor of 1.6.
+    Fits 1.5, 4, 6.5, 8, 35, 45 and 140 ms measured at 20, 660, 1144, 1584, 3360, 5280 and 7056 unknowns within a factor
+    of 1.8.
     """
-    return 7e-4 + 4e-6 * n_unknowns + 1.8e-9 * float(n_unknowns) ** 2
+    return 1.5e-3 + 4e-6 * n_unknowns + 1.8e-9 * float(n_unknowns) ** 2
+
+
+def iterations_of_branch(sweep: str, n_frequencies: int) -> int:
+    """Newton iterations of a sweep through so many frequencies, or of a ramp."""
+    first = ITERATIONS_OF_RAMP if sweep == "ramp" else ITERATIONS_AT_FIRST
+    return first + ITERATIONS_A_STATE * (n_frequencies - 1)
 
 
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:

@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
+from studyrunner.advice import Used
+from studyrunner.percent import show_percent
 from studyrunner.study.study import Study
 from studyrunner.variables import COORDINATES
 
 _SHORT = 1e4
-
-
-def show_percent(fraction: float) -> str:
-    """A relative number in percent: "2.6 %"; more than ten times the whole in short."""
-    if fraction < 1.0:
-        return f"{100.0 * fraction:.2g} %"
-    return f"{100.0 * fraction:.0f} %" if fraction < 10.0 else f"{100.0 * fraction:.0e} %"
-
-
-def known_to(error: float) -> str:
-    """What a relative error says of what it is the error of: "is known to 2.6 % only"."""
-    return f"is known to {show_percent(error)} only" if math.isfinite(error) else "is not known"
 
 
 def describe_reach(last: float, end: float, error: float) -> str:
@@ -57,3 +48,24 @@ def describe_value(name: str, value: float | str) -> str:
     units = COORDINATES[name].units
     after = f" {units}" if units != "1" and not isinstance(value, str) else ""
     return f"{shown}{after}" if name in ("frequency", "scheme") else f"{name} {shown}{after}"
+
+
+def settings_of(study: Study, point: Sequence[int]) -> Used:
+    """What a point is computed with, for advice on it."""
+    axes = study.axes
+    at = {name: values[index] for (name, values), index in zip(study.dimensions.items(), point, strict=True)}
+
+    def of(key: str) -> Any:
+        return at.get(key, getattr(study.solver, key))
+
+    return Used(
+        scheme=str(at["scheme"]),
+        sweep=str(at["sweep"]),
+        harmonics=of("harmonics"),
+        samples=of("samples"),
+        rtol=of("rtol"),
+        schemes=axes.scheme,
+        sweeps=axes.sweep,
+        by_depth=study.slow_time.largest_depth is not None,
+        until=study.until is not None,
+    )

@@ -23,8 +23,11 @@ from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE
 
 
-def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float) -> str:
-    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene takes."""
+def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float = 0.0) -> str:
+    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene takes.
+
+    prepared_in: CPU seconds from the start of the process until the scene is built, which a run takes, too.
+    """
     marches = [task for line in plan.marches for task in line]
     n_tasks = len(plan.branches) + len(marches)
     n_values = _result_values(study, facts, plan.n_points)
@@ -49,10 +52,8 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
-        (
-            "time",
-            f"about {format_seconds(plan.cost)} on one rank, {_on_two(plan)} on two, if every point wears (rough)",
-        ),
+        ("time", f"{_about(plan, prepared_in)}, to a factor of two, if every point wears;"),
+        ("", _range(plan)),
         ("assumed", _assumed(study, plan)),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
@@ -61,7 +62,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
 
 def _cycles(study: Study) -> str:
     if study.to_the_end:
-        kept = f"{len(study.cycles_kept)} states are kept, equally spaced in worn volume"
+        kept = f"{len(study.cycles_kept)} states are kept, spaced evenly in worn volume and cycles"
         return f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest; {kept}"
     return f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept"
 
@@ -96,13 +97,23 @@ def _if_automatic(study: Study) -> str:
     return f", with {AUTOMATIC_HARMONICS} for automatic harmonics" if AUTO in study.harmonics else ""
 
 
-def _on_two(plan: TaskPlan) -> str:
-    """Estimated time on two ranks: the longest way through a branch and a march bounds it."""
+def _range(plan: TaskPlan) -> str:
+    """What is known only when it is computed: how many points wear, and how often the joint jumps."""
+    starts = format_seconds(sum(branch.cost for branch in plan.branches))
+    return (
+        f"{starts} of it for the start states; a history in which nothing slips takes none, one in which the joint"
+        " jumps up to five times as long"
+    )
+
+
+def _about(plan: TaskPlan, prepared_in: float) -> str:
+    """Estimated time on one and on two ranks: the longest way through a branch and a march bounds it."""
     longest = max(
         branch.cost + max((task.cost for task in line), default=0.0)
         for branch, line in zip(plan.branches, plan.marches, strict=True)
     )
-    return format_seconds(max(longest, plan.cost / 2.0))
+    one, two = (format_seconds(prepared_in + seconds) for seconds in (plan.cost, max(longest, plan.cost / 2.0)))
+    return f"about {one} on one rank, {two} on two"
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:

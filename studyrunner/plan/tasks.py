@@ -14,7 +14,7 @@ from studyrunner.plan.costs import Kin
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
-    ITERATIONS_AT_FIRST,
+    iterations_of_branch,
     iterations_of_march,
     seconds_an_iteration,
 )
@@ -74,6 +74,11 @@ class BranchTask:
     def n_results(self) -> int:
         """Start states that it gives."""
         return len(self.frequencies) - len(self.known)
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated seconds of the first state, with all of the way to it, or of one of the others."""
+        share = iterations_of_branch(self.sweep, 1) if first else ITERATIONS_A_STATE
+        return self.cost * share / iterations_of_branch(self.sweep, self.n_results)
 
     @property
     def opens_others(self) -> bool:
@@ -153,6 +158,11 @@ class MarchTask:
             return (0.0,) * len(self.cycles)
         return march_counts(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
 
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated seconds of a history; all come with the first one, and are not told apart."""
+        del first
+        return self.cost / self.n_results
+
     @property
     def opens_others(self) -> bool:
         """Nothing."""
@@ -188,7 +198,7 @@ class TaskPlan:
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one rank."""
+        """Estimated seconds on one rank, where every point wears."""
         marches = itertools.chain.from_iterable(self.marches)
         return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
 
@@ -226,7 +236,7 @@ def build_tasks(study: Study, n_displacements: int) -> TaskPlan:
                     sweep=sweep,
                     settings=settings,
                     frequencies=tuple(study.axes.frequency[place] for place in places),
-                    cost=seconds * (ITERATIONS_AT_FIRST + ITERATIONS_A_STATE * len(places)),
+                    cost=seconds * iterations_of_branch(sweep, len(places)),
                 )
             )
             marches.append(

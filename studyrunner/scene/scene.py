@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import surface_factors
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
+from studyrunner.scene.edge_pairs import edge_pairs
+from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import AUTO, Study
@@ -31,7 +33,8 @@ class SceneFacts:
     position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
     digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
-    static_response (n_response,): m per unit excitation amplitude, None where it is not known or not asked for.
+    static_response: to the harmonic load, None where it is not known or not asked for.
+    edge (n_contact,): whether the pair is at the edge of the contact (`edge_pairs`); False where that is not known.
     """
 
     n_displacements: int
@@ -41,7 +44,8 @@ class SceneFacts:
     response_names: tuple[str, ...]
     digest: str
     largest_harmonics: int | None = None
-    static_response: NDArray[np.float64] | None = None
+    static_response: StaticResponse | None = None
+    edge: NDArray[np.bool_] | None = None
 
 
 def _silent(_: str) -> None:
@@ -188,6 +192,7 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         response_names=model.response_names,
         digest=_digest(model),
         largest_harmonics=largest_harmonics(model),
+        edge=edge_pairs(contact),
     )
 
 
@@ -218,8 +223,9 @@ def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
             yield f"{nodal_diameter} {name}", getattr(linear, name)
     for name in ("dofs", "area", "gap", "normal_load", "position"):
         yield name, getattr(model.contact, name)
-    if model.contact.friction_coefficient is not None:
-        yield "friction_coefficient", model.contact.friction_coefficient
+    for name in ("friction_coefficient", "edge"):
+        if getattr(model.contact, name) is not None:
+            yield name, getattr(model.contact, name)
     texts = "\n".join((*model.contact.surface, "", *model.response_names))
     yield "texts", np.frombuffer(texts.encode(), dtype=np.uint8)
     yield "sectors", np.array([model.n_sectors, model.nodal_diameter], dtype=np.int64)

@@ -131,7 +131,7 @@ class SlowTimeSection(Section):
     outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
         101,
         description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts; with"
-        " cycles = inf their number, equally spaced in worn volume",
+        " cycles = inf their number, spaced evenly in worn volume and cycles",
     )
     until: Annotated[dict[str, float] | None, BeforeValidator(_read_target)] = Field(
         None,
@@ -266,7 +266,9 @@ class Study(Section):
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if isinstance(outputs, tuple):
             if self.to_the_end:
-                remedy = "give their number: with slow_time.cycles = inf they are equally spaced in worn volume"
+                remedy = (
+                    "give their number: with slow_time.cycles = inf they are spaced evenly in worn volume and cycles"
+                )
                 raise WrongValueError(outputs, remedy, "slow_time.outputs")
             if outputs[-1] > cycles:
                 remedy = f"give cycle counts of at most slow_time.cycles = {cycles:g}"

@@ -20,6 +20,7 @@ from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
 from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
 from studyrunner.study.names import nearest_name
+from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file, names_model
 from studyrunner.study.toml_text import read_toml, read_toml_file
@@ -106,7 +107,8 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     sections["scene"] = _check_scene(_section(table, "scene"), source, path, archived, kept)
     moved = _move_solver_axes(sections)
     try:
-        return _check(Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, "")
+        study = _check(Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, "")
+        return with_room_for_wear(study)
     except UserError as error:
         if error.key in moved:
             raise UserError(error.place, moved[error.key], error.value, error.remedy) from None

@@ -1,1 +1,1 @@
-"""What a run says of its results: worn volumes within rtol, certificates, outcomes, findings."""
+"""What a run says of its results: worn volumes known to rtol, certificates, outcomes, findings."""

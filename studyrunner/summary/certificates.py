@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
+from studyrunner.advice import advise_steps
+from studyrunner.plan.places import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
+from studyrunner.summary.edge_wear import EdgeWear
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
@@ -57,6 +60,7 @@ class CertificateTable:
         self._study = study
         self._volumes = WornVolumes(study)
         self._small = SmallWear(study, facts)
+        self._edge = EdgeWear(study, facts)
         self._outcomes = OutcomeTable(study)
         self._doubts = Doubts(study, facts)
         self._n_complete = 0
@@ -69,7 +73,7 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
-        for collected in (self._volumes, self._small, self._outcomes, self._doubts):
+        for collected in (self._volumes, self._small, self._edge, self._outcomes, self._doubts):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -89,19 +93,20 @@ class CertificateTable:
         self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
 
     def format(self) -> str:
-        """Table in lines: how well the worn volume is known, whether wear is small, outcomes where loads and wear vary;
-        the largest value of each certificate over all points computed to the end, with its place, then how many folds,
-        jumps, too long steps, oscillating wear rates and unstable states there are.
+        """Table in lines: how well the worn volume is known, whether wear is small, how much of it is at the edge,
+        outcomes where loads and wear vary; the largest value of each certificate over all points computed to the end,
+        with its place, then how many folds, jumps, too long steps, oscillating wear rates and unstable states there
+        are.
         """
         rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
+        rows.extend(self._edge.rows())
         rows.extend(self._outcomes.rows())
-        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the last cycle"))
+        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the end"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())
         rows.append(("folds in the sweeps", self._format_folds()))
         rows.append(("jumps while wearing", self._format_jumps()))
         rows.append(("explicit steps too long", self._format_noted("too long", "longer than step_limit")))
-        remedy = "use a smaller step or the implicit scheme"
-        rows.append(("oscillating wear rate", self._format_noted("oscillating", remedy)))
+        rows.append(("oscillating wear rate", self._format_noted("oscillating", self._steps())))
         rows.append(("unstable states", self._format_noted("unstable", "see the variable stable")))
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
@@ -175,6 +180,11 @@ class CertificateTable:
         cycle, point = self._first_jump
         where = _where(self._study, _Place(point))
         return f"{self._n_jumps}, the first at cycle {cycle:g}" + (f" at {where}" if where else "")
+
+    def _steps(self) -> str:
+        """What to do about the first wear rate that oscillates."""
+        first = self._noted["oscillating"].first
+        return "" if first is None else advise_steps(settings_of(self._study, first))
 
     def _format_noted(self, what: str, remedy: str) -> str:
         """How many of them, where the first is, and what there is to say."""

@@ -1,4 +1,4 @@
-"""Points that failed, or that are less exact than was asked for, by name: where, up to which cycle, how well known."""
+"""Points that failed, or that are less exact than was asked for: where, how far, how well known, what to do."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.plan.places import describe_point, describe_reach
+from studyrunner.advice import advise
+from studyrunner.plan.places import describe_point, describe_reach, settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.room_for_wear import describe_room
 from studyrunner.study.study import AUTO, Study
 
 MOST_NAMED = 10
@@ -21,7 +23,7 @@ MOST_NAMED = 10
 
 @dataclass
 class _Ended:
-    """Points of one outcome: how many, and the first of them in the order of the file with what there is to say."""
+    """Points of one outcome and one advice: how many, and the first in the order of the file with what to say."""
 
     n: int = 0
     first: list[tuple[Index, str]] = field(default_factory=list)
@@ -39,26 +41,33 @@ class Findings:
     def __init__(self, study: Study, facts: SceneFacts) -> None:
         self._study = study
         self._largest_harmonics = facts.largest_harmonics if AUTO in study.harmonics else None
-        self._ended: dict[int, _Ended] = {}
+        self._ended: dict[tuple[int, str], _Ended] = {}
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
         for row in np.flatnonzero(records["outcome"] != Outcome.CONVERGED).tolist():
-            outcome = int(records["outcome"][row])
-            self._ended.setdefault(outcome, _Ended()).add(points[row], self._say(records[row]))
+            outcome, said = Outcome(records["outcome"][row]), self._say(records[row])
+            # points that share a history were computed in one way
+            advice = advise(outcome.meaning, settings_of(self._study, min(points[row])))
+            self._ended.setdefault((outcome, advice), _Ended()).add(points[row], said)
 
     def format(self, outcomes: Mapping[int, int]) -> tuple[str, ...]:
-        """For each way to end but to tolerance a line with its number of points, then a line for each of the first.
+        """For each way to end but `converged`, and each advice on it, a line with its number of points, then a line for
+        each of the first.
 
         outcomes: points by number; those that are not computed are in no record.
         """
         lines: list[str] = []
-        present = [ending for ending in Outcome if ending != Outcome.CONVERGED and outcomes.get(ending, 0)]
-        most = max(1, MOST_NAMED // max(1, len(present)))
-        for ending in present:
-            lines.append(f"{outcomes[ending]} x {ending.meaning}: {ending.sentence}{self._remark(ending)}")
-            ended = self._ended.get(ending)
-            if ended is None or ending == Outcome.NOT_COMPUTED:
+        ends: dict[tuple[int, str], _Ended] = dict(self._ended)
+        left = outcomes.get(Outcome.NOT_COMPUTED, 0)
+        if left:
+            ends[Outcome.NOT_COMPUTED, ""] = _Ended(left)
+        most = max(1, MOST_NAMED // max(1, len(ends)))
+        for number, advice in sorted(ends):
+            ending, ended = Outcome(number), ends[number, advice]
+            text = " ".join(filter(None, (ending.sentence, advice, self._remark(ending))))
+            lines.append(f"{ended.n} x {ending.meaning}: {text}")
+            if ending == Outcome.NOT_COMPUTED:
                 continue
             for point, said in ended.first[:most]:
                 text = ": ".join(filter(None, (describe_point(self._study, point), said)))
@@ -78,10 +87,13 @@ class Findings:
         return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
 
     def _remark(self, number: int) -> str:
-        """Where a travelling wave has no nodal diameters for more harmonics, more of them are no use of the solver."""
+        """What the study makes of it: the width that has room, or that a travelling wave has no more harmonics."""
+        if number == Outcome.CONTACT_CUT_OFF:
+            room = describe_room(self._study)
+            return f" Here {room}." if room else ""
         if number != Outcome.INACCURATE or self._largest_harmonics is None:
             return ""
         return (
-            f" The scene holds the nodal diameters of {self._largest_harmonics} harmonics: one that holds more allows"
+            f"The scene holds the nodal diameters of {self._largest_harmonics} harmonics: one that holds more allows"
             " for more."
         )

@@ -16,46 +16,50 @@ from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 
-METALS = (1.9e-14, 4e-13)
-"""Wear coefficients of metals that were measured, 1/Pa: steel (McColl, Ding and Leen, Wear 256 (2004) 1114: 1.9e-8 and
-2.9e-8 1/MPa; 52100: 4.2e-5 mm3/J), Ti-6Al-4V (4e-4 mm3/J). Energy coefficients are Archard's over the friction
-coefficient, which is little beside the factor that is allowed."""
+OF_THE_PAPER = 1.1e-11
+"""The default, 1/Pa, which is that of the reference."""
 
-FAR = 1e3
-"""Factor from which on a wear coefficient is far off."""
+PLAUSIBLE = (1.9e-17, 4e-10)
+"""Wear coefficients, 1/Pa, that are not asked about: a factor of 1000 around what was measured of metals, 1.9e-14
+(steel; McColl, Ding and Leen, Wear 256 (2004) 1114) to 4e-13 (Ti-6Al-4V, 4e-4 mm3/J), as studies wear faster than
+machines. Energy coefficients are Archard's over the friction coefficient, which is little beside this factor."""
 
 _UNITS = {"1/MPa or mm2/N": 1e-6, "mm3/(N m) or mm3/J": 1e-9}
 """What else wear coefficients are given in, and how much of 1/Pa it is."""
 
 
 def doubts_of_study(study: Study) -> tuple[str, ...]:
-    """Lines on wear coefficients that no metal has, before anything is computed; the one farthest off speaks for all.
-
-    With a wear table it is the coefficient times the factors of the table.
-    """
-    table = study.wear_law.table
-    factors = [1.0] if table is None else [factor for row in table.factor for factor in row if factor > 0.0]
-    values = [value * factor for value in study.axes.wear_coefficient if value > 0.0 for factor in factors]
-    off = [value for value in values if not METALS[0] / FAR <= value <= METALS[1] * FAR]
+    """Lines on wear coefficients far off, before anything is computed; the one farthest off speaks for all."""
+    off = [value for value in _coefficients(study) if not _is_plausible(value)]
     if not off:
         return ()
-    worst = max(off, key=_distance)
-    what = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
-    measured = f"metals have {METALS[0]:.2g} to {METALS[1]:.2g} 1/Pa"
-    if worst < METALS[0]:
-        return (f"{what} {worst:.3g} 1/Pa is {METALS[0] / worst:.1g} times below what was measured: {measured}",)
+    worst = max(off, key=lambda value: abs(math.log(value / OF_THE_PAPER)))
+    what = "wear_coefficient" if study.wear_law.table is None else "wear_coefficient times wear.factor"
+    times, side = (worst / OF_THE_PAPER, "larger") if worst > OF_THE_PAPER else (OF_THE_PAPER / worst, "smaller")
+    text = f"{what} {worst:.3g} 1/Pa is {times:.1g} times {side} than the default, {OF_THE_PAPER:g} 1/Pa"
     units = [
         f"in {name} (then it is {worst * factor:.3g} 1/Pa)"
         for name, factor in _UNITS.items()
-        if METALS[0] / FAR <= worst * factor <= METALS[1] * FAR
+        if worst > OF_THE_PAPER and _is_plausible(worst * factor)
     ]
-    asked = f": is it {' or '.join(units)}?" if units else ":"
-    return (f"{what} {worst:.3g} 1/Pa is {worst / METALS[1]:.1g} times above what was measured{asked} {measured}",)
+    return (f"{text}: is it {' or '.join(units)}?" if units else text,)
 
 
-def _distance(value: float) -> float:
-    """How far a wear coefficient is from those of metals, as the logarithm of a factor."""
-    return max(math.log(METALS[0]) - math.log(value), math.log(value) - math.log(METALS[1]))
+def wears_too_fast(study: Study) -> bool:
+    """Whether a wear coefficient of the study is larger than any that is plausible."""
+    return max(_coefficients(study), default=0.0) > PLAUSIBLE[1]
+
+
+def _coefficients(study: Study) -> list[float]:
+    """Wear coefficients above 0, 1/Pa; with a wear table times each of its factors."""
+    table = study.wear_law.table
+    factors = [1.0] if table is None else [factor for row in table.factor for factor in row if factor > 0.0]
+    return [value * factor for value in study.axes.wear_coefficient if value > 0.0 for factor in factors]
+
+
+def _is_plausible(value: float) -> bool:
+    """Whether a wear coefficient, 1/Pa, need not be asked about."""
+    return PLAUSIBLE[0] <= value <= PLAUSIBLE[1]
 
 
 class Doubts:
@@ -70,7 +74,9 @@ class Doubts:
         n_amplitudes = len(study.axes.excitation_amplitude)
         self._wears = np.zeros(n_amplitudes, np.bool_)
         self._could_wear = any(value > 0.0 for value in study.axes.wear_coefficient)
-        self._above_static = self._static is None or not bool(np.any(self._static > 0.0))
+        # below its first resonance, and where nothing can resonate, a structure may move less than at rest
+        low = min(study.axes.frequency)
+        self._above_static = self._static is None or low <= self._static.frequency or not self._static.amplitude.any()
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Records (n,) as in `records`, and the points that each of them is of."""
@@ -90,7 +96,7 @@ class Doubts:
         assert self._static is not None
         # points that share a history have the same excitation
         excited = amplitudes[[of_one[0][self._amplitude] for of_one in points]]
-        static = excited[:, None] * self._static
+        static = excited[:, None] * self._static.amplitude
         at_first = records["response_amplitude"][:, 0, :]
         self._above_static = bool(np.any((at_first > static) & (static > 0.0)))
 
@@ -106,10 +112,10 @@ class Doubts:
             return ()
         frequency = self._study.axes.frequency
         low, high = min(frequency), max(frequency)
-        given = f"{low:.6g} Hz" if low == high else f"{low:.6g} to {high:.6g} Hz"
-        in_radians = f"{low / (2 * math.pi):.6g} to {high / (2 * math.pi):.6g} Hz"
+        given = " to ".join(f"{value:.6g}" for value in sorted({low, high}))
+        in_hertz = " to ".join(f"{value / (2 * math.pi):.6g}" for value in sorted({low, high}))
         why = "the response is nowhere above that to the same load at rest, so that no resonance is near"
-        return (f"frequency {given}: {why}: is it in rad/s (then it is {in_radians})?",)
+        return (f"frequency {given} Hz: {why}: is it in rad/s (then it is {in_hertz} Hz)?",)
 
     def _on_amplitudes(self) -> tuple[str, ...]:
         study = self._study
@@ -121,7 +127,9 @@ class Doubts:
             return ()
         named = ", ".join(f"{value:.6g}" for value in at_rest)
         slips = "no pair slips more than wear.threshold allows" if study.wear_law.threshold else "no pair slips"
-        asked = "is the amplitude in N, the resonance among the frequencies?"
+        asked = "is the load in N"
+        if self._static is None or self._static.frequency < math.inf:
+            asked += ", the resonance among the frequencies"
         return (
-            f"excitation_amplitude {named} N: {slips} under pressure at any frequency, so that nothing wears: {asked}",
+            f"excitation_amplitude {named} N: {slips} under pressure at any frequency, so that nothing wears: {asked}?",
         )

@@ -41,9 +41,9 @@ class Standing:
             return 1.0
         return min(elapsed / max(elapsed + self.seconds_left, 1e-9), 0.99)
 
-    def describe(self, elapsed: float) -> str:
-        """Points and percent that are done, the time left, and what runs, in one line."""
-        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * self.fraction(elapsed):.0f} %"]
+    def describe(self, fraction: float) -> str:
+        """Points and percent that are done, the time left, and what runs, in one line; fraction: that is over."""
+        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * fraction:.0f} %"]
         if self.n_done < self.n_points:
             parts.append(f"about {format_seconds(self.seconds_left)} left")
         if self.running:
@@ -60,6 +60,7 @@ class ProgressDisplay:
         self._began = self._began_tasks = time.monotonic()
         self._next_line = FIRST_LINE
         self._next_picture = 0.0
+        self._fraction = 0.0
         console = Console(stderr=True)
         self._bar: Progress | None = None
         if console.is_terminal:
@@ -107,12 +108,16 @@ class ProgressDisplay:
         if self._bar is not None:
             if elapsed >= self._next_picture:
                 self._next_picture = elapsed + _SECONDS_A_PICTURE
-                standing = look()
-                text = standing.describe(since)
-                self._bar.update(self._bar_task, completed=standing.fraction(since), description=text)
+                text = self._describe(look(), since)
+                self._bar.update(self._bar_task, completed=self._fraction, description=text)
         elif elapsed >= self._next_line:
             self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
-            print(f"{self._clock()} {look().describe(since)}", file=sys.stderr, flush=True)
+            print(f"{self._clock()} {self._describe(look(), since)}", file=sys.stderr, flush=True)
+
+    def _describe(self, standing: Standing, since: float) -> str:
+        """The line that is shown. What is over never falls, be it that more is left than was expected before."""
+        self._fraction = max(self._fraction, standing.fraction(since))
+        return standing.describe(self._fraction)
 
     @property
     def seconds(self) -> float:

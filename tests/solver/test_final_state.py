@@ -104,6 +104,21 @@ def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
     assert np.abs(direct.wear_depth[-1] - limit).max() < 1e-6 * limit.max()
 
 
+@pytest.mark.slow
+def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing() -> None:
+    """Worn volume and outcome say the same, and no harmonics are added to find out what round-off wears."""
+    model = build_scene("cylinder_on_flat", strips=60)
+    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", SolverSettings())
+    direct = find_final_state(model, 0.6, start, 1e-13, END, SolverSettings())
+    assert direct.outcome is Outcome.CONVERGED
+    assert direct.message == ""
+    assert direct.wear_rate[-1] < 1e-9 * direct.wear_rate[0]
+    assert direct.wear_rate_error[-1] <= 1e-2
+    assert direct.harmonics_used[-1] <= direct.harmonics_used[0]
+    # no better than the states are solved
+    assert SolverSettings().tolerance <= direct.error_estimate < 1e-3
+
+
 def test_a_spring_that_presses_is_relaxed_to_round_off() -> None:
     assert found("slider").wear_depth[-1, 0] == pytest.approx(10.0 / 1e5, rel=1e-10)
 

@@ -51,11 +51,21 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> N
     assert np.abs(found.wear_depth[-1] - limit).max() < 2e-4 * limit.max()
     assert found.wear_rate[-1] < 1e-4 * found.wear_rate.max()
     assert found.last_cycle == found.cycles[-1]
-    # equal volumes from one output to the next, at counts that are farther and farther apart in the end
-    assert np.diff(found.worn_volume) == pytest.approx(found.worn_volume[-1] / 8, rel=1e-6)
+    # as far from one output to the next in volume and cycles together, each over the whole
+    way = found.worn_volume / found.worn_volume[-1] + found.cycles / found.cycles[-1]
+    assert np.diff(way) == pytest.approx(np.full(8, 0.25), rel=1e-6)
     assert found.cycles[0] == 0.0
     assert (np.diff(found.cycles) > 0.0).all()
-    assert np.diff(found.cycles)[-1] > 3.0 * np.diff(found.cycles)[-2]
+
+
+def test_straight_lines_between_the_outputs_are_the_history() -> None:
+    """Neither the burst of wear nor the long calm behind it falls between two outputs."""
+    few, many = worn(ToTheEnd(11)), worn(ToTheEnd(201))
+    whole = many.worn_volume[-1]
+    between = np.interp(many.cycles, few.cycles, few.worn_volume)
+    assert np.abs(between - many.worn_volume).max() < 0.02 * whole
+    assert np.diff(few.cycles).max() < 0.21 * few.cycles[-1]
+    assert np.diff(few.worn_volume).max() < 0.21 * whole
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])

@@ -11,6 +11,7 @@ from studyrunner.checkpoint.records import pack, record_type
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import build_tasks
+from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from tests.studyrunner.fakes import FACTS, changed, fake_histories
 
@@ -31,9 +32,9 @@ def results_of(study: Study, **given: Callable[[Index], object]) -> list[MarchRe
     return results
 
 
-def batches(study: Study, results: Sequence[MarchResult], size: int = 3) -> list[Batch]:
+def batches(study: Study, results: Sequence[MarchResult], size: int = 3, facts: SceneFacts = FACTS) -> list[Batch]:
     """Points and records of the results, some at a time."""
-    kind = record_type(study, FACTS)
+    kind = record_type(study, facts)
     found = []
     for first in range(0, len(results), size):
         some = results[first : first + size]

@@ -22,7 +22,7 @@ def lines_of(
     largest_harmonics: int | None = None,
     last_cycle: float = 20_000.0,
 ) -> tuple[str, ...]:
-    """Findings of a study whose points end as is said by frequency and scheme; all others are to tolerance."""
+    """Findings of a study whose points end as is said by frequency and scheme; all others converge."""
     study = read_study("sdof_slider", overrides or GRID)
     said = messages or {}
 
@@ -63,7 +63,7 @@ def test_point_cycle_and_error_are_named() -> None:
 
 def test_how_far_a_point_came_that_ended_early() -> None:
     assert lines_of({(2, 0): MARCH_FAILED}, last_cycle=12_500.0) == (
-        f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}",
+        f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.',
         "  212.5 Hz, implicit: computed up to cycle 12 500 of 20 000, the worn volume there to 2.6 %",
     )
     (_, line) = lines_of({(2, 0): MARCH_FAILED}, {(2, 0): "lost it"}, last_cycle=0.0)
@@ -72,6 +72,17 @@ def test_how_far_a_point_came_that_ended_early() -> None:
     assert line == "  212.5 Hz, implicit: ended at cycle 12"
     (_, line) = lines_of({(2, 0): MARCH_FAILED}, last_cycle=float("nan"))
     assert line == "  212.5 Hz, implicit: no state was found"
+
+
+def test_points_that_were_computed_otherwise_have_advice_of_their_own() -> None:
+    """What was used decides: nothing that the study has, and no step for a scheme that has none."""
+    grid = ("axes.frequency=[210, 211]", "axes.scheme=['adaptive', 'explicit']")
+    found = lines_of({(0, 0): MARCH_FAILED, (0, 1): MARCH_FAILED, (1, 1): MARCH_FAILED}, None, *grid)
+    sentence = f"x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    assert [line for line in found if not line.startswith(" ")] == [
+        f'1 {sentence} Try a smaller rtol, which makes the steps shorter, or scheme = "implicit" with a small step.',
+        f"2 {sentence} Try a smaller step.",
+    ]
 
 
 def test_outcomes_in_their_order_and_points_in_that_of_the_file() -> None:

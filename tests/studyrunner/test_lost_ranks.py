@@ -35,7 +35,7 @@ def begin(completion: CompletionIndex, n_starts: int) -> tuple[TaskProgress, Bra
     assert isinstance(branch, BranchTask)
     marches = []
     for started in list(fake_branch(branch))[:n_starts]:
-        progress.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
+        progress.costs.learn(branch.kin, branch.cost_of(first=False), 1.0)
         marches.extend(progress.take(branch, started))
     return progress, branch, marches
 
@@ -66,7 +66,7 @@ def test_a_branch_goes_on_behind_what_it_has_given(completion: CompletionIndex) 
     assert again.order_left == branch.order[2:]
     assert again.resume is not None
     assert again.resume.text == "progress"
-    assert again.cost == pytest.approx(0.6 * branch.cost)
+    assert again.cost == pytest.approx(3 * branch.cost_of(first=False))
     finish(progress, [again, *marches])
     assert_finished(progress, completion)
 

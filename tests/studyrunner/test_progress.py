@@ -7,9 +7,12 @@ import itertools
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rich.console import Console
 
 from studyrunner import run
@@ -81,8 +84,31 @@ def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.
 def test_all_is_done_at_the_end_only() -> None:
     assert Standing(3, 4, 0.0, ()).fraction(50.0) == 0.99
     assert Standing(4, 4, 0.0, ()).fraction(50.0) == 1.0
-    assert Standing(4, 4, 0.0, ()).describe(50.0) == "4 of 4 points, 100 %"
+    assert Standing(4, 4, 0.0, ()).describe(1.0) == "4 of 4 points, 100 %"
     assert Standing(0, 4, 0.0, ()).fraction(0.0) < 0.01
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 9), st.integers(9, 12), st.floats(0.0, 1e9), st.floats(0.0, 1e4)),
+        min_size=2,
+        max_size=30,
+    )
+)
+def test_the_percent_that_is_shown_never_falls(reports: list[tuple[int, int, float, float]]) -> None:
+    """Whatever is expected, found out to be left, taken back from a rank that is lost, and whenever that is told."""
+    clock, shown = Clock(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stderr(shown):
+        patch.setattr("studyrunner.system.progress.time.monotonic", clock)
+        display = ProgressDisplay()
+        display.begin_tasks()
+        for n_done, n_points, left, seconds in reports:
+            clock.now += progress.LONGEST_SILENCE + seconds
+            display.tick(lambda told=(n_done, n_points, left): Standing(*told, ()))  # type: ignore[misc]
+    percents = [int(found["percent"]) for found in map(LINE.match, shown.getvalue().splitlines()) if found]
+    assert len(percents) == len(reports)
+    assert percents == sorted(percents)
+    assert percents[-1] <= 100
 
 
 def test_of_many_tasks_some_are_named() -> None:

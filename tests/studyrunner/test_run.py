@@ -57,7 +57,7 @@ def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert main(SMALL) == 0
     first, *table = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    assert table[0].split(maxsplit=2) == ["worn", "volume", "3 of 3 points within rtol = 1 %; worst 1 % at 100 Hz"]
+    assert table[0].split(maxsplit=2) == ["worn", "volume", "3 of 3 points known to rtol = 1 %; worst 1 % at 100 Hz"]
     with xr.open_dataset("out.nc") as result:
         assert table == result.attrs["certificate_summary"].splitlines()
 
@@ -70,8 +70,8 @@ def test_points_that_failed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     assert main(SMALL) == 3
     first, volume, *_, outcome, point = capsys.readouterr().out.splitlines()
     assert "2 computed, 1 failed" in first
-    assert "2 of 3 points within rtol = 1 %, 1 without one at the last cycle" in volume
-    assert outcome == f"1 x march_failed: {Outcome.MARCH_FAILED.sentence}"
+    assert "2 of 3 points known to rtol = 1 %, 1 not computed to the end" in volume
+    assert outcome == f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.'
     assert point == "  110 Hz: no state was found"
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
@@ -94,9 +94,9 @@ def test_points_above_rtol_are_computed_points(
     assert main(SMALL) == 0
     first, volume, *_, head, point = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    remedy = 'scheme = "adaptive" or a smaller step'
-    assert volume.endswith(f"2 of 3 points within rtol = 1 %, 1 above it; worst 15 % at 110 Hz: {remedy}")
-    assert head == f"1 x {outcome.meaning}: {outcome.sentence}"
+    assert volume.endswith("2 of 3 points known to rtol = 1 %, 1 less well; worst 15 % at 110 Hz: a smaller rtol")
+    advice = ' Try scheme = "adaptive" or a smaller step.' if outcome is Outcome.SENSITIVE else ""
+    assert head == f"1 x {outcome.meaning}: {outcome.sentence}{advice}"
     assert point == f"  110 Hz: {message}"
     with xr.open_dataset("out.nc") as result:
         there = result.sel(frequency=110.0).squeeze()
@@ -199,6 +199,16 @@ def test_what_was_computed_of_a_point_that_failed_is_kept() -> None:
     assert result.values["largest_wear_depth"] == 1.0
     assert totals_of(result, "branch", "fold_frequency", "newton_iterations") == [2, 101.5, 7]
     assert result.message == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
+
+
+def test_what_wears_before_the_first_count_that_is_kept_has_no_error_of_none() -> None:
+    """A target is reached at once: the unworn joint is all that is held, whose volume of 0 says nothing of it."""
+    at_target = replace(ended_at(0.0, history([0.0, 1e5]), Outcome.CONVERGED), last_cycle=30.0, cycles_to_target=25.0)
+    task = march_task("slow_time.outputs=2")
+    wears = build_result(task, replace(at_target, wear_rate=np.array([1e-15, np.nan])))
+    assert np.isnan(wears.values["error_estimate"])
+    rests = build_result(task, replace(at_target, wear_rate=np.array([0.0, np.nan])))
+    assert rests.values["error_estimate"] == 0.0
 
 
 def test_a_point_without_a_state_holds_no_numbers() -> None:

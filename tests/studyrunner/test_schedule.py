@@ -24,6 +24,10 @@ class Job:
     n_results: int = 1
     opens_others: bool = False
 
+    def cost_of(self, *, first: bool) -> float:
+        del first
+        return self.cost / self.n_results
+
     @property
     def kin(self) -> tuple[tuple[str, ...], ...]:
         return (("job", self.name),)

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import pack
+from solver.results.cut_off import describe_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution
 from studyrunner.evaluate import build_result, march
@@ -280,6 +281,22 @@ def test_a_scaled_history_says_from_which_of_its_own_cycles_on() -> None:
     messages = [build_result(shared_task(), found, place).message for place in range(3)]
     # 4 cycles of the march are 10 of the scaled history
     assert messages == ["of the march", "from cycle 10 on the wear rate is known to 4 % only", ""]
+
+
+@pytest.mark.parametrize(
+    ("first", "expected"), [(0.0, [18, 18, 18]), (2.0, [18, 18, 18]), (3.0, [18, 18, 0]), (9.0, [18, 0, 0])]
+)
+def test_a_scaled_history_is_cut_off_by_its_own_counts(first: float, expected: list[int]) -> None:
+    cut = replace(history(COUNTS, Outcome.CONTACT_CUT_OFF), cut_off_cycle=first, message="of the march")
+    results = [build_result(shared_task(), cut, place) for place in range(3)]
+    assert [result.outcome for result in results] == expected
+    assert results[0].message == "of the march"
+    # 4 cycles of the march are 10 of the second, 2 of them 10 of the third
+    for result, at in zip(results[1:], (2.5 * first, 5.0 * first), strict=True):
+        assert result.message == ("" if result.outcome == 0 else describe_cut_off(at))
+        # what was computed is kept
+        assert np.isfinite(result.values["worn_volume"]).all()
+        assert result.values["last_cycle"] == 10.0
 
 
 def test_a_scaled_history_is_sensitive_by_its_own_last_count() -> None:

@@ -1,4 +1,4 @@
-"""The assumption that wear is small against the distance between pairs: where it is not, a run says so."""
+"""The assumption that wear is small against the width of the contact: where it is not, a run says so."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies import build_scene
+from studyrunner.scene.scene import SceneFacts, describe_scene
 from studyrunner.study.study_file import read_study
-from studyrunner.summary.small_wear import SMALL, SmallWear, pair_spacing
+from studyrunner.summary.small_wear import SMALL, SmallWear, contact_width
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results_of import batches, results_of
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.wear_coefficient=[1e-11, 1e-5]", "axes.scheme=adaptive")
 
 
-def line_of(depths: dict[tuple[int, int], float], facts: object = FACTS) -> str:
+def line_of(depths: dict[tuple[int, int], float], facts: SceneFacts = FACTS, grid: tuple[str, ...] = GRID) -> str:
     """Largest depths by frequency and wear coefficient; 1 um everywhere else."""
-    study = read_study("sdof_slider", GRID)
+    study = read_study("sdof_slider", grid)
     results = results_of(study, largest_wear_depth=lambda point: depths.get((point[0], point[1]), 1e-6))
     found = set()
     for given in (results, results[::-1]):
@@ -31,45 +33,67 @@ def line_of(depths: dict[tuple[int, int], float], facts: object = FACTS) -> str:
 
 def test_small_wear_is_one_number() -> None:
     # one pair on each surface: the side of the smaller one is 0.01 m
-    assert line_of({(1, 0): 2e-4}) == "depth over pair spacing at most 0.02"
-    assert line_of({(1, 0): SMALL * 0.01}) == "depth over pair spacing at most 0.1"
+    assert line_of({(1, 0): 2e-4}) == "depth over contact width at most 0.02"
+    assert line_of({(1, 0): SMALL * 0.01}) == "depth over contact width at most 0.1"
 
 
 def test_large_wear_says_where_and_asks_for_the_unit() -> None:
     assert line_of({(1, 1): 0.014, (2, 1): 0.002}) == (
-        "NOT MET: depth over pair spacing (0.01 m) is 1.4 at 211.25 Hz, wear_coefficient 1e-05 1/Pa, above 0.1 at"
-        " 2 points: is wear_coefficient in 1/Pa? If it is, take fewer cycles"
+        "NOT MET: depth over contact width (0.01 m) is 1.4 at 211.25 Hz, wear_coefficient 1e-05 1/Pa, above 0.1 at"
+        " 2 points: is wear_coefficient in 1/Pa?"
     )
     assert "points" not in line_of({(1, 1): 0.014})
+
+
+def test_no_unit_is_asked_about_where_the_coefficient_is_sensible() -> None:
+    sensible = (GRID[0], "axes.wear_coefficient=[1e-14, 1e-11]", GRID[2])
+    assert line_of({(1, 1): 0.014}, grid=sensible).endswith("wear_coefficient 1e-11 1/Pa: take fewer cycles")
+    # one that is far too small does not wear too much
+    tiny = (GRID[0], "axes.wear_coefficient=[1e-25, 1e-11]", GRID[2])
+    assert line_of({(1, 1): 0.014}, grid=tiny).endswith(": take fewer cycles")
 
 
 def test_points_without_a_state_say_nothing() -> None:
     nowhere = {(place, wear): float("nan") for place in range(3) for wear in range(2)}
     assert line_of(nowhere) == "nothing was computed"
-    assert line_of(nowhere | {(1, 0): 2e-4}) == "depth over pair spacing at most 0.02"
+    assert line_of(nowhere | {(1, 0): 2e-4}) == "depth over contact width at most 0.02"
 
 
-@pytest.mark.parametrize(
-    ("surface", "expected"),
-    [("aaaa", 0.5), ("aabb", 1.0), ("abab", 2.0), ("abcd", 0.1)],
-)
-def test_neighbours_are_those_of_one_surface(surface: str, expected: float) -> None:
-    """A surface with one pair has the side of that."""
-    places = {"aaaa": (0.0, 1.0, 3.0, 3.5), "aabb": (0.0, 1.0, 1.5, 4.0), "abab": (0.0, 0.5, 2.0, 9.5)}
-    position = np.full((4, 3), 10.0)
-    position[:, 1] += places.get(surface, (0.0, 0.01, 0.02, 0.03))
-    facts = replace(FACTS, position=position, area=np.full(4, 0.01), surface=tuple(surface))
-    assert pair_spacing(facts) == pytest.approx(expected)
+@pytest.mark.parametrize(("n_along", "n_across"), [(1, 1), (2, 3), (8, 3), (40, 1), (1, 12), (40, 21)])
+def test_the_width_is_that_of_the_surface_however_finely_it_is_divided(n_along: int, n_across: int) -> None:
+    """A flank of 40 by 7 mm, turned in space."""
+    along, across = ((np.arange(n) + 0.5) / n * size for n, size in ((n_along, 0.04), (n_across, 0.007)))
+    flat = np.stack([*np.meshgrid(along, across), np.full((n_across, n_along), 0.3)], axis=-1).reshape(-1, 3)
+    turned = flat @ np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    area = np.full(len(flat), 0.04 * 0.007 / len(flat))
+    facts = replace(FACTS, position=turned, area=area, surface=("a",) * len(flat))
+    # a single pair, or a row of pairs across, does not say how long it is
+    expected = 0.007 if n_along > 1 else 0.007 if n_across > 1 else np.sqrt(0.04 * 0.007)
+    assert contact_width(facts) == pytest.approx(expected, rel=0.2 if min(n_along, n_across) == 2 else 0.02)
 
 
-def test_without_positions_it_is_the_side_of_a_pair() -> None:
+def test_two_strip_widths_of_a_cylinder_have_one_verdict_and_one_number() -> None:
+    """10 um of wear on a contact of twice 0.5 mm; strips of 25 and 12.5 um were told 0.41 and 0.81."""
+    lines = []
+    for strips in (40, 80):
+        facts = describe_scene(build_scene("cylinder_on_flat", strips=strips, half_width=0.5e-3))
+        assert contact_width(facts) == pytest.approx(0.5e-3, rel=2e-3)
+        lines.append(line_of({(1, 0): 10.18e-6}, facts))
+    assert lines == ["depth over contact width at most 0.02"] * 2
+    facts = describe_scene(build_scene("cylinder_on_flat", strips=40, half_width=0.5e-3))
+    assert line_of({(1, 0): 60e-6}, facts).startswith("NOT MET: depth over contact width (0.0005 m) is 0.12 at")
+
+
+def test_the_narrowest_surface_counts() -> None:
+    position = np.zeros((8, 3))
+    position[:4, 0], position[4:, 1] = 1e-3 * np.arange(4), 5e-3 * np.arange(4)
+    facts = replace(FACTS, position=position, area=np.full(8, 1e-5), surface=("a",) * 4 + ("b",) * 4)
+    # b is 20 mm long, so that its 40 mm2 are 2 mm wide
+    assert contact_width(facts) == pytest.approx(2e-3, rel=0.05)
+
+
+def test_without_positions_it_is_the_side_of_a_square() -> None:
     facts = replace(FACTS, position=np.full((2, 3), np.nan), surface=("a", "a"))
-    assert pair_spacing(facts) == pytest.approx(0.01)
+    assert contact_width(facts) == pytest.approx(np.sqrt(3e-4))
     at_one_place = replace(FACTS, position=np.ones((2, 3)), surface=("a", "a"))
-    assert pair_spacing(at_one_place) == pytest.approx(0.01)
-
-
-def test_pairs_at_one_place_are_no_neighbours() -> None:
-    position = np.array([[0.0, 0, 0], [1e-12, 0, 0], [1.0, 0, 0]])
-    facts = replace(FACTS, position=position, area=np.full(3, 1e-4), surface=("a",) * 3)
-    assert pair_spacing(facts) == pytest.approx(1.0)
+    assert contact_width(at_one_place) == pytest.approx(np.sqrt(3e-4))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from studyrunner.plan.results import StartResult
@@ -25,7 +27,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     marches = []
     for branch in plan.branches:
         for started in fake_branch(branch):
-            progress.costs.learn(branch.kin, branch.cost / branch.n_results, 1.0)
+            progress.costs.learn(branch.kin, branch.cost_of(first=False), 1.0)
             marches.extend(progress.take(branch, started))
     assert progress.n_starts_left == 0
     for number, task in enumerate(marches, start=1):
@@ -52,9 +54,28 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
     assert half.running == ("1 Hz implicit",)
     # a sweep down that has given two states is on the way to the third
     assert both.running[1] == f"sweep down to {down.frequencies[-3]:.6g} Hz"
-    # what is late is not over at once
-    late = progress.look([(march, 1, 1e6)])
-    assert late.seconds_left >= 1e6
+    # what is late is not over at once, and takes less than once more what it has taken
+    alone = TaskProgress(MemoryIndex(plan))
+    assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_way_to_the_first_state_is_most_of_a_sweep(number: int) -> None:
+    branch = plan_of().branches[number]
+    first, other = branch.cost_of(first=True), branch.cost_of(first=False)
+    assert first > 5.0 * other > 0.0
+    assert first + (branch.n_results - 1) * other == pytest.approx(branch.cost)
+    alone = replace(branch, known=frozenset(branch.order[1:]))
+    assert alone.cost_of(first=True) == pytest.approx(alone.cost)
+
+
+def test_a_sweep_on_its_way_to_the_first_state_is_not_late() -> None:
+    plan = plan_of()
+    progress = TaskProgress(MemoryIndex(plan))
+    branch = plan.branches[0]
+    first = branch.cost_of(first=True)
+    before, now = (progress.look([(branch, branch.n_results, share * first)]) for share in (0.0, 0.7))
+    assert before.seconds_left - now.seconds_left == pytest.approx(0.7 * first)
 
 
 def test_finished_marches_are_kept_with_their_results() -> None:

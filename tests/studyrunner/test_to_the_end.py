@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import warnings
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def test_the_effective_study_is_to_the_end_too(tmp_path: Path) -> None:
     ("override", "key", "remedy"),
     [
         ("axes.scheme=[adaptive, explicit]", "axes.scheme", 'give "adaptive" or "implicit"'),
-        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "equally spaced in worn volume"),
+        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "spaced evenly in worn volume and cycles"),
         ("slow_time.outputs=1", "slow_time.outputs", "at least 2"),
         ("slow_time.cycles=nan", "slow_time.cycles", "or inf"),
         ("slow_time.cycles=-inf", "slow_time.cycles", "or inf"),
@@ -107,7 +108,9 @@ def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Pa
     counts, volumes = one.cycle_count.values, one.worn_volume.values
     assert not counts[:, :, 0].any()
     assert (np.diff(counts[:2], axis=-1) > 0.0).all()
-    assert np.diff(volumes[:2], axis=-1) == pytest.approx(1e-4 * 1e-4 / 5, rel=1e-3)
+    assert volumes[:2, ..., -1] == pytest.approx(np.full((2, 2), 1e-4 * 1e-4), rel=1e-3)
+    way = volumes[:2] / volumes[:2, ..., -1:] + counts[:2] / counts[:2, ..., -1:]
+    assert np.diff(way, axis=-1) == pytest.approx(np.full((2, 2, 5), 2.0 / 5.0), rel=1e-6)
     # the same history of both coefficients, five times as slow; nothing wears without one
     assert counts[1, 0] == pytest.approx(5.0 * counts[0, 0])
     assert one.wear_rate.values[1, 0] == pytest.approx(one.wear_rate.values[0, 0] / 5.0)
@@ -144,8 +147,52 @@ def test_the_report_draws_it(tmp_path: Path) -> None:
     last = [float(line.get_xdata()[-1]) for line in lines]  # type: ignore[index, arg-type]
     ends = result.dataset.cycle_count.isel(cycle=-1).values.ravel()
     assert np.array(last) / np.array(ends) == pytest.approx(last[0] / ends[0])
-    assert any("equally spaced in worn volume" in note for note in build_page_data(result, 1e6).notes)
+    assert any("spaced evenly in worn volume and cycles" in note for note in build_page_data(result, 1e6).notes)
     result.close()
+
+
+@pytest.mark.slow
+def test_the_report_shows_a_final_state_as_one(tmp_path: Path) -> None:
+    """It has no cycle count: a level beside a history, and alone no history at all; on the page infinite."""
+    from studyrunner.report.drawing import Missing
+    from studyrunner.report.figures.frequency_course import find_course
+    from studyrunner.report.figures.volume import draw_history, draw_map, draw_volumes
+    from studyrunner.report.page.data import build_page_data
+    from studyrunner.report.reading.units import scale_for
+
+    two = study_with('axes.scheme=["adaptive", "final"]', "axes.frequency=[155, 160]")
+    with run_study(two, tmp_path / "both.nc"):
+        pass
+    both = open_for_report(tmp_path / "both.nc")
+    assert both.has_history
+    scale = scale_for("m3", 1e-8)
+    marched, level = draw_history(both, scale, 1e-8).figure.axes[0].get_lines()
+    assert len(marched.get_xdata()) == 6  # type: ignore[arg-type]
+    assert level.get_label() == "final scheme: final state"
+    assert list(level.get_ydata()) == pytest.approx([10.0, 10.0])  # type: ignore[arg-type]
+    course = find_course(both)
+    assert course is not None
+    panels = draw_map(both, course, "worn_volume", scale).figure.axes
+    assert [panel.get_title() for panel in panels if panel.get_title()] == ["adaptive scheme"]
+    content = build_page_data(both, 1e6).content
+    assert content is not None
+    decoded = np.frombuffer(base64.b64decode(str(content["counts"])), "<f4").reshape(*both.held.shape, 6)
+    assert np.array_equal(np.isinf(decoded).any(axis=-1), both.dataset["final_method"] == 1)
+    both.close()
+    one = study_with("axes.scheme=final", "axes.wear_coefficient=[1.1e-11, 1e-12]")
+    with run_study(one, tmp_path / "final.nc"):
+        pass
+    alone = open_for_report(tmp_path / "final.nc")
+    assert not alone.has_history
+    assert (alone.cycle_label(-1), alone.when(-1)) == ("the final state", "in the final state")
+    history, final = draw_volumes(alone)
+    assert isinstance(history, Missing)
+    assert "10 mm³ ± 1e-06 % at " in history.sentence
+    assert "worn volume at the end" in final.figure.axes[0].get_ylabel()  # type: ignore[union-attr]
+    content = build_page_data(alone, 1e6).content
+    assert content is not None
+    assert content["cycles"] == [0.0, 5.0]
+    alone.close()
 
 
 @pytest.mark.slow

@@ -13,8 +13,9 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import OutOfTimeError, move_point
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error
+from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
 from solver.packing import Packed
+from solver.results.cut_off import judge_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.results.recorder import Recorder
 from solver.settings import RESOLUTION, SolverSettings, ToTheEnd
@@ -109,6 +110,8 @@ def _directly(
     recorder = Recorder(model, counts, start.newton_iterations, start.run_time, "implicit", len(loops))
     recorder.add(0.0, trajectory.report(), wear_coefficient)
     unworn = trajectory.point
+    # the wear rate of the final state is round-off: its error counts for what it is beside that of the unworn one
+    trajectory.usual_work = float(unworn.evaluation.slip_work.sum())
     none = np.zeros(model.contact.n_contact, bool)
     off = wear_off(trajectory, unworn.evaluation.wear_depth, none, share)
     reason = failure(trajectory, unworn, off, share)
@@ -124,7 +127,9 @@ def _directly(
     if outcome is not Outcome.CONVERGED:
         reason = reason or f"its final state is {outcome.meaning}"
     recorder.add(1.0, trajectory.report(), wear_coefficient, 0.0)
-    error = np.abs(_coarser(trajectory, start, share) - trajectory.point.evaluation.wear_depth)
+    depth = trajectory.point.evaluation.wear_depth
+    # no depth is known better than the states are solved
+    error = np.abs(_coarser(trajectory, start, share) - depth) + settings.tolerance * depth
     history = recorder.finish(
         outcome,
         np.nan,
@@ -170,14 +175,17 @@ def _finished(history: WearHistory, trajectory: Trajectory, start: StartState, e
     errors[0], errors[-1] = 0.0, relative
     depths[0], depths[-1] = 0.0, error
     cycles = history.cycles.copy()
+    # the recorder has the final state at count 1
+    cut_off = history.cut_off_cycle if history.cut_off_cycle != cycles[-1] else np.inf
     cycles[-1] = np.inf
     outcome, message = history.outcome, ""
     if outcome is Outcome.CONVERGED and relative > SENSITIVE_ERROR:
         outcome, message = Outcome.SENSITIVE, "the worn volume is another one with fewer harmonics and a coarser sweep"
     elif outcome is Outcome.CONVERGED and not trajectory.accurate:
         outcome = Outcome.INACCURATE
-        message = f"the final state is known to {100 * trajectory.estimate.largest:.2g} % only"
-    return replace(
+        rtol = trajectory.case.settings.rtol
+        message = f"the response in the final state {known_to(trajectory.estimate.response, rtol)}"
+    ended = replace(
         history,
         outcome=outcome,
         message=message,
@@ -190,4 +198,6 @@ def _finished(history: WearHistory, trajectory: Trajectory, start: StartState, e
         fold_frequency=start.fold_frequency,
         step_limit=trajectory.step_limit if trajectory.step_limit > 0.0 else float("inf"),
         final_method="active_set",
+        cut_off_cycle=cut_off,
     )
+    return judge_cut_off(ended)

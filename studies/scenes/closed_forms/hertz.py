@@ -35,6 +35,29 @@ def point_stick_radius(contact_radius: float, share: float) -> float:
     return float(contact_radius * np.cbrt(1.0 - share))
 
 
+def line_stick_under_stroke(
+    stroke: float, friction_coefficient: float, load: float, half_width: float, modulus: float, depth: float
+) -> float:
+    """Half-width c, m, of the stick zone of a line contact whose body moves by +- stroke, m; 0 where all of it slides.
+
+    `stroke = mu (d(P, a) - d(P_c, c))` with `P_c = P (c/a)^2` and the approach
+    `d(P, a) = 2 P / (pi E*) (ln(2 depth / a) + 1/2)`, depth, m, being what displacements refer to. load: N/m.
+    """
+    c = half_width * np.linspace(0.0, 1.0, 2001)[1:]
+    approach = 2.0 * load / (np.pi * modulus) * (c / half_width) ** 2 * (np.log(2.0 * depth / c) + 0.5)
+    motion = friction_coefficient * (approach[-1] - approach)
+    return float(np.interp(-stroke, -motion, c, left=0.0))
+
+
+def point_stick_under_stroke(
+    stroke: float, friction_coefficient: float, load: float, radius: float, young: float, poisson: float
+) -> float:
+    """The same of a point contact of this radius, m, load in N: `stroke = 3 mu P (2 - nu) / (8 a G) (1 - (c/a)^2)`."""
+    shear = young / (2.0 * (1.0 + poisson))
+    slides = 3.0 * friction_coefficient * load * (2.0 - poisson) / (8.0 * radius * shear)
+    return float(radius * np.sqrt(max(1.0 - stroke / slides, 0.0))) if slides > 0.0 else 0.0
+
+
 def line_worn_depth(x: FloatArray, radius: float, half_width: float, stick_width: float) -> FloatArray:
     """Depth W, m, of both bodies at distances x, m, from the middle where partial slip has worn all that it can.
 

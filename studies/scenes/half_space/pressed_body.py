@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.model import BoolArray, ContactInterface, FloatArray, LinearModel, ReducedModel
 
 _HOLDER = 1e-9
 """Stiffness that holds the body over that of the contact: every motion has some, and no result changes by more."""
@@ -77,8 +77,13 @@ def _join(stiffness: FloatArray, pairs: np.ndarray, body: int, joint: FloatArray
     stiffness[body, body] = (1.0 + _HOLDER) * joint.sum()
 
 
-def pairs_of_patches(position: FloatArray, area: FloatArray, gap: FloatArray, surface: str) -> ContactInterface:
-    """Pairs with a closing and one tangential displacement; position (n_contact, 3), m, area, m2, and gap, m."""
+def pairs_of_patches(
+    position: FloatArray, area: FloatArray, gap: FloatArray, surface: str, edge: BoolArray
+) -> ContactInterface:
+    """Pairs with a closing and one tangential displacement; position (n_contact, 3), m, area, m2, and gap, m.
+
+    edge (n_contact,): those beside which the half-spaces go on without pairs.
+    """
     n = len(area)
     dofs = np.stack([np.arange(n), np.arange(n, 2 * n), np.full(n, -1)], axis=1)
-    return ContactInterface(dofs, area, gap, np.zeros(n), position, (surface,) * n)
+    return ContactInterface(dofs, area, gap, np.zeros(n), position, (surface,) * n, edge=edge)

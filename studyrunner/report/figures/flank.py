@@ -22,7 +22,7 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.isolines import add_colour_bar, add_isolines
-from studyrunner.report.reading.flanks import LONE, Flank, cell_edges, find_flanks
+from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
@@ -46,7 +46,8 @@ def draw_flanks(result: Result) -> Iterator[Drawing | Missing]:
     if not result.has("wear_depth"):
         yield Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
     elif len(result.cycles) > 1:
-        worn = float(result.at("wear_depth", result.shown_point(), -1).max()) > _NO_DEPTH
+        shown = result.shown_point()
+        worn = float(result.at("wear_depth", shown, result.last_kept(shown)).max()) > _NO_DEPTH
     if worn and result.dataset.sizes["contact"] > 1:
         yield draw_depths(result)
     placed = all(flank.seen is not None for flank in find_flanks(result))
@@ -67,8 +68,8 @@ def draw_depths(result: Result) -> Drawing:
     shown = result.shown_point()
     course = result.course_axis
     choice = result.choose([course] if course else [], _MOST_SERIES)
-    pairs = result.dataset["contact"].values
-    series = [(result.at("wear_depth", {**shown, **point}, -1).values, label) for point, label in choice]
+    pairs, last = result.dataset["contact"].values, result.last_kept(shown)
+    series = [(result.at("wear_depth", {**shown, **point}, last).values, label) for point, label in choice]
     series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]
     scale = scale_for("m", *(depth for depth, _ in series))
     highest = max(float(np.nanmax(depth)) for depth, _ in series)
@@ -85,7 +86,7 @@ def draw_depths(result: Result) -> Drawing:
     set_from_zero(panel, scale(highest).item())
     panel.set_xlim(pairs[0] - 0.8, pairs[-1] + 0.8)
     panel.set_xlabel("contact pair")
-    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(-1)}"))
+    panel.set_ylabel(scale.label(f"wear depth {result.when(last)}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
     _shade_surfaces(panel, result, pairs)
@@ -95,7 +96,7 @@ def draw_depths(result: Result) -> Drawing:
         f"{scale.show(float(np.nanmax(d)))} at pair {pairs[np.nanargmax(d)]}{f' ({k})' if k else ''}" for d, k in series
     ]
     text = as_sentences(
-        f"Wear depth of each contact pair after {result.cycle_label(-1)}"
+        f"Wear depth of each contact pair {result.when(last, 'after')}"
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
@@ -125,7 +126,7 @@ def _shade_surfaces(panel: Axes, result: Result, pairs: NDArray[np.int_]) -> Non
 def draw_pressure(result: Result) -> Drawing:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
     shown = result.shown_point()
-    kept = [0, -1] if len(result.cycles) > 1 else [0]
+    kept = sorted({0, result.last_kept(shown)})
     values = [result.at("mean_pressure", shown, cycle).values for cycle in kept]
     scale = scale_for("Pa", *values)
     flanks, left_out = _choose_flanks(result, values)
@@ -149,14 +150,16 @@ def draw_pressure(result: Result) -> Drawing:
 def draw_pressure_history(result: Result) -> Drawing:
     """Mean pressure over cycles of a few pairs that have no positions, one line a pair (Figs. 10, 11)."""
     shown = result.shown_point()
-    values = result.at("mean_pressure", shown).values
+    values, last = result.at("mean_pressure", shown).values, result.last_kept(shown)
     scale, cycles = scale_for("Pa", values), scale_for("cycles", result.cycles)
     figure = new_figure(3.2)
     panel: Axes = figure.subplots()
-    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values.T, strict=True)):
-        panel.plot(cycles(result.cycles), scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
+    counted = np.isfinite(result.cycles)
+    for number, (pair, pressure) in enumerate(zip(result.dataset["contact"].values, values[counted].T, strict=True)):
+        at = cycles(result.cycles[counted])
+        panel.plot(at, scale(pressure), label=f"pair {pair}", **line_style(number, pressure.size))
     set_from_zero(panel, scale(np.nanmax(values, initial=0.0)).item())
-    panel.set_xlim(0.0, cycles(result.cycles[-1]).item())
+    panel.set_xlim(0.0, cycles(result.cycles[counted][-1]).item())
     panel.set_xlabel(cycles.label("vibration cycles"))
     panel.set_ylabel(scale.label("mean pressure"))
     if values.shape[1] > 1:
@@ -164,7 +167,7 @@ def draw_pressure_history(result: Result) -> Drawing:
     text = as_sentences(
         f"Contact pressure, mean over a period, at {result.describe(shown)}",
         f"Largest: {scale.show(float(np.nanmax(values[0])))} ({result.cycle_label(0)}),"
-        f" {scale.show(float(np.nanmax(values[-1])))} ({result.cycle_label(-1)})",
+        f" {scale.show(float(np.nanmax(values[last])))} ({result.cycle_label(last)})",
         "The file has no positions of the pairs, hence no map. In place of Figs. 10 and 11 of the paper",
     )
     return Drawing("mean_pressure", "Mean contact pressure", text, figure)
@@ -173,10 +176,11 @@ def draw_pressure_history(result: Result) -> Drawing:
 def draw_profile(result: Result) -> Drawing:
     """Wear depth on each flank at the last cycle count: map, and lines along the flank (Fig. 12)."""
     shown = result.shown_point()
-    depth = result.at("wear_depth", shown, -1).values
+    last = result.last_kept(shown)
+    depth = result.at("wear_depth", shown, last).values
     scale = scale_for("m", depth)
     flanks, left_out = _choose_flanks(result, [depth])
-    label = result.cycle_label(-1)
+    label = result.cycle_label(last)
     on_grid = all(flank.grid is not None for flank in flanks)
     figure = (
         _draw_profiles(flanks, depth, scale) if on_grid else _draw_fields(flanks, [depth], [label], scale, "wear depth")
@@ -186,7 +190,7 @@ def draw_profile(result: Result) -> Drawing:
     ]
     deepest = int(result.dataset["contact"].values[np.nanargmax(depth)])
     text = as_sentences(
-        f"Wear depth of {_surfaces(flanks)} after {label} at {result.describe(shown)}",
+        f"Wear depth of {_surfaces(flanks)} {result.when(last, 'after')} at {result.describe(shown)}",
         f"Deepest: {scale.show(float(np.nanmax(depth)))} at pair {deepest}",
         f"Mean over the area: {', '.join(mean)}",
         "Below, the depth along the flank, one line for each row of pairs" if on_grid else "",
@@ -249,8 +253,7 @@ def _draw_field(panel: Axes, flank: Flank, values: NDArray[np.float64], norm: No
     if flank.grid is not None:
         grid = flank.grid
         panel.pcolormesh(
-            cell_edges(grid.along, LONE) * 1e3,
-            cell_edges(grid.across, LONE) * 1e3,
+            *(edges * 1e3 for edges in flank.edges),
             values[grid.pair],
             norm=norm,
             rasterized=values.size > _MANY_CELLS,

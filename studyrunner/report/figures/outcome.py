@@ -13,10 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
+from studyrunner.advice import advise_steps
+from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds
-from studyrunner.report.reading.reliance import tell_ends, tell_volumes
+from studyrunner.report.reading.reliance import settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import show_cycles, show_number, show_power
 from studyrunner.system.progress import count
@@ -34,7 +36,7 @@ _ERRORS = {
     "energy_error": "energy balance, worst cycle",
 }
 _NOTE = (
-    "Each value of a certificate is the largest over all points computed to the last cycle and all cycle counts kept; 0"
+    "Each value of a certificate is the largest over all points computed to the end and all cycle counts kept; 0"
     " is the best. A point ends where its certificates exceed their limits."
 )
 _FLOOR = 1e-3
@@ -42,7 +44,7 @@ _NEGLIGIBLE = 1e-6
 
 
 def draw_outcomes(result: Result) -> Iterator[Drawing | Table]:
-    """Table of the outcomes, and where points failed, a map of them."""
+    """Table of the outcomes, with how many of each are known to rtol, and where some are special, a map of them."""
     outcome = result.read("outcome")
     numbers = Counter(outcome.values.ravel().tolist())
     rows = []
@@ -51,11 +53,13 @@ def draw_outcomes(result: Result) -> Iterator[Drawing | Table]:
         point = dict(zip(result.axes, map(int, place), strict=True))
         ending = result.endings[number]
         first = result.describe(point) if number != CONVERGED else ""
-        rows.append((str(number), ending.word.replace("_", " "), str(numbers[number]), ending.sentence, first))
+        known = [str(np.count_nonzero(result.known & (outcome.values == number)))] if result.tells_volumes else []
+        rows.append((str(number), ending.word.replace("_", " "), str(numbers[number]), *known, ending.sentence, first))
     n_special = outcome.size - numbers[CONVERGED]
     without = "" if result.held.all() else "Where there is no result there are gaps in the figures and NaN in the file"
     note = as_sentences(tell_volumes(result), tell_ends(result), without)
-    columns = ("number", "outcome", "points", "what it means", "first of them at")
+    known = ["known to rtol"] if result.tells_volumes else []
+    columns = ("number", "outcome", "points", *known, "what it means", "first of them at")
     yield Table("outcomes", "Outcomes of the points", columns, tuple(rows), note)
     course = find_course(result)
     if n_special and course is not None:
@@ -67,8 +71,8 @@ def draw_outcome_map(result: Result, course: Course) -> Drawing:
     choice = result.choose([course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points]).astype(int)
     present = sorted(set(field.ravel().tolist()))
-    failing = [number for number in present if number != CONVERGED]
-    colours = {number: _FAILED_COLOURS[i % len(_FAILED_COLOURS)] for i, number in enumerate(failing)}
+    special = [number for number in present if number != CONVERGED]
+    colours = {number: _FAILED_COLOURS[i % len(_FAILED_COLOURS)] for i, number in enumerate(special)}
     colours[CONVERGED] = _CONVERGED_COLOUR
     figure = new_figure(1.4 + 0.32 * len(field))
     panel: Axes = figure.subplots()
@@ -94,9 +98,9 @@ def draw_outcome_map(result: Result, course: Course) -> Drawing:
         label = f"{number} {result.endings[number].word.replace('_', ' ')}"
         panel.plot([], [], linestyle="none", marker="s", markersize=9, color=colours[number], label=label)
     add_legend(figure)
-    meaning = [f"{number}: {result.endings[number].sentence}" for number in failing]
+    meaning = [f"{number}: {result.endings[number].sentence}" for number in special]
     caption = as_sentences("How the computation of each point ended", *meaning, choice.sentence)
-    return Drawing("outcome_map", "Where points failed, and why", caption, figure)
+    return Drawing("outcome_map", "How the points ended", caption, figure)
 
 
 def _label_cells(panel: Axes, course: Course, labels: tuple[str, ...]) -> None:
@@ -161,7 +165,7 @@ def draw_errors(result: Result, course: Course) -> Drawing | None:
         panel.plot(course.values, errors, label=label, **course.line_style(number))
         top = int(np.nanargmax(errors))
         at = result.describe({course.axis: int(course.index[top])}, [course.axis])
-        worst.append(f"{label} {errors[top]:.1e} at {at}")
+        worst.append(f"{label} {show_percent(errors[top], aim)} at {at}")
     if not worst:
         return None
     panel.set_yscale("log")
@@ -176,8 +180,8 @@ def draw_errors(result: Result, course: Course) -> Drawing | None:
     others = result.describe(point, [name for name in result.varying if name != course.axis])
     caption = as_sentences(
         f"Estimated relative errors{f' ({others})' if others else ''}; the largest: {'; '.join(worst)}",
-        f"Gaps: points without a result, errors below {floor:.0e} or not estimated, and for the wear points that hardly"
-        " wear",
+        f"Gaps: points without a result, errors below {show_percent(floor)} or not estimated, and for the wear"
+        " points that hardly wear",
         "Horizontal line: rtol, what automatic settings aim at" if aim is not None else "",
     )
     return Drawing("estimated_errors", "Estimated errors", caption, figure)
@@ -255,11 +259,18 @@ def list_stability(result: Result) -> Iterator[Table]:
         note = as_sentences(
             f"{count(counts[0], 'point')} with an explicit step longer than step_limit, {counts[1]} with a wear rate"
             f" that oscillates from step to step, {counts[2]} with unstable states",
-            "Against the first two, use a smaller step or the implicit scheme",
+            _advise_steps(result, too_long | oscillates),
             _tell_rest(len(places)),
         )
         columns = ("point", "step (cycles)", "step_limit (cycles)", "step too long", "oscillates", "unstable states")
         yield Table("stability", "Stability in slow time", columns, tuple(rows), note)
+
+
+def _advise_steps(result: Result, where: NDArray[np.bool_]) -> str:
+    """What may help the first of these points, whose steps are too long."""
+    if not where.any():
+        return ""
+    return f"Against the first two: {advise_steps(settings_of(result, tuple(np.argwhere(where)[0].tolist())))}"
 
 
 def _steps(result: Result) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

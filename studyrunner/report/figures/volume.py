@@ -50,13 +50,19 @@ def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
     volume = result.read("worn_volume").values
     largest = float(np.nanmax(volume))
     scale = scale_for("m3", largest if largest > NO_VOLUME else 0.0)
-    yield draw_history(result, scale, largest)
+    if result.has_history:
+        yield draw_history(result, scale, largest)
+    else:
+        yield Missing("worn_volume", title, _tell_final(result, scale))
     course = find_course(result)
     if course is None:
         sentence = "The study has one frequency: give several under [axes] frequency."
         yield Missing("worn_volume_map", "Worn volume and wear rate over frequency", sentence)
         return
     if largest <= NO_VOLUME:
+        return
+    if not result.has_history:
+        yield draw_final(result, course, scale)
         return
     yield draw_map(result, course, "worn_volume", scale)
     if result.has("wear_rate"):
@@ -87,10 +93,15 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
         highest = max(highest, float(np.nanmax(worn)))
         style = line_style(number, worn.size)
         counts = result.counts(full)
-        latest = max(latest, float(counts[-1]))
-        panel.plot(cycles(counts), scale(worn), label=label or "computed", **style)
-        highest = max(highest, draw_band(result, panel, full, cycles, scale, style["color"]))
-        early.append(mark_end(result, panel, full, cycles, scale, style["color"]))
+        if np.isinf(counts[-1]):
+            # it has no count: a level that histories come to
+            text = f"{label}: final state" if label else "final state"
+            panel.axhline(scale(worn[-1]).item(), color=style["color"], linestyle="--", label=text)
+        else:
+            latest = max(latest, float(counts[-1]))
+            panel.plot(cycles(counts), scale(worn), label=label or "computed", **style)
+            highest = max(highest, draw_band(result, panel, full, cycles, scale, style["color"]))
+            early.append(mark_end(result, panel, full, cycles, scale, style["color"]))
         amount = f"{scale.show(float(worn[-1]), 4)}{tell_error(result, full)}"
         ends += [f"{amount} ({label})" if label else amount] if np.isfinite(worn[-1]) else []
         jump = float(result.at("jump_cycle", full).values) if result.has("jump_cycle") else np.nan
@@ -121,14 +132,24 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     if len(panel.get_lines()) > 1:
         add_legend(figure)
     where = result.describe(shown, [course]) if course else ""
-    amount = f"Worn after {result.cycle_label(-1)}: {', '.join(ends)}." if ends else ""
-    amount = amount if largest > NO_VOLUME else "Nothing wears."
+    amount = f"Worn {_when(result)}: {', '.join(ends)}." if ends else ""
+    amount = amount if largest > NO_VOLUME else "Nothing is worn at the counts kept."
     bands = "Bands: estimated error" if any(found.get_gid() == "error" for found in panel.collections) else ""
     schemes = "" if "scheme" in result.varying else _tell_scheme(result)
     text = as_sentences(
         f"Worn volume over cycles{f' at {where}' if where else ''}", amount, bands, *early, schemes, choice.sentence
     )
     return Drawing("worn_volume", "Worn volume over cycles", f"{text} Fig. 4 of the paper.", figure)
+
+
+def _tell_final(result: Result, scale: Scale) -> str:
+    """What there is in place of a history where the final state was found without slow time."""
+    shown = result.shown_point()
+    amount = f"{scale.show(float(result.at('worn_volume', shown, -1)), 4)}{tell_error(result, shown)}"
+    return (
+        f"The final state was found without slow time, and there is no history: {amount} at {result.describe(shown)}."
+        ' With scheme = "adaptive" there is one.'
+    )
 
 
 def _tell_scheme(result: Result) -> str:
@@ -142,7 +163,7 @@ def _tell_scheme(result: Result) -> str:
 def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing:
     """Worn volume or wear rate over the course and the cycles, one panel a combination (Figs. 6, 7)."""
     cycles = scale_for("cycles", result.cycles)
-    choice, fields = _read_known(result, course, name, _MOST_MAPS)
+    choice, fields = _read_histories(result, course, name)
     largest = max(float(np.nanmax(field, initial=0.0)) for field in fields)
     n_columns = 2 if len(fields) == _MOST_MAPS else len(fields)
     n_rows = len(fields) // n_columns
@@ -170,7 +191,7 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         f"{text.capitalize()} over {course.name} and cycles",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
         "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
-        "Cycles of the shown point: the outputs of each are equally spaced in worn volume"
+        "Each point comes to its end at a count of its own, and stays as it is then"
         if result.has("cycle_count")
         else "",
         choice.sentence,
@@ -186,6 +207,25 @@ def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[
     # The shown point has a result: there is at least one.
     points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
     return Choice(points, labels, choice.sentence), list(fields)
+
+
+def _read_histories(result: Result, course: Course, name: str) -> tuple[Choice, list[NDArray[np.float64]]]:
+    """As `_read_known`, of combinations with histories, at the cycle counts of the shown point."""
+    choice, fields = _read_known(result, course, name, _MOST_MAPS)
+    if not result.has("cycle_count"):
+        return choice, fields
+    kept = []
+    for point, label, field in zip(choice.points, choice.labels, fields, strict=True):
+        counts = course.read(result, "cycle_count", point)
+        if np.isinf(counts).any():
+            continue
+        rows = [
+            np.interp(result.cycles, own, row) if (np.diff(own) > 0.0).all() else np.full(row.shape, row[-1])
+            for own, row in zip(counts, field, strict=True)
+        ]
+        kept.append((point, label, np.array(rows)))
+    points, labels, fields = (list(column) for column in zip(*kept, strict=True))
+    return Choice(tuple(points), tuple(labels), choice.sentence), fields
 
 
 def _read_reached(result: Result, course: Course) -> list[NDArray[np.float64]]:
@@ -211,6 +251,11 @@ def _where_largest(result: Result, course: Course, choice: Choice, fields: list[
     return f", at {at}, {result.cycle_label(int(cycle))}{label}"
 
 
+def _when(result: Result) -> str:
+    """When the last worn volumes are."""
+    return "at the end" if result.has("cycle_count") else result.when(-1)
+
+
 def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     """Worn volume at the last cycle count over the course, one line a combination (Fig. 8)."""
     choice, fields = _read_known(result, course, "worn_volume", _MOST_LINES)
@@ -231,11 +276,11 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     n_oscillating = _mark_oscillating(result, course, choice, panel, fields, scale, _SEEN * largest)
     n_failed = mark_failed(panel, course.values, failed)
     course.set_axis(panel)
-    panel.set_ylabel(scale.label(f"worn volume at {result.cycle_label(-1)}"))
+    panel.set_ylabel(scale.label(f"worn volume {_when(result)}"))
     if len(panel.get_lines()) > 1:
         add_legend(figure)
     caption = as_sentences(
-        f"Worn volume after {result.cycle_label(-1)} over {course.name}",
+        f"Worn volume {_when(result)} over {course.name}",
         f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
         f"Rings: {count(n_oscillating, 'point')} whose wear rate oscillates from step to step" if n_oscillating else "",

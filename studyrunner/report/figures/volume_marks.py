@@ -54,7 +54,7 @@ def tell_error(result: Result, point: Mapping[str, int]) -> str:
     if not result.computed[place] or not np.isfinite(error) or error <= 0.0:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {show_error(error)}{remark}"
+    return f" ± {show_error(result, place)}{remark}"
 
 
 def draw_bars(
@@ -98,7 +98,7 @@ def mark_care(
     """
     sensitive = result.ended("sensitive")
     kinds = (
-        ("above rtol", "s", result.above & ~sensitive, "Squares: {} whose worn volume is known less well than rtol"),
+        ("above rtol", "s", result.above & ~sensitive, "Squares: {} whose worn volume is known less well than to rtol"),
         ("sensitive", "D", sensitive, "Diamonds: {} so sensitive that one number says little"),
         (
             "ended early",

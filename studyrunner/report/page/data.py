@@ -21,7 +21,8 @@ from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.reliance import advise_point, advise_volume, show_error
+from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
 from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
@@ -101,7 +102,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
     notes: list[str] = []
     if result.has("cycle_count"):
         notes.append(
-            "Cycle counts are those of the point shown first: the outputs of a point are equally spaced in worn volume."
+            "Each point has cycle counts of its own, spaced evenly in worn volume and cycles: those of the point"
+            " that is picked are shown; the slider runs through the outputs."
         )
     floats = limit / _CHARACTERS_A_FLOAT
     points, last = _point_numbers(result), result.last_cycle
@@ -125,15 +127,16 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "horizontal": result.axes.index(result.course_axis or result.axes[0]),
         "lines": [result.axes.index(name) for name in _LINES if name in result.varying],
         "colours": COLOURS,
-        "cycles": result.cycles[kept.cycles].tolist(),
+        "cycles": result.dataset["cycle"].values[kept.cycles].tolist(),
+        "counts": _counts(result, kept) if result.has("cycle_count") else None,
         "responses": result.responses,
         "shown": int(np.ravel_multi_index(shown, result.held.shape)),
         "outcome": result.dataset["outcome"].values.ravel().tolist(),
         "without": np.flatnonzero(~result.held).tolist(),
         "ends": {
             str(place): float(last.flat[place])
+            # of counts of their own each says whether it is known
             for place in np.flatnonzero(result.held & (~result.computed | (last < result.cycles[-1]))).tolist()
-            # of counts of their own all are known
             if not result.has("cycle_count")
         },
         "remarks": remarks,
@@ -149,15 +152,24 @@ def build_page_data(result: Result, limit: float) -> PageData:
 
 
 def _remarks(result: Result) -> Iterator[tuple[int, str]]:
-    """What there is to say of points beside their outcome, by number: messages, and errors above rtol."""
+    """What there is to say of points beside their outcome, by number: messages, errors above rtol, advice."""
     messages = result.dataset["message"].values.ravel() if result.has("message") else None
-    for place in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
-        message = "" if messages is None else str(messages[place])
-        error = float(result.errors.ravel()[place])
-        above = result.above.ravel()[place] and math.isfinite(error)
-        texts = (message, f"Its worn volume is known to {100.0 * error:.2g} %" if above else "")
-        if any(texts):
-            yield place, ". ".join(filter(None, texts))
+    for flat in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
+        place = tuple(int(index) for index in np.unravel_index(flat, result.above.shape))
+        texts = ["" if messages is None else str(messages[flat]), advise_point(result, place)]
+        if result.above[place] and math.isfinite(result.errors[place]):
+            texts.append(f"Its worn volume is known to {show_error(result, place)} only")
+            texts.append(f"What may help: {advise_volume(result, place)}")
+        text = as_sentences(*texts)
+        if text:
+            yield flat, text
+
+
+def _counts(result: Result, kept: _Kept) -> str:
+    """Cycle counts of the points, infinite of a final state that has none, NaN where there is no such output."""
+    points = np.stack(np.unravel_index(kept.points, result.held.shape), axis=-1).tolist()
+    counts = [result.counts(dict(zip(result.axes, place, strict=True))) for place in points]
+    return encode_floats(np.array(counts)[:, kept.cycles])
 
 
 def thin_out(count: int, keep: int) -> NDArray[np.int64]:
@@ -169,13 +181,17 @@ def thin_out(count: int, keep: int) -> NDArray[np.int64]:
 
 def _fit_courses(result: Result, floats: float, notes: list[str]) -> _Kept | None:
     """Cycles at which the numbers of all points fit; None where not even two of them do."""
-    n_cycles, n_points = result.dataset.sizes.get("cycle", 1), result.held.size
+    told = np.arange(result.dataset.sizes.get("cycle", 1))
+    if result.has("cycle_count"):
+        # final states have no outputs on the way to them
+        told = np.flatnonzero(result.dataset["cycle_count"].notnull().any(result.axes).values)
+    n_cycles, n_points = len(told), result.held.size
     names = [name for name in COURSES if result.has(name)]
     per_cycle = sum(math.prod(_inner_shape(result.dataset[name])[1:]) for name in names) * n_points
     keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
     if keep < min(2, n_cycles):
         return None
-    cycles = thin_out(n_cycles, keep)
+    cycles = told[thin_out(n_cycles, keep)]
     if len(cycles) < n_cycles:
         notes.append(f"The slider runs through {len(cycles)} of the {n_cycles} cycle counts of the file.")
     return _Kept(np.arange(n_points), cycles)

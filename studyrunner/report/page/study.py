@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
-from studyrunner.report.reading.result import CONVERGED, Result
+import numpy as np
+
+from studyrunner.report.reading.reliance import advise_ended, describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.result import CONVERGED, Ending, Result
 from studyrunner.report.reading.units import show_cycles, show_number, units_of
 from studyrunner.system.progress import count
 
@@ -15,7 +17,7 @@ _MOST_VALUES = 12
 
 @dataclass(frozen=True)
 class Ended:
-    """Points that ended in one way: how many, what that means, and the first of them, a line each."""
+    """Points that ended in one way: how many, what that means and what may help, and the first of them, a line each."""
 
     points: str
     sentence: str
@@ -41,19 +43,24 @@ def describe_study(result: Result) -> StudyFacts:
     attributes = result.dataset.attrs
     facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
     cycles = result.cycles
-    kept = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}, {len(cycles)} kept"
+    ends = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}"
+    kept = f"{ends}, {np.count_nonzero(~np.isnan(cycles))} kept"
     facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
     facts.append(("scene", _scene(result)))
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
     numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
     endings = [
-        Ended(count(numbers[number], "point"), ending.sentence, describe_ended(result, number))
+        Ended(count(numbers[number], "point"), _with_advice(result, ending), describe_ended(result, number))
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     ]
     summary = " ".join(filter(None, (tell_volumes(result), tell_ends(result))))
     return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
+
+
+def _with_advice(result: Result, ending: Ending) -> str:
+    return " ".join((ending.sentence, *advise_ended(result, ending.number)))
 
 
 def _axis_values(result: Result, name: str) -> str:

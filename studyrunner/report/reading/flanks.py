@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from studyrunner.accessor import Grid, find_grid
 from studyrunner.report.reading.result import Result
 
-LONE = 1e-3
-"""m. Width that a single row of pairs is drawn with."""
+_LONE, _SLIM = 1e-3, 0.2
+"""Width that a single row of pairs is drawn with, m; that of its length where this is less, as under a cylinder."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,20 @@ class Flank:
     seen: NDArray[np.float64] | None
 
     @property
+    def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Edges of the cells of the grid along and across, m. Raises ValueError where there is no grid."""
+        if self.grid is None:
+            raise ValueError(f"the pairs of {self.surface} lie on no grid")
+        length = max(float(np.ptp(self.grid.along)), float(np.ptp(self.grid.across)))
+        width = min(_LONE, _SLIM * length) if length > 0.0 else _LONE
+        return cell_edges(self.grid.along, width), cell_edges(self.grid.across, width)
+
+    @property
     def height_over_width(self) -> float:
         """Of the surface as it is drawn."""
         if self.grid is not None:
-            return float(np.ptp(cell_edges(self.grid.across, LONE)) / np.ptp(cell_edges(self.grid.along, LONE)))
+            along, across = self.edges
+            return float(np.ptp(across) / np.ptp(along))
         return 0.75
 
 

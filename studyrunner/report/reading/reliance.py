@@ -1,45 +1,63 @@
-"""How far the worn volumes of a file are to be trusted, in sentences: within rtol, above it, sensitive, ended early."""
+"""How far the worn volumes of a file are to be trusted, in sentences: known to rtol or less well, ended early, why.
+
+The words, the numbers and the advice are those of the last lines of a run.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
-from studyrunner.report.reading.result import Result
+from studyrunner.advice import Used, advise, advise_error
+from studyrunner.percent import show_percent, show_rtol
+from studyrunner.report.reading.result import Point, Result
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
-
-
-def show_error(error: float) -> str:
-    """A relative error: "2.6 %"."""
-    return f"{100.0 * error:.2g} %" if error < 1.0 else f"{100.0 * error:.0f} %"
+_AUTO = "auto"
+_OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
 
 def tell_volumes(result: Result) -> str:
-    """How many worn volumes are within rtol, and the worst with its place; empty where the file says nothing of it."""
-    known = result.computed & np.isfinite(result.errors)
-    if not known.any() or not np.isfinite(result.rtol).any():
+    """How many worn volumes are known to rtol, the worst with its place, and what would help there.
+
+    Empty where the file says nothing of it.
+    """
+    if not result.tells_volumes:
         return ""
-    n_within = int(np.count_nonzero(known & (result.errors <= result.rtol)))
+    known = result.computed & np.isfinite(result.errors)
     several = np.unique(result.rtol[np.isfinite(result.rtol)])
-    aim = f"rtol = {show_error(float(several[0]))}" if several.size == 1 else "their rtol"
-    text = f"The worn volume of {n_within} of {count(known.size, 'point')} is known within {aim}"
-    n_above = int(np.count_nonzero(known)) - n_within
-    text += f", of {n_above} less well" if n_above else ""
+    aim = f"rtol = {show_rtol(float(several[0]))}" if several.size == 1 else "their rtol"
+    n_known, n_less = int(np.count_nonzero(result.known)), int(np.count_nonzero(result.above))
+    text = f"The worn volume of {n_known} of {count(known.size, 'point')} is known to {aim}"
+    text += f", of {n_less} less well" if n_less else ""
+    n_short = int(np.count_nonzero(~result.computed))
+    text += f", {n_short} not computed to the end" if n_short else ""
     n_unknown = int(np.count_nonzero(result.computed & ~known))
     text += f", of {n_unknown} it was never estimated" if n_unknown else ""
-    worst = np.where(known, result.errors, -1.0)
-    place = np.unravel_index(int(np.argmax(worst)), worst.shape)
-    where = result.describe(dict(zip(result.axes, map(int, place), strict=True)))
-    return f"{text}; the worst is known to {show_error(float(worst[place]))}, at {where}."
+    if not known.any():
+        return f"{text}."
+    # each is held against its own rtol: one that is above it is worse than any that is not
+    worst = np.where(result.above if n_less else known, result.errors, -1.0)
+    place = tuple(int(index) for index in np.unravel_index(int(np.argmax(worst)), worst.shape))
+    where = f", at {result.describe(_point(result, place))}" if result.varying else ""
+    text += f"; the worst is known to {show_error(result, place)}{where}."
+    return f"{text} What may help: {advise_volume(result, place)}." if n_less else text
+
+
+def show_error(result: Result, place: tuple[int, ...]) -> str:
+    """The error of the worn volume of a point: "2.6 %"."""
+    return show_percent(float(result.errors[place]), float(result.rtol[place]))
 
 
 def tell_ends(result: Result) -> str:
-    """How many points were computed to the last cycle, how many ended early and how many have no state."""
+    """How many points were computed to the end, how many ended early and how many have no state."""
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
-    text = f"{count(n_points, 'point')}, {n_computed} computed to the last cycle"
+    text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
     text += f", {n_early} ended early and hold what was computed until then" if n_early else ""
     n_without = n_points - n_computed - n_early
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
@@ -56,10 +74,63 @@ def describe_ended(result: Result, number: int) -> list[str]:
         if result.held[place] and "cycle" not in said:
             error = float(result.errors[place])
             end = "" if result.computed[place] else f"computed up to {show_cycles(float(result.last_cycle[place]))}"
-            known = f"worn volume known to {show_error(error)}" if np.isfinite(error) and error > 0.0 else ""
+            known = f"worn volume known to {show_error(result, place)}" if np.isfinite(error) and error > 0.0 else ""
             said = ", ".join(filter(None, (end, known, said)))
-        where = result.describe(dict(zip(result.axes, place, strict=True)))
+        where = result.describe(_point(result, place))
         lines += [f"{where}: {said}"] if said else []
     if len(found) > _MOST_NAMED and lines:
         lines.append(f"and {len(found) - _MOST_NAMED} more")
     return lines
+
+
+def advise_ended(result: Result, number: int) -> list[str]:
+    """What may help the points that ended in this way: a sentence for each that was used otherwise."""
+    found = np.argwhere(result.dataset["outcome"].values == number)
+    # advice depends on a few axes: one point for each of their values
+    axes = [place for place, name in enumerate(result.axes) if name in _OF_ADVICE]
+    _, first = np.unique(found[:, axes], axis=0, return_index=True)
+    texts = [advise_point(result, tuple(found[row].tolist())) for row in sorted(first.tolist())]
+    return [text for text in dict.fromkeys(texts) if text]
+
+
+def advise_point(result: Result, place: tuple[int, ...]) -> str:
+    """What may help a point that ended otherwise than `converged`; empty where there is nothing to say."""
+    ending = result.endings[int(result.dataset["outcome"].values[place])]
+    return advise(ending.word, settings_of(result, place))
+
+
+def advise_volume(result: Result, place: tuple[int, ...]) -> str:
+    """What would make the error of the worn volume of a point smaller, in a few words."""
+    rates: list[float] = []
+    if result.has("wear_rate_error"):
+        rates = result.at("wear_rate_error", _point(result, place)).values.tolist()
+    return advise_error(float(result.errors[place]), rates, settings_of(result, place))
+
+
+def settings_of(result: Result, place: tuple[int, ...]) -> Used:
+    """What a point was computed with, as far as the file says."""
+    dataset, point = result.dataset, _point(result, place)
+    solver: Mapping[str, Any] = result.study.get("solver", {})
+    slow_time: Mapping[str, Any] = result.study.get("slow_time", {})
+
+    def of(key: str) -> Any:
+        return dataset[key].values[point[key]] if key in point else solver.get(key, _AUTO)
+
+    def words(key: str) -> tuple[str, ...]:
+        return tuple(str(word) for word in dataset[key].values) if key in point else ()
+
+    return Used(
+        scheme=str(of("scheme")),
+        sweep=str(of("sweep")),
+        harmonics=_AUTO if str(of("harmonics")) == _AUTO else int(float(of("harmonics"))),
+        samples=_AUTO if str(of("samples")) == _AUTO else int(float(of("samples"))),
+        rtol=float(result.rtol[place]),
+        schemes=words("scheme"),
+        sweeps=words("sweep"),
+        by_depth="largest_depth" in slow_time,
+        until="until" in slow_time,
+    )
+
+
+def _point(result: Result, place: tuple[int, ...]) -> Point:
+    return dict(zip(result.axes, place, strict=True))

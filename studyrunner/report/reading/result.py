@@ -20,10 +20,10 @@ from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 
 CONVERGED = 0
-"""The `outcome` of a point of which nothing else is to be said."""
+"""The `outcome` of a point that was computed to the end with nothing against it."""
 
 _COMPLETE = ("converged", "inaccurate", "sensitive")
-"""Words of the outcomes of points that were computed to the last cycle."""
+"""Words of the outcomes of points that were computed to the end."""
 
 NO_VOLUME = 1e-24
 """m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
@@ -79,7 +79,7 @@ class Result:
 
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
-        """Which points were computed to the last cycle, each with its error; in the shape of the axes."""
+        """Which points were computed to the end, each with its error; in the shape of the axes."""
         outcome = self.dataset["outcome"].values
         if not self.has("last_cycle"):
             # an older file holds nothing of any other point
@@ -115,9 +115,19 @@ class Result:
 
     @cached_property
     def above(self) -> NDArray[np.bool_]:
-        """Which points were computed with an error of the worn volume, or of their states, above `rtol`."""
-        inexact = self.dataset["outcome"].values != CONVERGED
-        return np.asarray(self.computed & (inexact | (self.errors > self.rtol)))
+        """Which points were computed to the end, their worn volume known less well than to rtol; shape of the axes."""
+        return np.asarray(self.computed & (self.errors > self.rtol))
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Which points were computed to the end, with a worn volume that is known to `rtol`; shape of the axes."""
+        return np.asarray(self.computed & (self.errors <= self.rtol))
+
+    @property
+    def tells_volumes(self) -> bool:
+        """Whether the file says how well worn volumes are known: with an rtol, and not of unworn states only."""
+        wears = self.has("cycle_count") or self.dataset["cycle"].values[-1] > 0.0
+        return bool(wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
 
     @cached_property
     def worn(self) -> NDArray[np.float64]:
@@ -136,12 +146,28 @@ class Result:
         return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
 
     def counts(self, point: Point) -> NDArray[np.float64]:
-        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend."""
+        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend.
+
+        Infinite is that of a final state that was found without slow time; NaN those of outputs the point has not.
+        """
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
             return numbers
         own = np.asarray(self.at("cycle_count", point).values, dtype=float)
-        return own if np.isfinite(own).all() and (np.diff(own) > 0.0).all() else numbers
+        ascend = own.size > 1 and (np.diff(own[~np.isnan(own)]) > 0.0).all()
+        return own if ascend else numbers
+
+    @property
+    def has_history(self) -> bool:
+        """Whether anything is known of the shown point between the first state and a final one."""
+        return len(self.cycles) > 1 and bool(np.isfinite(self.cycles[1:]).any())
+
+    def last_kept(self, point: Point) -> int:
+        """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
+        counts = self.counts(point)
+        last = self.last_cycle[tuple(point[name] for name in self.axes)]
+        reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
+        return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
     @cached_property
     def title(self) -> str:
@@ -167,7 +193,9 @@ class Result:
         attributes = self.dataset["outcome"].attrs
         numbers = np.atleast_1d(attributes.get("flag_values", ())).tolist()
         words = str(attributes.get("flag_meanings", "")).split()
-        sentences = str(attributes.get("sentences", "")).splitlines()
+        # versions before 0.5 said so of every point that was computed to the end
+        claimed = str(attributes.get("sentences", "")).replace("computed to tolerance", "computed to the end")
+        sentences = claimed.splitlines()
         sentences += [""] * (len(words) - len(sentences))
         named = {
             int(number): Ending(int(number), word, sentence or word.replace("_", " "))
@@ -220,7 +248,7 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to the last cycle the one of the largest final worn volume; where nothing is worn, or
+        Among the points computed to the end the one of the largest final worn volume; where nothing is worn, or
         the file does not hold it, the one of the largest response at the first cycle count kept; else the first point
         that was computed; else the first. Explicit, oscillating and sensitive histories, which wear too much, only
         count where there is no other; those that ended early only where none was computed to the end.
@@ -247,13 +275,17 @@ class Result:
 
     @property
     def _trusted(self) -> NDArray[np.bool_]:
-        """Histories that are neither explicit nor sensitive and do not oscillate; in the shape of the axes."""
+        """Histories that are neither explicit nor sensitive and do not oscillate, no final states without a history; in
+        the shape of the axes.
+        """
         outcome = self.dataset["outcome"]
         trusted = xr.ones_like(outcome, dtype=bool)
         if "scheme" in outcome.dims:
             trusted = trusted & (self.dataset["scheme"] != "explicit")
         if self.has("oscillates"):
             trusted = trusted & (self.dataset["oscillates"] == 0)
+        if self.has("cycle_count"):
+            trusted = trusted & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1))
         found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
         return found
 
@@ -308,6 +340,10 @@ class Result:
     def cycle_label(self, index: int) -> str:
         """A kept cycle count in words."""
         return show_cycles(float(self.cycles[index]))
+
+    def when(self, index: int, before: str = "at") -> str:
+        """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
+        return "in the final state" if np.isinf(self.cycles[index]) else f"{before} {self.cycle_label(index)}"
 
     def close(self) -> None:
         """Close the file."""

@@ -92,7 +92,9 @@ def show_number(value: float, digits: int = 6) -> str:
 
 
 def show_cycles(value: float) -> str:
-    """A cycle count in words: in whole numbers as it is, else in four digits."""
+    """A cycle count in words: in whole numbers as it is, else in four digits; infinite, the final state."""
+    if value == np.inf:
+        return "the final state"
     return f"{show_number(value, 4)} cycle" + ("" if value == 1 else "s")
 
 

@@ -95,7 +95,7 @@ def draw_state(result: Result, surface: RootSurface, views: Sequence[View], stat
     figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(label), fraction=0.05, panchor=False)
     pair = result.dataset["contact"].values[int(np.argmax(state.values))]
     text = as_sentences(
-        f"{label.capitalize()} after {result.cycle_label(state.cycle)} at {result.describe(result.shown_point())}",
+        f"{label.capitalize()} {result.when(state.cycle, 'after')} at {result.describe(result.shown_point())}",
         f"Largest: {scale.show(largest)} at pair {pair}" if largest > 0.0 else "",
         f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
         if worn

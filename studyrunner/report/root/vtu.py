@@ -53,7 +53,8 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
     Points are those of the mesh before wear, m. At the points: `FIELDS` in the units of the result, NaN where there is
     no contact; `worn_displacement` (3), m, from there to the worn surface, which ParaView's filter "Warp By Vector"
     exaggerates. Of the cells: `body` and `contact_surface`, numbers as told in a comment of the PVD file, -1 where
-    there is no contact. The time of the series is the cycle count.
+    there is no contact. The time of the series is the cycle count, of a final state
+    without one the number of the output.
 
     Raises OSError where a file cannot be written.
     """
@@ -87,7 +88,9 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
             cell_data={key: [values[rows] for rows in chosen] for key, values in of_cells.items()},
         )
         meshio.vtu.write(folder / name, mesh)
-        cycle = repr(float(result.cycles[number]))
+        count = float(result.cycles[number])
+        # a final state has no count
+        cycle = repr(count if np.isfinite(count) else float(number))
         ElementTree.SubElement(collection, "DataSet", timestep=cycle, group="", part="0", file=name)
     ElementTree.indent(root)
     path = folder / "root.pvd"

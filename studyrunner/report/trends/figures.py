@@ -215,7 +215,7 @@ def _draw_maps(result: Result, worn: Quantity, axes: list[str]) -> Drawing:
         beside = [cell[0] for cell in cells] if n > 2 else panels[0, number]
         figure.colorbar(ScalarMappable(norm, colours), ax=beside, label=label, fraction=0.05, aspect=35, pad=0.02)
     caption = as_sentences(
-        f"Worn volume after {result.cycle_label(-1)} over each two axes"
+        f"Worn volume {result.when(-1, 'after')} over each two axes"
         + (" below the diagonal, its estimated error above it" if n > 2 and told else ""),
         f"The other axes are at {result.describe(shown)}, where most is worn" if n > 2 else "",
         "Hatched: points without a result" if not result.computed.all() else "",

@@ -45,7 +45,7 @@ def find_quantities(result: Result) -> list[Quantity]:
     found = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
-        found.append(Quantity(f"worn volume at {result.cycle_label(-1)}", "m3", worn, result.errors * worn))
+        found.append(Quantity(f"worn volume {result.when(-1)}", "m3", worn, result.errors * worn))
     if not result.has("response_amplitude"):
         return found
     amplitude = result.read("response_amplitude").isel(response=0).transpose(*result.axes, "cycle")

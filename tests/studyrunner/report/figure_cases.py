@@ -23,7 +23,7 @@ SENTENCES = (
     "Two.",
 )
 
-SUMMARY = """worst certificate of              3 points computed to tolerance
+SUMMARY = """worst certificate of              3 points computed to the end
   scaled residual                 1.0e-08 at frequency 2 Hz
 folds in the sweeps               none"""
 

@@ -13,7 +13,7 @@ from studyrunner.report.reading.result import Result, open_for_report
 from studyrunner.variables import ASKED, COORDINATES, KEPT
 
 FAILED = 4
-SENTENCES = ("The point was computed to tolerance.", "one", "two", "three", "A step did not converge: <b>use</b> less.")
+SENTENCES = ("The point was computed to the end.", "one", "two", "three", "A step did not converge: <b>use</b> less.")
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n'
 
 AXES: Mapping[str, Sequence[object]] = {

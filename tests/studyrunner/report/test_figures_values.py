@@ -160,22 +160,22 @@ def test_outcome_map_tells_each_number_and_its_sentence() -> None:
 def test_table_of_outcomes() -> None:
     table = find_table(make_result(failed=[2, 5]), "outcomes")
     assert table is not None
-    assert [row[:4] for row in table.rows] == [
-        ("0", "converged", "6", "It was computed."),
-        ("3", "branch lost", "2", "The branch was lost."),
+    assert [row[:5] for row in table.rows] == [
+        ("0", "converged", "6", "2", "It was computed."),
+        ("3", "branch lost", "2", "0", "The branch was lost."),
     ]
-    assert table.rows[1][4] == "201 Hz, implicit scheme"
+    assert table.rows[1][5] == "201 Hz, implicit scheme"
     assert table.note.startswith(
-        "The worn volume of 2 of 8 points is known within rtol = 1 %, of 4 less well; the worst"
+        "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the"
     )
-    assert "8 points, 6 computed to the last cycle, 2 without a result." in table.note
+    assert "8 points, 6 computed to the end, 2 without a result." in table.note
 
 
 def test_table_of_certificates_is_that_of_the_file() -> None:
     table = find_table(make_result(), "certificates")
     assert table is not None
     assert table.rows == (
-        ("worst certificate of", "3 points computed to tolerance"),
+        ("worst certificate of", "3 points computed to the end"),
         ("scaled residual", "1.0e-08 at frequency 2 Hz"),
         ("folds in the sweeps", "none"),
     )

@@ -98,7 +98,7 @@ def test_the_study_is_told(tmp_path: Path) -> None:
     write_page(as_result(dataset, tmp_path / "some.nc"), [], tmp_path / "index.html")
     text = read(tmp_path / "index.html").text
     for part in (
-        "16 points, 14 computed to the last cycle, 2 without a result.",
+        "16 points, 14 computed to the end, 2 without a result.",
         "2 points: A step did not converge: <b>use</b> less.",
         "190, 191, 192.5, 193 Hz",
         "implicit, explicit",

@@ -10,10 +10,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
+from studyrunner.plan.places import settings_of as of_study
+from studyrunner.report.drawing import Table
+from studyrunner.report.figures.outcome import draw_outcomes
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.reliance import describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.reliance import describe_ended, settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import Result
+from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.report.figure_cases import make_result, with_endings
 from tests.studyrunner.report.figure_numbers import draw_figure, lines_of, values_of
 
@@ -22,7 +26,7 @@ EARLY, ABOVE, SENSITIVE, LOST = 2, 4, 5, 7
 
 
 def mixed() -> Result:
-    """One point ended early, one is above rtol, one sensitive and one has no state; others are to tolerance or not."""
+    """One point ended early, one is above rtol, one sensitive and one has no state; others are known to rtol or not."""
     endings = {EARLY: (3, 6000.0), ABOVE: (6, 20_000.0), SENSITIVE: (15, 20_000.0)}
     messages = {ABOVE: "from cycle 1000 on the wear rate is known to 2.6 % only", EARLY: "it broke off"}
     return with_endings(make_result(failed=[LOST]), endings, messages)
@@ -43,12 +47,11 @@ def test_points_are_told_apart() -> None:
 def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
     result = mixed()
     assert tell_volumes(result) == (
-        "The worn volume of 2 of 8 points is known within rtol = 1 %, of 4 less well; the worst is known to 2 %, at 202"
-        " Hz, implicit scheme."
+        "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the worst"
+        " is known to 2 %, at 202 Hz, implicit scheme. What may help: rtol = 0.005."
     )
     assert tell_ends(result) == (
-        "8 points, 6 computed to the last cycle, 1 ended early and hold what was computed until then, 1 without a"
-        " result."
+        "8 points, 6 computed to the end, 1 ended early and hold what was computed until then, 1 without a result."
     )
     write_page(result, [], tmp_path / "index.html")
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -75,6 +78,61 @@ def test_errors_that_were_never_estimated_say_so() -> None:
     estimates.values.flat[[0, 1]] = np.nan
     unknown = Result(result.path, result.dataset.assign(error_estimate=estimates))
     assert "of 2 it was never estimated" in tell_volumes(unknown)
+    none = Result(result.path, result.dataset.assign(error_estimate=estimates * np.nan))
+    assert tell_volumes(none) == (
+        "The worn volume of 0 of 8 points is known to rtol = 1 %, 2 not computed to the end, of 6 it was never"
+        " estimated."
+    )
+
+
+def test_an_inaccurate_state_is_no_volume_above_rtol() -> None:
+    """Table, header, marks and remarks count alike: known to rtol is what its error says, whatever the outcome."""
+    result = with_endings(make_result(), {0: (6, 20_000.0)}, {0: "the response is known to 3 % only"})
+    assert float(result.errors.flat[0]) < 0.01
+    assert not result.above.flat[0]
+    table = next(item for item in draw_outcomes(result) if isinstance(item, Table))
+    place = table.columns.index("known to rtol")
+    assert [row[1:4] for row in table.rows] == [("converged", "7", "1"), ("inaccurate", "1", "1")]
+    assert sum(int(row[place]) for row in table.rows) == int(result.known.sum()) == 2
+    assert "of 2 of 8 points is known to rtol = 1 %, of 6 less well" in table.note
+    remarks = build_page_data(result, 1e7).content["remarks"]
+    assert remarks["0"] == "the response is known to 3 % only."
+
+
+def test_of_unworn_states_no_volume_is_told() -> None:
+    result = make_result(cycles=(0.0,))
+    assert tell_volumes(result) == ""
+    table = next(item for item in draw_outcomes(result) if isinstance(item, Table))
+    assert "known to rtol" not in table.columns
+
+
+def test_an_error_just_above_rtol_is_not_shown_as_rtol() -> None:
+    result = make_result(frequency=(200.0,), scheme=("adaptive",))
+    errors = result.dataset["error_estimate"] * 0.0 + 0.010003
+    just = Result(result.path, result.dataset.assign(error_estimate=errors))
+    assert tell_volumes(just) == (
+        "The worn volume of 0 of 1 point is known to rtol = 1 %, of 1 less well; the worst is known to 1.0003 %."
+        " What may help: rtol = 0.0099."
+    )
+
+
+def test_the_report_and_the_run_advise_the_same() -> None:
+    """Settings of a point by its file are those by its study."""
+    changes = ("axes.frequency=[200, 201]", "axes.scheme=['implicit', 'explicit']", "solver.harmonics=5")
+    study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
+    made = make_result(frequency=(200.0, 201.0))
+    result = Result(made.path, made.dataset.assign_attrs(study=format_study(study)))
+    for place in np.ndindex(result.above.shape):
+        assert settings_of(result, place) == of_study(study, place)
+
+
+@pytest.mark.parametrize("figure", ["mean_pressure", "wear_depth", "worn_profile"])
+def test_a_point_at_its_target_is_drawn_where_it_ended(figure: str) -> None:
+    """It is computed to the end, with no values at later counts."""
+    result = with_endings(make_result(), dict.fromkeys(range(8), (0, 6000.0)), {})
+    assert result.last_kept(result.shown_point()) == 2
+    caption = draw_figure(result, figure).caption.replace("\N{NO-BREAK SPACE}", " ")
+    assert "5000 cycles" in caption
 
 
 def bands(panel: Axes) -> list[Any]:
@@ -172,7 +230,9 @@ def test_the_page_knows_which_points_hold_what() -> None:
     assert content["ends"] == {str(EARLY): 6000.0}
     remarks = content["remarks"]
     assert isinstance(remarks, dict)
-    assert set(remarks) == {"3", "6", str(EARLY), str(ABOVE), str(SENSITIVE)}
+    assert set(remarks) == {"3", "6", str(EARLY), str(ABOVE), str(SENSITIVE), str(LOST)}
+    assert remarks[str(LOST)] == 'Try sweep = "down" or sweep = "ramp".'
     assert remarks[str(ABOVE)] == (
-        "from cycle 1000 on the wear rate is known to 2.6 % only. Its worn volume is known to 2 %"
+        "from cycle 1000 on the wear rate is known to 2.6 % only. Its worn volume is known to 2 % only. What may help:"
+        " rtol = 0.005."
     )

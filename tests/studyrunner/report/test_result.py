@@ -136,6 +136,11 @@ def test_outcomes_are_told_by_the_file() -> None:
     result = make_result(failed=[1], failing=-1)
     assert result.endings[-1].word == "not_computed"
     assert result.endings[-1].sentence == "It was not reached."
+    # what files of earlier versions claim of every point that was computed to the end
+    older = make_result()
+    sentences = older.dataset["outcome"].attrs["sentences"].replace("It was computed.", "It was computed to tolerance.")
+    older.dataset["outcome"].attrs["sentences"] = sentences
+    assert older.endings[0].sentence == "It was computed to the end."
     del result.dataset["outcome"].attrs["sentences"]
     bare = Result(result.path, result.dataset)
     assert bare.endings[3].sentence == "branch lost"

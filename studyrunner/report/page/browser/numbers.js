@@ -19,6 +19,8 @@ for (const group of [data.points, courses, maps && maps.variables, loops && loop
   for (const entry of Object.values(group || {})) entry.values = decode(entry.data);
 }
 
+const counts = data.counts ? decode(data.counts) : null;
+
 function digits(value, count = 6) {
   if (value === null || !Number.isFinite(value)) return "–";
   if (Number.isInteger(value) && Math.abs(value) < 1e15) return String(value).replace(/\B(?=(\d{3})+$)/g, "\u00a0");
@@ -50,7 +52,9 @@ const pointAt = (found) => found.reduce((point, place, axis) => point * sizes[ax
 const varying = axes.map((_, axis) => axis).filter((axis) => sizes[axis] > 1);
 // Whether there are numbers of a point at this cycle: one that ended early has those of the first cycles.
 const without = new Set(data.without);
-const known = (point, cycle) => !without.has(point) && !(cycles[cycle] > data.ends[point] * (1 + 1e-9));
+// Cycle count of a point at an output: infinite of a final state that has none, NaN where the point has no such output.
+const countAt = (point, cycle) => (counts ? counts[point * cycles.length + cycle] : cycles[cycle]);
+const known = (point, cycle) => !without.has(point) && !Number.isNaN(countAt(point, cycle)) && !(cycles[cycle] > data.ends[point] * (1 + 1e-9));
 const sentence = (point) => [data.endings[data.outcome[point]], data.remarks[point]].filter(Boolean).join(" ");
 
 function axisText(axis, place) {
@@ -83,4 +87,12 @@ function held(group, point, cycle) {
   return { row, column: nearest, cycle: group.cycles[nearest] };
 }
 
-const cycleText = (cycle) => `cycle ${digits(cycles[cycle])}`;
+const countText = (point, cycle) => (countAt(point, cycle) === Infinity ? "final state" : digits(countAt(point, cycle)));
+function cycleText(cycle) {
+  const count = countAt(state.point, cycle);
+  if (Number.isNaN(count)) return `output ${cycles[cycle]}`;
+  return count === Infinity ? "the final state" : `cycle ${digits(count)}`;
+}
+
+// Why nothing is known of a point at an output.
+const lacking = (point, cycle) => (Number.isNaN(countAt(point, cycle)) && !without.has(point) ? "The final state was found without slow time: nothing is known between the unworn state and it." : sentence(point));

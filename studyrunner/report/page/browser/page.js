@@ -10,7 +10,7 @@ function readout() {
   const rows = [];
   // The other axes have one value, which the table of the study tells.
   varying.forEach((axis) => rows.push([`axis ${axes[axis].label}`, axes[axis].label, axisText(axis, found[axis])]));
-  rows.push(["cycle", "cycle", digits(cycles[cycle])]);
+  rows.push(["cycle", "cycle", countText(point, cycle)]);
   const of = data.responses.length > 1 ? `, ${data.responses[response]}` : "";
   for (const [name, entry] of Object.entries(courses)) {
     const label = name.includes("response") ? entry.label + of : entry.label;
@@ -53,6 +53,11 @@ const choices = varying.map((axis) => {
 function pick(point) {
   state.point = point;
   varying.forEach((axis, i) => { choices[i].value = String(places(point)[axis]); });
+  const last = cycles.length - 1;
+  const now = countText(point, state.cycle);
+  const text = last > 0 && Number.isFinite(countAt(point, last)) ? `${now} of ${countText(point, last)}` : now;
+  byId("cycle-count").textContent = text;
+  byId("cycle").setAttribute("aria-valuetext", text);
   drawResponse();
   drawCourse();
   drawMaps();
@@ -65,9 +70,6 @@ function pick(point) {
 function turnTo(cycle) {
   state.cycle = cycle;
   byId("cycle").value = String(cycle);
-  const text = cycles.length > 1 ? `${digits(cycles[cycle])} of ${digits(cycles[cycles.length - 1])}` : digits(cycles[0]);
-  byId("cycle-count").textContent = text;
-  byId("cycle").setAttribute("aria-valuetext", text);
   pick(state.point);
 }
 
@@ -137,7 +139,7 @@ function prepare() {
     });
   }
   if (!byId("course-part").hidden) {
-    byId("course-plot").on("plotly_click", (event) => turnTo(cycles.indexOf(event.points[0].x)));
+    byId("course-plot").on("plotly_click", (event) => turnTo(event.points[0].pointNumber));
   }
 }
 

@@ -97,7 +97,7 @@ function drawResponse() {
     });
     if (bad.length) {
       traces.push({
-        x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "failed",
+        x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "no result",
         text: bad.map((point) => plain(`${pointText(point)}: ${sentence(point)}`).replace(/(.{50,}?) /g, "$1<br>")),
         hovertemplate: "%{text}<extra></extra>", showlegend: !failures, legendrank: 3000, cliponaxis: false,
         marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } }, meta: "failed",
@@ -131,6 +131,11 @@ function drawCourse() {
   const beside = byId("course-plot").clientWidth > 800;
   const domains = panels.length === 1 ? [[0, 1]] : beside ? [[0, 0.46], [0.54, 1]] : [[0.54, 1], [0, 0.46]];
   const traces = [];
+  const own = cycles.map((_, cycle) => countAt(state.point, cycle));
+  // a final state without slow time has no count: two marks side by side in place of a history
+  const leaps = own.includes(Infinity);
+  const across = leaps ? own.map((count) => (count === Infinity ? 1 : count === 0 ? 0 : null)) : own;
+  const ticks = leaps ? { tickvals: [0, 1], ticktext: ["unworn", "final state"], range: [-0.3, 1.3] } : {};
   const shape = layout({
     height: beside ? 300 : 380, showlegend: Boolean(courses.exact_worn_volume), uirevision: "course",
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
@@ -141,32 +146,32 @@ function drawCourse() {
     const place = { xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const scaled = (kind) => Array.from(cycles, (_, cycle) => course(kind, state.point, cycle) * entry.factor);
     const values = scaled(name);
-    if (name === "worn_volume" && courses.worn_volume_error) {
+    if (name === "worn_volume" && courses.worn_volume_error && !leaps) {
       const wrong = Array.from(cycles, (_, cycle) => course("worn_volume_error", state.point, cycle));
       const told = cycles.map((_, i) => i).filter((i) => Number.isFinite(values[i] * wrong[i]));
       const edge = (sign) => told.map((i) => Math.max(values[i] * (1 + sign * wrong[i]), 0));
-      const counts = told.map((i) => cycles[i]);
+      const at = told.map((i) => across[i]);
       traces.push({
-        ...place, x: [...counts, ...counts.slice().reverse()], y: [...edge(1), ...edge(-1).reverse()], mode: "lines",
+        ...place, x: [...at, ...at.slice().reverse()], y: [...edge(1), ...edge(-1).reverse()], mode: "lines",
         fill: "toself", fillcolor: "rgba(0, 114, 178, 0.18)", line: { width: 0 }, hoverinfo: "skip", showlegend: false,
         name: "estimated error", meta: "worn_volume_error",
       });
     }
     traces.push({
-      ...place, x: cycles, y: values, mode: cycles.length > 1 ? "lines" : "markers", showlegend: false, meta: name, name: title,
-      line: { color: data.colours[0], width: 2 }, hovertemplate: `cycle %{x}<br>${title} %{y:.4~g} ${plain(entry.unit)}<extra></extra>`,
+      ...place, x: across, y: values, mode: cycles.length > 1 && !leaps ? "lines" : "markers", showlegend: false, meta: name, name: title,
+      line: { color: data.colours[0], width: 2 }, marker: { color: data.colours[0], size: 10 }, hovertemplate: `${leaps ? "" : "cycle %{x}<br>"}${title} %{y:.4~g} ${plain(entry.unit)}<extra></extra>`,
     });
     if (name === "worn_volume" && courses.exact_worn_volume) {
-      traces.push({ ...place, x: cycles, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
+      traces.push({ ...place, x: across, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
         line: { color: "#000", width: 1.5, dash: "dot" }, hoverinfo: "skip" });
     }
     traces.push({
-      ...place, x: [cycles[state.cycle]], y: [values[state.cycle]], mode: "markers", hoverinfo: "skip", showlegend: false,
+      ...place, x: [across[state.cycle]], y: [values[state.cycle]], mode: "markers", hoverinfo: "skip", showlegend: false,
       marker: { symbol: "circle-open", size: 13, color: "#000", line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
     });
     const alone = beside || i === panels.length - 1;
-    shape[`xaxis${suffix}`] = axisLayout(alone ? "cycles" : "", {
-      anchor: `y${suffix}`, domain: beside ? domains[i] : [0, 1], showticklabels: alone, ...(i && !beside ? { matches: "x" } : {}),
+    shape[`xaxis${suffix}`] = axisLayout(alone && !leaps ? "cycles" : "", {
+      ...ticks, anchor: `y${suffix}`, domain: beside ? domains[i] : [0, 1], showticklabels: alone, ...(i && !beside ? { matches: "x" } : {}),
     });
     shape[`yaxis${suffix}`] = axisLayout("", {
       ...upright(title, entry.unit), anchor: `x${suffix}`, domain: beside ? [0, 1] : domains[i], rangemode: "tozero",
@@ -189,7 +194,7 @@ function drawMaps() {
   const found = held(maps, state.point, state.cycle);
   byId("map-title").textContent = `Contact pairs at ${cycleText(found ? found.cycle : state.cycle)}`;
   if (!found || !known(state.point, state.cycle)) {
-    sayInstead("map-plot", known(state.point, state.cycle) ? "The maps of this point are not on this page." : sentence(state.point));
+    sayInstead("map-plot", known(state.point, state.cycle) ? "The maps of this point are not on this page." : lacking(state.point, state.cycle));
     return;
   }
   const nPairs = entry.values.length / (maps.points.length * maps.cycles.length);
@@ -245,7 +250,7 @@ function drawLoop() {
   const found = held(loops, state.point, state.cycle);
   byId("loop-title").textContent = `Loop of pair ${loops.contacts[state.loop]} at ${cycleText(found ? found.cycle : state.cycle)}`;
   if (!found || !known(state.point, state.cycle)) {
-    sayInstead("loop-plot", known(state.point, state.cycle) ? "The loops of this point are not on this page." : sentence(state.point));
+    sayInstead("loop-plot", known(state.point, state.cycle) ? "The loops of this point are not on this page." : lacking(state.point, state.cycle));
     return;
   }
   const parts = loops.components.length;

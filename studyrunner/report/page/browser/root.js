@@ -114,7 +114,7 @@ function drawRoot() {
   if (!found || !known(state.point, state.cycle)) {
     byId("root-title").textContent = title;
     byId("root-plot").dataset.factor = "";
-    sayInstead("root-plot", known(state.point, state.cycle) ? "The pairs of this point are not on this page." : sentence(state.point));
+    sayInstead("root-plot", known(state.point, state.cycle) ? "The pairs of this point are not on this page." : lacking(state.point, state.cycle));
     return;
   }
   const coloured = pairValues(state.colour, found);

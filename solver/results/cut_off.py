@@ -1,0 +1,46 @@
+"""Whether the contact reaches an edge of the modelled pairs at which the bodies go on: then its scar is cut off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from solver.model import ContactInterface, FloatArray
+from solver.outcome import Outcome
+from solver.results.history import WearHistory
+from solver.results.options import RESULTS
+
+
+def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
+    """First of the counts at which a pair at an edge of the modelled contact carries load or has worn, NaN if never.
+
+    Parameters
+    ----------
+    contact
+        The pairs; `edge` says which are at such an edge.
+    cycles
+        (n_output,), counts.
+    pressure, depth
+        (n_output, n_contact), Pa and m, NaN at counts without a state.
+    """
+    if contact.edge is None or not contact.edge.any():
+        return math.nan
+    least = RESULTS.edge_load
+    reached = [values[:, contact.edge].max(axis=1) > least * values.max(axis=1) for values in (pressure, depth)]
+    found = np.flatnonzero(np.logical_or(*reached))
+    return float(cycles[found[0]]) if found.size else math.nan
+
+
+def judge_cut_off(history: WearHistory) -> WearHistory:
+    """A history that was computed to its end, but of a contact that is cut off, says so by its outcome."""
+    if math.isnan(history.cut_off_cycle) or not history.outcome.complete:
+        return history
+    return replace(history, outcome=Outcome.CONTACT_CUT_OFF, message=describe_cut_off(history.cut_off_cycle))
+
+
+def describe_cut_off(cycle: float) -> str:
+    """From which count on it is cut off; inf for a final state that was found without slow time."""
+    when = "in the final state" if math.isinf(cycle) else f"at cycle {cycle:.6g}" + (" already" if cycle else "")
+    return f"pairs at the edge of the modelled contact carry load or have worn {when}"

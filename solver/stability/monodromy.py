@@ -1,0 +1,177 @@
+"""How a small disturbance of a periodic state goes through one period: the monodromy of the joint, in time.
+
+A disturbance (dy, dlambda) of the displacements y, m, and of the contact force, N, obeys
+
+    M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
+
+and at every sample the derivative of the contact law of Eqs. (9)-(15), its statuses being those of the state. With
+`p = lambda + x`, `x = eps u` the state of an elastic pair, and A, B the derivatives of x with respect to p and to x of
+the sample before (`coulomb.sample_tangents`), the law reads
+
+    (1 - A) eps du - A dlambda = B eps du'.                                                                  (2)
+
+A mass on a slider is marched with its own steps (`rigid_slider.step_mass`), whose derivatives T see the instants at
+which it turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+
+Equation (1) is integrated by backward differences of second order (BDF2): the contact holds displacements, which no
+scheme without damping at high rates follows. The scheme itself takes the fraction `(2 pi r)^4 / (4 N^3)` of a
+vibration at r times the frequency of the state in a period of N samples. Pairs that stick all period long are held,
+pairs that are open all period long are free: no law is needed for either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit, sample_tangents
+from solver.contact.rigid_slider import step_mass
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.model import BoolArray, FloatArray, IntArray, LinearModel
+from solver.structure.fourier import build_basis
+from solver.structure.joint import Joint
+
+
+@dataclass(frozen=True)
+class SampledLaw:
+    """Derivative of the contact law at N samples of the p pairs that switch, blocks (N, p, 3, 3) of each pair:
+
+        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv',
+
+    a prime for the sample before. Displacements that a pair does not have take no force. Velocities: m per sample.
+    """
+
+    by_force: FloatArray
+    by_motion: FloatArray
+    by_speed: FloatArray
+    by_last_motion: FloatArray
+    by_last_speed: FloatArray
+
+
+@dataclass(frozen=True)
+class Monodromy:
+    """March of disturbances through the N samples of a period.
+
+    inertia, drag (n, n): `M / h^2` and `C / h` of the displacements that move, N/m, h the time between two samples.
+    compliance (n, n): inverse of `9/4 M / h^2 + 3/2 C / h + K`, m/N. select (3p, n): motion of the pairs that switch.
+    """
+
+    inertia: FloatArray
+    drag: FloatArray
+    compliance: FloatArray
+    select: csr_array
+    law: SampledLaw
+
+    @property
+    def size(self) -> int:
+        """Of a disturbance: displacements and velocities of two samples."""
+        return 4 * len(self.inertia)
+
+    @cached_property
+    def _contact(self) -> tuple[FloatArray, FloatArray]:
+        """Motion under contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law in these forces alone."""
+        spread = np.asarray(self.select @ self.compliance).T
+        flexibility = np.asarray(self.select @ spread)
+        n_samples, n_pairs = self.law.by_force.shape[:2]
+        blocks = flexibility.reshape(n_pairs, 3, 3 * n_pairs)
+        inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
+        pairs = np.arange(n_pairs)
+        for n in range(n_samples):
+            system = -((self.law.by_motion[n] + 1.5 * self.law.by_speed[n]) @ blocks)
+            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += self.law.by_force[n]
+            inverse[n] = np.linalg.inv(system.reshape(3 * n_pairs, 3 * n_pairs))
+        return spread, inverse
+
+    def apply(self, disturbance: FloatArray) -> FloatArray:
+        """Disturbances (size, j) a period later: displacements now and a sample before, velocities (m per sample)."""
+        now, before, speed, speed_before = np.split(disturbance, 4)
+        law, shape = self.law, (-1, 3, disturbance.shape[1])
+        spread, inverse = self._contact
+        for n, solve in enumerate(inverse):
+            # BDF2: v = 3/2 y + known, and the same of the acceleration
+            known = 0.5 * before - 2.0 * now
+            push = self.inertia @ (1.5 * known + 0.5 * speed_before - 2.0 * speed) + self.drag @ known
+            after = -(self.compliance @ push)
+            if solve.size:
+                free, last, given, swift = ((self.select @ part).reshape(shape) for part in (after, now, known, speed))
+                right = law.by_last_motion[n] @ last + law.by_last_speed[n] @ swift
+                right -= law.by_motion[n] @ free + law.by_speed[n] @ (1.5 * free + given)
+                after -= spread @ (solve @ right.reshape(-1, disturbance.shape[1]))
+            now, before, speed, speed_before = after, now, 1.5 * after + known, speed
+        return np.concatenate([now, before, speed, speed_before])
+
+
+def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:
+    """Monodromy of a state whose wear is held, marched with `n_samples` of the law.
+
+    linear: the structure that disturbances move in. Raises numpy.linalg.LinAlgError where that is singular.
+    """
+    fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
+    state = Balance.frozen(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
+    switching, stuck = switching_pairs(state)
+    dofs = joint.contact.dofs
+    moves = np.ones(len(linear.mass), bool)
+    moves[dofs[stuck][dofs[stuck] >= 0]] = False
+    mass, damping, stiffness = (
+        np.ascontiguousarray(np.real(part)[np.ix_(moves, moves)])
+        for part in (linear.mass, linear.damping, linear.stiffness)
+    )
+    inertia, drag = mass / fine.sample_step**2, damping / fine.sample_step
+    compliance = np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness)
+    chosen = dofs[switching].ravel()
+    rows = np.flatnonzero(chosen >= 0)
+    place = (np.cumsum(moves) - 1)[chosen[rows]]
+    select = csr_array((np.ones(rows.size), (rows, place)), shape=(chosen.size, len(mass)))
+    return Monodromy(inertia, drag, compliance, select, _sample_law(fine, state, np.flatnonzero(switching)))
+
+
+def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
+    """Pairs (n_contact,) that slip or open in a part of the period; and those that stick through all of it."""
+    stuck = (at.status_t == STICK).all(axis=1)
+    return ~stuck & ~(at.status_t == SEPARATED).all(axis=1), stuck
+
+
+def _sample_law(joint: Joint, at: Evaluation, pairs: IntArray) -> SampledLaw:
+    """The law of the pairs that switch."""
+    n = at.status_t.shape[1]
+    own, carried = sample_tangents(
+        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, 1
+    )
+    penalty = joint.penalty
+    eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
+    there = joint.contact.dofs[pairs] >= 0
+    # without such a displacement there is no disturbance of the force either
+    passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
+    last = np.zeros((n, pairs.size, 3, 3))
+    last[:, :, 1:, 1:] = carried[:, pairs]
+    none = np.zeros_like(last)
+    law = SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
+    for place, pair in enumerate(pairs.tolist()):
+        if penalty.inertial[pair]:
+            _take_mass_law(law, place, joint, at, pair)
+    return law
+
+
+def _take_mass_law(law: SampledLaw, place: int, joint: Joint, at: Evaluation, pair: int) -> None:
+    """Tangential rows of the law of a mass on a slider, in place, at `place` among the pairs that switch."""
+    step, line = joint.sample_step, int(joint.line[pair])
+    mass, drag = joint.penalty.mass[pair], joint.penalty.drag[pair]
+    gain, loss = mass / step + 0.5 * drag, mass / step - 0.5 * drag
+    there = np.array([0, 1]) if line < 0 else np.array([line])
+    rows, friction = 1 + there, float(joint.friction_coefficient[pair])
+    for part in (law.by_force, law.by_motion, law.by_last_motion):
+        part[:, place, rows] = 0.0
+    velocity, out, slopes = at.start[pair].copy(), np.empty(7), np.empty((5, 5))
+    for n in range(at.status_t.shape[1]):
+        limit = friction_limit(friction, max(float(at.predicted_t[pair, 0, n]), 0.0))
+        step_mass(at.predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, slopes)
+        velocity[:] = out[2:4]
+        by_predicted, by_before = slopes[np.ix_(there, there)], slopes[np.ix_(there, 2 + there)]
+        law.by_force[n, place][np.ix_(rows, rows)] = np.eye(there.size) - by_predicted
+        if joint.has_normal[pair] and limit > 0.0:
+            law.by_force[n, place, rows, 0] = -friction * slopes[there, 4]
+        law.by_speed[n, place][np.ix_(rows, rows)] = -gain / step * by_predicted
+        law.by_last_speed[n, place][np.ix_(rows, rows)] = (by_before - loss * by_predicted) / step

@@ -1,0 +1,128 @@
+"""What to do about a point that failed, or that is known less well than was asked for.
+
+It never names what was used already, nor what the scheme does not use: the adaptive scheme has no `step`, automatic
+harmonics cannot be made more. The summary of a run and the report take all of their advice from here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_SWEEPS = ("up", "down", "ramp")
+_OF_ADAPTIVE_STEPS = ("adaptive", "final")
+
+_OF_STATES = 0.5
+"""Share of the error of a worn volume from which on the error of a wear rate is what it comes from."""
+
+_OF_START = 1.0 / 6.0
+"""The same of the wear rate of the start state, which counts three times (`ResultOptions.start_safety`)."""
+
+_FAR = 10.0
+"""Errors of more than so many times `rtol` do not fall in proportion to it."""
+
+
+@dataclass(frozen=True)
+class Used:
+    """What a point was computed with.
+
+    scheme, sweep, rtol: of the point. harmonics, samples: "auto", or a number. schemes, sweeps: all of the study.
+    by_depth: whether slow_time.largest_depth gives explicit steps, which then ignore `step`. until: whether the study
+    has a target, slow_time.until.
+    """
+
+    scheme: str
+    sweep: str
+    harmonics: int | str = "auto"
+    samples: int | str = "auto"
+    rtol: float = 1e-2
+    schemes: tuple[str, ...] = ()
+    sweeps: tuple[str, ...] = ()
+    by_depth: bool = False
+    until: bool = False
+
+
+def advise(outcome: str, used: Used) -> str:
+    """A sentence on what may help against an outcome, which is a word of `flag_meanings`.
+
+    Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
+    """
+    if outcome in ("start_failed", "branch_lost", "unstable"):
+        # more harmonics make no state stable
+        finer = () if outcome == "unstable" else _given(used)
+        return _try(*finer, *_other_sweeps(used))
+    if outcome == "march_failed":
+        return _try(*_given(used), *_other_steps(used))
+    if outcome == "step_too_long":
+        return _try(*_other_steps(used))
+    if outcome == "sensitive":
+        if used.scheme not in _OF_ADAPTIVE_STEPS:
+            return _try(*_other_steps(used))
+        return _try("a smaller rtol") + (
+            " Where that leaves both apart, the joint itself is that sensitive: its friction coefficient and load,"
+            " varied a little, say more than one number."
+        )
+    if outcome == "inaccurate":
+        return _try(*_given(used))
+    if outcome == "certificate_failed":
+        return _try(*_given(used), "a smaller tolerance")
+    if outcome == "no_final_state":
+        other = "another scheme with " if used.scheme == "final" else ""
+        target = "" if used.until else " or slow_time.until"
+        return _try(f"{other}an end in slow_time.cycles{target}")
+    return ""
+
+
+def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> str:
+    """What would make the error of a worn volume smaller, in a few words.
+
+    error: of the last worn volume, relative, above `rtol`. wear_rate_error: of the states, the first of the start state
+    (NaN: not estimated); empty where they are not known.
+    """
+    rates = [0.0 if math.isnan(value) else value for value in wear_rate_error]
+    if _given(used) and max(rates, default=0.0) >= _OF_STATES * error > 0.0:
+        return " and ".join(_given(used))
+    of_start = bool(rates) and rates[0] >= _OF_START * error
+    if used.scheme not in _OF_ADAPTIVE_STEPS and not of_start:
+        return " or ".join(_other_steps(used))
+    if error >= _FAR * used.rtol:
+        return "a smaller rtol"
+    # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
+    return f"rtol = {_rounded_down(used.rtol**2 / error)}"
+
+
+def advise_steps(used: Used) -> str:
+    """What to do about explicit steps that make the wear rate oscillate."""
+    return " or ".join(_other_steps(used))
+
+
+def _given(used: Used) -> tuple[str, ...]:
+    """Harmonics and samples of a given number, which may be automatic instead."""
+    return tuple(f'{key} = "auto"' for key in ("harmonics", "samples") if getattr(used, key) != "auto")
+
+
+def _other_sweeps(used: Used) -> tuple[str, ...]:
+    return tuple(f'sweep = "{sweep}"' for sweep in _SWEEPS if sweep not in (used.sweep, *used.sweeps))
+
+
+def _other_steps(used: Used) -> tuple[str, ...]:
+    """Steps that are shorter than those that were used, and schemes that the study does not have."""
+    if used.scheme in _OF_ADAPTIVE_STEPS:
+        shorter, other = "a smaller rtol, which makes the steps shorter,", "implicit"
+        return (
+            (shorter, 'scheme = "implicit" with a small step') if other not in used.schemes else (shorter.rstrip(","),)
+        )
+    by_depth = used.by_depth and used.scheme == "explicit"
+    shorter = "a smaller slow_time.largest_depth" if by_depth else "a smaller step"
+    return (shorter,) if "adaptive" in used.schemes else ('scheme = "adaptive"', shorter)
+
+
+def _try(*remedies: str) -> str:
+    return f"Try {' or '.join(remedies)}." if remedies else ""
+
+
+def _rounded_down(value: float) -> str:
+    """With two digits, no larger than it is."""
+    digits, exponent = f"{value:.12e}".split("e")
+    return f"{float(f'{digits[:3]}e{exponent}'):g}"

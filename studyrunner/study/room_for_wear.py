@@ -1,0 +1,53 @@
+"""Pairs laid as far as a study will wear them: the width that a scene in gross slip is built with."""
+
+from __future__ import annotations
+
+import math
+
+from studies.scenes import scene_with_room
+from studies.scenes.half_space.room_for_wear import ExpectedWear
+from studyrunner.study.study import Study
+
+
+def with_room_for_wear(study: Study) -> Study:
+    """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself."""
+    scene = study.scene
+    # what a result file holds was built with the parameters that stand beside it
+    if not scene.is_bundled or scene.path is not None:
+        return study
+    parameters = scene_with_room(scene.model, scene.parameters, expected_wear(study))
+    if parameters is scene.parameters:
+        return study
+    return study.model_copy(update={"scene": scene.model_copy(update={"parameters": parameters})})
+
+
+def expected_wear(study: Study) -> ExpectedWear:
+    """The most that any of its points wears."""
+    law, until = study.wear_law, study.slow_time.until or {}
+    factor = sum(value for _, value in law.surfaces) if law.surfaces else 1.0
+    if law.name == "energy":
+        factor *= study.friction_coefficient or 0.0
+    if law.table is not None:
+        factor *= max(max(row) for row in law.table.factor)
+    cycles = math.inf if study.to_the_end else study.cycles_kept[-1]
+    wear = max(study.axes.wear_coefficient) * factor
+    return ExpectedWear(
+        amplitude=max(study.axes.excitation_amplitude),
+        per_slip_work=wear * cycles if wear > 0.0 else 0.0,
+        volume=until.get("worn_volume", math.inf),
+        depth=until.get("wear_depth", math.inf),
+    )
+
+
+def describe_room(study: Study) -> str:
+    """Half-width, and number of pairs as wide as now, with which the scene has room; empty where that is not known."""
+    given = dict(study.scene.parameters)
+    if not study.scene.is_bundled or given.get("half_width") is None:
+        return ""
+    free = study.scene.parameters.model_copy(update={"half_width": None})
+    needed = dict(scene_with_room(study.scene.model, free, expected_wear(study)))["half_width"]
+    if not isinstance(needed, float) or needed <= given["half_width"]:
+        return ""
+    name = "strips" if "strips" in given else "patches"
+    number = 2 * math.ceil(given[name] * needed / given["half_width"] / 2.0)
+    return f"half_width = {needed:g} has room for it; {name} = {number} are then as wide as now"

@@ -1,0 +1,128 @@
+"""A contact that reaches an edge of its pairs where the bodies go on is told by the outcome, and no other one is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import march_wear
+from solver.model import ContactInterface, ReducedModel
+from solver.outcome import COMPLETE, Outcome
+from solver.results.cut_off import describe_cut_off, first_cut_off
+from solver.settings import SolverSettings
+from studies import build_scene
+from studies.scenes.closed_forms.hertz import line_half_width, point_radius
+from studies.scenes.half_space.influence import composite_modulus
+
+A_LINE = line_half_width(1.2e5, 6e-3, composite_modulus(200e9, 0.3))
+A_POINT = point_radius(100.0, 10e-3, composite_modulus(200e9, 0.3))
+SETTINGS = SolverSettings(harmonics=3, samples=32)
+
+
+def edge_of(model: ReducedModel, edge: list[bool] | None) -> ContactInterface:
+    return replace(model.contact, edge=None if edge is None else np.array(edge))
+
+
+def test_load_or_wear_at_the_edge_is_found_at_its_first_count() -> None:
+    contact = edge_of(build_scene("cylinder_on_flat", strips=6), [False, False, True])
+    cycles, none = np.array([0.0, 10.0, 20.0, 30.0]), np.zeros((4, 3))
+    middle = none + [2.0, 1.0, 0.0]
+    at = none.copy()
+    at[2:, 2] = 1e-3
+    assert math.isnan(first_cut_off(contact, cycles, middle, middle))
+    assert first_cut_off(contact, cycles, middle + at, middle) == 20.0
+    assert first_cut_off(contact, cycles, middle, middle + at) == 20.0
+    assert first_cut_off(contact, cycles, middle + 1.0, middle) == 0.0
+    # round-off is no load, and an edge that is none does not count
+    assert math.isnan(first_cut_off(contact, cycles, middle + 1e-9 * at, middle))
+    for edge in (None, [False, False, False]):
+        assert math.isnan(first_cut_off(edge_of(build_scene("sdof_slider"), edge), cycles, middle + at, middle))
+    # of counts without a state nothing is known
+    gone = middle + at
+    gone[2] = np.nan
+    assert first_cut_off(contact, cycles, gone, middle) == 30.0
+    gone[3] = np.nan
+    assert math.isnan(first_cut_off(contact, cycles, gone, middle))
+
+
+def test_it_is_said_from_which_count_on() -> None:
+    assert describe_cut_off(2000.0).endswith("at cycle 2000 already")
+    assert describe_cut_off(0.0).endswith("at cycle 0")
+    assert describe_cut_off(math.inf).endswith("in the final state")
+    assert Outcome.CONTACT_CUT_OFF not in COMPLETE
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("cylinder_on_flat", {"strips": 12, "half_width": 0.9 * A_LINE}),
+        ("sphere_on_flat", {"patches": 4, "half_width": 0.9 * A_POINT}),
+    ],
+)
+def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name: str, values: dict[str, float]) -> None:
+    found = march_wear(build_scene(name, **values), 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=SETTINGS)
+    assert found.outcome is Outcome.CONTACT_CUT_OFF
+    assert found.cut_off_cycle == 0.0
+    assert found.message == describe_cut_off(0.0)
+    # the state is there, and wrong
+    assert found.mean_pressure[0].min() > 0.0
+
+
+@pytest.mark.parametrize(("name", "pairs"), [("cylinder_on_flat", {"strips": 12}), ("sphere_on_flat", {"patches": 4})])
+@pytest.mark.parametrize("values", [{}, {"stroke": 1e-5}])
+def test_the_unworn_contact_is_whole_by_default(name: str, pairs: dict[str, int], values: dict[str, float]) -> None:
+    model = build_scene(name, **pairs, **values)
+    found = march_wear(model, 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=SETTINGS)
+    assert model.contact.edge is not None
+    assert found.outcome is Outcome.CONVERGED
+    assert not found.mean_pressure[0, model.contact.edge].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "narrow", "wide"),
+    [
+        ("cylinder_on_flat", {"strips": 12, "half_width": 1.5 * A_LINE}, {"strips": 20, "half_width": 2.5 * A_LINE}),
+        ("sphere_on_flat", {"patches": 4, "half_width": 1.4 * A_POINT}, {"patches": 7, "half_width": 2.45 * A_POINT}),
+    ],
+)
+def test_a_scar_that_grows_out_of_its_pairs_is_no_result(
+    name: str, narrow: dict[str, float], wide: dict[str, float]
+) -> None:
+    # the same pairs, with and without some farther out
+    found = [
+        march_wear(
+            build_scene(name, stroke=1e-5, **pairs),
+            20.0,
+            1.0,
+            0.6,
+            5e-14,
+            list(np.linspace(0.0, 4000.0, 9)),
+            sweep="ramp",
+            settings=SETTINGS,
+        )
+        for pairs in (narrow, wide)
+    ]
+    assert found[1].outcome is Outcome.CONVERGED
+    cut = found[0]
+    assert cut.outcome is Outcome.CONTACT_CUT_OFF
+    assert 0.0 < cut.cut_off_cycle < 4000.0
+    before = cut.cycles < cut.cut_off_cycle
+    assert cut.wear_depth[before].max(axis=1) == pytest.approx(found[1].wear_depth[before].max(axis=1), rel=0.02)
+    assert cut.wear_depth[-1].max() > 1.02 * found[1].wear_depth[-1].max()
+    # it was computed to its end, and is kept
+    assert cut.last_cycle == 4000.0
+    assert np.isfinite(cut.worn_volume).all()
+
+
+def test_a_final_state_without_slow_time_is_cut_off_as_well() -> None:
+    # partial slip would wear up to 1.17 of the unworn contact
+    model = build_scene("cylinder_on_flat", strips=40, half_width=1.08 * A_LINE)
+    found = march_wear(model, 20.0, 1.0, 0.6, 1e-13, math.inf, scheme="final", sweep="ramp", settings=SETTINGS)
+    assert found.final_method == "active_set"
+    assert found.outcome is Outcome.CONTACT_CUT_OFF
+    assert found.cut_off_cycle == math.inf
+    assert found.message == describe_cut_off(math.inf)

@@ -1,0 +1,291 @@
+"""Floquet multipliers of states against those of exact motions, and what becomes of unstable states."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.contact.coulomb import SEPARATED
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.loading_history import start_states
+from solver.loading_history.start_states import follow_branch
+from solver.model import ComplexArray, FloatArray, ReducedModel
+from solver.newton.solve_balance import Effort
+from solver.outcome import Outcome
+from solver.results.history import StartState
+from solver.settings import SolverSettings
+from solver.stability.floquet import find_instability, growing_exponents, moving, multipliers_of
+from solver.stability.monodromy import build_monodromy, switching_pairs
+from solver.structure.fourier import synthesis, to_complex
+from solver.structure.joint import Case, Joint, build_case
+from solver.wear.march import march_wear
+from tests import references
+from tests.solver.models import cyclic_model, random_balance, random_model
+from tests.solver.models import scene as bundled
+from tests.solver.random_orbits import Scene, drawn
+
+
+@pytest.fixture
+def presented(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unstable states are handed out, to be looked at here."""
+    monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
+
+
+def start_of(
+    model: ReducedModel, friction: float, excitation: float, frequency: float, settings: SolverSettings
+) -> StartState:
+    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", settings)
+    return start
+
+
+def state_at(
+    model: ReducedModel, friction: float, excitation: float, frequency: float, settings: SolverSettings | None = None
+) -> tuple[Case, Joint, Evaluation]:
+    """The state that a sweep up comes to."""
+    settings = settings or SolverSettings()
+    start = start_of(model, friction, excitation, frequency, settings)
+    assert start.state is not None
+    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
+    joint = case.joint(2.0 * np.pi * frequency, excitation)
+    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
+    return case, joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+
+
+@lru_cache
+def state_of(kind: str, seed: int, damping: float = 1.0) -> tuple[Scene, Case, Joint, Evaluation]:
+    """A drawn scene, its damping times a factor, and its state."""
+    scene = drawn(kind, seed)
+    scene = replace(scene, damping=damping * scene.damping)
+    case, joint, at = state_at(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
+    return scene, case, joint, at
+
+
+def exact_multipliers(scene: Scene, joint: Joint, at: Evaluation) -> ComplexArray:
+    """Of the exact periodic motion next to a state, by differences of its period map."""
+    orders, masses = joint.basis.orders, np.diag(scene.mass) > 0.0
+    motion = np.zeros((masses.size, 2 * len(orders) + 1))
+    motion[masses] = joint.structure.response_h(joint.to_relative(at.displacement_h))
+    if scene.tangent is not None and not masses[scene.tangent]:
+        motion[scene.tangent] = at.displacement_h[0, 1]
+    displacement = (motion @ synthesis(orders, np.zeros(1)))[:, 0]
+    velocity = (1j * scene.omega * np.array(orders) * to_complex(motion)).sum(axis=1).real
+    pair = scene.pair
+    orbit, system = pair.orbit_near(displacement, velocity), pair.system
+    y, name = orbit.segments[0].start, orbit.segments[0].phase
+    size = np.abs(y[: 2 * system.n]).max()
+    columns = []
+    for place in range(2 * system.n):
+        step = 1e-6 * size * np.eye(y.size)[place]
+        ends = [system.advance(system.phase_at(name, y + s), y + s, system.period)[1] for s in (step, -step)]
+        columns.append((ends[0] - ends[1])[: 2 * system.n] / (2e-6 * size))
+    return np.linalg.eigvals(np.array(columns).T)
+
+
+def marched(joint: Joint, at: Evaluation, n_samples: int) -> ComplexArray:
+    return multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), every=True)
+
+
+def largest(multipliers: ComplexArray) -> float:
+    """Largest size of those that are none of a pair that sticks: such a pair neither gains nor loses."""
+    sizes = np.abs(multipliers)
+    return float(sizes[np.abs(multipliers - 1.0) > 1e-6].max(initial=0.0))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("presented")
+@pytest.mark.parametrize(
+    ("kind", "seed", "allowed"),
+    [
+        ("slider", 1, 0.01),
+        ("slider", 7, 0.01),
+        ("stopping slider", 5, 0.02),
+        ("swinging slider", 5, 0.02),
+        ("swinging slider", 7, 0.01),
+        ("two masses", 6, 0.05),
+        ("impact", 2, 0.04),
+        ("impact", 6, 0.01),
+        ("grazing", 2, 0.05),
+        ("grazing", 4, 0.01),
+        ("jenkins", 2, 0.01),
+        ("jenkins", 6, 0.01),
+        ("slipping little", 3, 0.01),
+        ("inclined", 4, 0.01),
+        ("inclined", 8, 0.01),
+    ],
+)
+def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int, allowed: float) -> None:
+    scene, _, joint, at = state_of(kind, seed)
+    assert largest(marched(joint, at, 512)) == pytest.approx(largest(exact_multipliers(scene, joint, at)), abs=allowed)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("presented")
+@pytest.mark.parametrize("damping", [-0.3, -1.0, -3.0])
+@pytest.mark.parametrize("kind", ["slider", "two masses", "jenkins"])
+def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
+    """Friction holds some of these vibrations, and some not."""
+    seen = 0
+    for seed in (1, 4, 6):
+        try:
+            scene, case, joint, at = state_of(kind, seed, damping)
+            exact = largest(exact_multipliers(scene, joint, at))
+        except (AssertionError, RuntimeError):
+            # no state, or none that is a motion of the exact scene
+            continue
+        if abs(exact - 1.0) > 0.05:
+            seen += 1
+            assert (find_instability(case, joint, at, Effort()) is not None) == (exact > 1.0), (seed, exact)
+    assert seen > 0
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("presented")
+@pytest.mark.parametrize("seed", [1, 2, 3, 5, 17, 26, 29, 32, 41, 54, 57])
+def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
+    scene, case, joint, at = state_of("impact", seed)
+    exact = exact_multipliers(scene, joint, at)
+    beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
+    unstable = find_instability(case, joint, at, Effort())
+    assert (unstable is not None and unstable.outcome is Outcome.PERIOD_DOUBLED) == beyond
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_harmonics", [3, 5, 9, 13])
+@pytest.mark.parametrize("omega", [1.0, 1.2, 1.5])
+def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega: float, n_harmonics: int) -> None:
+    """Its multipliers lie within the unit circle: the mass comes to this motion by itself, see `tests.event_driven`."""
+    case, joint, at = state_at(
+        bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, 128)
+    )
+    assert (at.status_t == SEPARATED).any()
+    assert not (at.status_t == SEPARATED).all()
+    assert find_instability(case, joint, at, Effort()) is None
+
+
+def with_matrices(name: str, **matrices: FloatArray) -> ReducedModel:
+    """A bundled scene with other matrices."""
+    model = bundled(name)
+    return replace(model, linear={0: replace(model.linear[0], **matrices)})
+
+
+def scaled_damping(factor: float) -> ReducedModel:
+    return with_matrices("vibro_impact", damping=factor * bundled("vibro_impact").linear[0].damping)
+
+
+def driven(damping: float) -> ReducedModel:
+    """The two masses, the first one with another damping."""
+    changed = bundled("two_masses").linear[0].damping.copy()
+    changed[0, 0] = damping
+    return with_matrices("two_masses", damping=changed)
+
+
+@pytest.mark.parametrize(
+    ("model", "friction", "excitation", "frequency"),
+    [
+        (driven(-0.5), 0.5, 20.0, 0.05),
+        (with_matrices("two_masses", stiffness=np.array([[-2.0, -1.0], [-1.0, 1.0]])), 0.5, 20.0, 0.05),
+        (scaled_damping(-1.0), 0.0, 0.02, 1.2 / (2.0 * np.pi)),
+        (with_matrices("sdof_slider", damping=np.diag([0.0, -5.0])), 0.5, 10.0, 200.0),
+    ],
+    ids=["damping", "stiffness", "wall", "slider"],
+)
+def test_a_growing_vibration_is_no_result(
+    model: ReducedModel, friction: float, excitation: float, frequency: float
+) -> None:
+    start = start_of(model, friction, excitation, frequency, SolverSettings())
+    assert start.outcome is Outcome.UNSTABLE
+    assert start.state is None
+    assert "in each period of the excitation" in start.message
+    assert start.message.endswith("look for negative damping or stiffness of the structure")
+    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SolverSettings())
+    assert (history.outcome, history.message) == (start.outcome, start.message)
+    assert np.isnan(history.response).all()
+
+
+def test_friction_bounds_a_vibration_with_little_negative_damping() -> None:
+    """The structure alone is unstable, the state is not: it is an exact periodic motion that attracts."""
+    model = driven(-0.02)
+    case, joint, at = state_at(model, 0.5, 20.0, 0.05)
+    linear = model.linear[0]
+    orbit = references.coulomb_orbit(
+        linear.mass, linear.damping, linear.stiffness, [20.0, 0.0], 1, 7.2, 2.0 * np.pi * 0.05
+    )
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    assert np.abs(response) == pytest.approx([abs(orbit.harmonic(0)), abs(orbit.harmonic(1))], rel=2e-3)
+    assert growing_exponents(linear, np.ones(2, bool)).size > 0
+    assert find_instability(case, joint, at, Effort()) is None
+
+
+def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
+    start = start_of(driven(-0.5), 50.0, 20.0, 0.05, SolverSettings())
+    assert start.outcome is Outcome.UNSTABLE
+    # the first mass alone: x'' - 0.5 x' + 2 x = 0 for 20 s
+    assert f"{np.exp(0.25 * 20.0):.3g}" in start.message
+    assert "linear structure alone" in start.message
+
+
+def test_exponents_of_a_structure() -> None:
+    model = driven(-0.5)
+    joint = build_case(model, 0.5, 1.0, SolverSettings(1, 8)).joint(1.0, 1.0)
+    found = growing_exponents(model.linear[0], moving(joint, np.array([True])))
+    assert np.sort_complex(found) == pytest.approx(0.25 + np.sqrt(2.0 - 0.0625) * np.array([-1j, 1j]))
+    assert growing_exponents(bundled("two_masses").linear[0], np.ones(2, bool)).size == 0
+
+
+def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
+    balance, predicted = random_balance(random_model(4, ("3d",) * 6, 12), SolverSettings(3, 24), 4, wear=False)
+    at = balance.evaluate(predicted)
+    assert switching_pairs(at)[0].any()
+    monodromy = build_monodromy(balance.joint, balance.joint.model.linear[0], at, 64)
+    every, some = multipliers_of(monodromy, every=True), multipliers_of(monodromy, every=False)
+    assert np.abs(some).max() == pytest.approx(np.abs(every).max(), rel=1e-3)
+
+
+def test_the_march_is_of_second_order_for_the_structure_alone() -> None:
+    """An open joint, against the exponential of its matrix."""
+    model = random_model(3, ("3d",), 2)
+    balance, predicted = random_balance(model, SolverSettings(1, 24), 3, wear=False)
+    predicted[:, 0] = -1e6 * (balance.joint.component_index % 3 == 0)
+    at = balance.evaluate(predicted)
+    linear, n = model.linear[0], len(model.linear[0].mass)
+    period = 2.0 * np.pi / balance.joint.omega
+    flow = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(linear.mass, linear.stiffness), -np.linalg.solve(linear.mass, linear.damping)],
+        ]
+    )
+    exact = np.abs(np.exp(period * np.linalg.eigvals(flow))).max()
+    errors = [
+        abs(np.abs(multipliers_of(build_monodromy(balance.joint, linear, at, n_samples), every=True)).max() - exact)
+        for n_samples in (512, 1024, 2048)
+    ]
+    assert errors[1] < 0.3 * errors[0]
+    assert errors[2] < 0.3 * errors[1]
+
+
+def test_it_is_not_looked_for_in_a_travelling_wave() -> None:
+    balance, predicted = random_balance(cyclic_model(3, ("3d",), 7, 1), SolverSettings(3, 24), 3, wear=False)
+    at = balance.evaluate(predicted)
+    assert switching_pairs(at)[0].any()
+    assert (
+        find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Effort())
+        is None
+    )
+
+
+@pytest.mark.slow
+def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, settings = drawn("impact", 17), SolverSettings(27, 512)
+    frequency = scene.omega / (2.0 * np.pi)
+    assert start_of(scene.model, 0.0, scene.excitation, frequency, settings).outcome is Outcome.PERIOD_DOUBLED
+    with monkeypatch.context() as handed_out:
+        handed_out.setattr(start_states, "find_instability", lambda *_: None)
+        start = start_of(scene.model, 0.0, scene.excitation, frequency, settings)
+    assert start.outcome is Outcome.CONVERGED
+    history = march_wear(scene.model, 0.0, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
+    assert history.outcome is Outcome.PERIOD_DOUBLED
+    assert "in each period of the excitation" in history.message

@@ -1,0 +1,170 @@
+"""The width of a contact in gross slip against wear that is computed apart from the solver, and what needs none."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.model import FloatArray
+from studies import build_scene
+from studies.scenes import scene_parameters, scene_with_room
+from studies.scenes.closed_forms.hertz import (
+    line_half_width,
+    line_stick_under_stroke,
+    line_worn_edge,
+    point_radius,
+    point_stick_under_stroke,
+)
+from studies.scenes.half_space.influence import composite_modulus
+from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
+from tests.studies.half_space_twin import compliances, limit_depth, pressed
+
+MODULUS = composite_modulus(200e9, 0.3)
+A_LINE = line_half_width(1.2e5, 6e-3, MODULUS)
+A_POINT = point_radius(100.0, 10e-3, MODULUS)
+
+
+def room(name: str, expected: ExpectedWear, **values: Any) -> float | None:
+    kind = scene_parameters(name)
+    return dict(scene_with_room(name, kind(**values), expected))["half_width"]
+
+
+def worn_by_uniform_slip(name: str, **values: float) -> FloatArray:
+    """Half-width, volume and largest depth, rows, while all pairs slide alike and wear by their pressure."""
+    model = build_scene(name, **values)
+    compliance, contact = compliances(model)[0], model.contact
+    load = float(model.linear[0].load_static[2 * contact.n_contact])
+    depth, rows = np.zeros(contact.n_contact), []
+    radius = np.linalg.norm(contact.position, axis=1)
+    while True:
+        force = solve_pressed(compliance, contact.gap + depth, load)
+        rows.append((radius[force > 0.0].max(), depth @ contact.area, depth.max()))
+        if rows[-1][0] > 0.85 * radius.max():
+            return np.array(rows)
+        pressure = force / contact.area
+        depth = depth + 0.03 * rows[-1][0] ** 2 / (2.0 * values["R"]) * pressure / pressure.max()
+
+
+def solve_pressed(compliance: FloatArray, gap: FloatArray, load: float) -> FloatArray:
+    """Normal forces (n,), N, of a body pressed on pairs with these gaps, m; pairs come and go until none is wrong."""
+    touching = np.ones(len(gap), bool)
+    while True:
+        m = int(touching.sum())
+        matrix = np.ones((m + 1, m + 1))
+        matrix[:m, :m], matrix[m, m] = -compliance[np.ix_(touching, touching)], 0.0
+        force, approach = np.zeros(len(gap)), 0.0
+        *force[touching], approach = np.linalg.solve(matrix, np.append(gap[touching], load))
+        again = np.where(touching, force > 0.0, compliance @ force + gap < approach)
+        if (again == touching).all():
+            return force
+        touching = again
+
+
+@pytest.mark.parametrize(
+    ("name", "contact", "values"),
+    [
+        ("cylinder_on_flat", A_LINE, {"R": 6e-3, "strips": 120, "half_width": 5.0 * A_LINE, "stroke": 1e-5}),
+        ("sphere_on_flat", A_POINT, {"R": 10e-3, "patches": 14, "half_width": 3.0 * A_POINT, "stroke": 1e-5}),
+    ],
+)
+def test_the_scar_of_gross_slip_is_as_wide_as_its_volume_and_depth_say(
+    name: str, contact: float, values: dict[str, float]
+) -> None:
+    line = name == "cylinder_on_flat"
+    scar = Scar(values["R"], contact, *((3, 1.5) if line else (4, 4.0 / math.pi)))
+    rows = worn_by_uniform_slip(name, **values)
+    width = values["half_width"] / (values["strips"] / 2 if line else values["patches"])
+    for half_width, volume, depth in rows[1:]:
+        by_volume = scar.half_width(volume / (0.01 if line else 1.0), math.inf)
+        by_depth = scar.half_width(math.inf, depth)
+        for needed in (by_volume, by_depth):
+            # the margin holds, and is none of twice the width
+            assert half_width - 0.5 * width < needed < 1.25 * half_width + width
+    assert rows[-1, 0] > 2.5 * contact
+
+
+def test_a_stroke_slides_where_the_approach_under_the_load_says() -> None:
+    # the strips move under tangential forces as under normal ones: all slide from mu times the approach on
+    model = build_scene("cylinder_on_flat", strips=200, half_width=1.2 * A_LINE)
+    _, approach = pressed(model, 1200.0)
+    half = line_stick_under_stroke(0.3 * approach, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
+    _, without = pressed(model, 1200.0 * (half / A_LINE) ** 2)
+    assert 0.6 * (approach - without) == pytest.approx(0.3 * approach, rel=2e-3)
+    for factor, slides in ((0.99, False), (1.01, True)):
+        stick = line_stick_under_stroke(factor * 0.6 * approach, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
+        assert (stick == 0.0) == slides
+    # Johnson, Eq. (7.42), both bodies, under half of the force that slides
+    shear = 200e9 / 2.6
+    stroke = 3.0 * 0.6 * 100.0 * 2.0 * 1.7 / (16.0 * A_POINT * shear) * (1.0 - 0.5 ** (2.0 / 3.0))
+    found = point_stick_under_stroke(stroke, 0.6, 100.0, A_POINT, 200e9, 0.3)
+    assert found == pytest.approx(A_POINT * 0.5 ** (1.0 / 3.0), rel=1e-12)
+    assert point_stick_under_stroke(1e-3, 0.6, 100.0, A_POINT, 200e9, 0.3) == 0.0
+    assert point_stick_under_stroke(1e-9, 0.0, 100.0, A_POINT, 200e9, 0.3) == 0.0
+
+
+@pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
+def test_what_needs_no_room_stays_as_it_is(name: str) -> None:
+    much = ExpectedWear(1.0, 1e-9)
+    assert room(name, much) is None
+    assert room(name, much, Q=10.0) is None
+    assert room(name, much, stroke=1e-8) is None
+    assert room(name, ExpectedWear(1.0, 0.0), stroke=1e-5) is None
+    assert room(name, ExpectedWear(1.0, math.inf), stroke=1e-5) is None
+    assert room(name, much, stroke=1e-5, half_width=2e-4) == 2e-4
+    slider = scene_parameters("sdof_slider")()
+    assert scene_with_room("sdof_slider", slider, much) is slider
+
+
+def test_the_width_is_that_of_what_wears_at_most() -> None:
+    def cylinder(expected: ExpectedWear) -> float:
+        found = room("cylinder_on_flat", expected, stroke=1e-5)
+        assert found is not None
+        return found
+
+    # the segment 2 b^3 / (3 R) is 4 k N P s, beside the unworn contact; the middle of the last of 100 strips
+    area = 4.0 * 1e-9 * 1.2e5 * 1e-5
+    assert cylinder(ExpectedWear(1.0, 1e-9)) == round_up(1.1 * np.cbrt(A_LINE**3 + 9e-3 * area) * 100 / 99)
+    assert cylinder(ExpectedWear(2.0, 1e-9)) == cylinder(ExpectedWear(1.0, 2e-9)) > cylinder(ExpectedWear(1.0, 1e-9))
+    for ends in ({"volume": 1e-11}, {"depth": 2e-6}):
+        assert cylinder(ExpectedWear(1.0, math.inf, **ends)) == cylinder(ExpectedWear(1.0, 1.0, **ends))
+        assert cylinder(ExpectedWear(1.0, 1.0, **ends)) < cylinder(ExpectedWear(1.0, 1.0))
+    # strips stay above the depth that displacements refer to, and a wrong unit is no reason not to build
+    assert cylinder(ExpectedWear(1.0, 1e9)) == 2.7e-3
+    build_scene("cylinder_on_flat", stroke=1e-5, half_width=2.7e-3)
+    assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3
+
+
+def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears() -> None:
+    stroke = 2.15e-6
+    stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
+    assert 0.0 < stick < 0.3 * A_LINE
+    found = room("cylinder_on_flat", ExpectedWear(1.0, 1e-3), stroke=stroke)
+    assert found == round_up(1.1 * line_worn_edge(A_LINE, stick) * 100 / 99)
+
+
+def test_widths_are_rounded_up_to_three_digits() -> None:
+    assert round_up(1.23401e-4) == 1.24e-4
+    assert round_up(1.24e-4) == 1.24e-4
+    assert round_up(9.999e-4) == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "fewest"), [("cylinder_on_flat", "strips", 10), ("sphere_on_flat", "patches", 4)]
+)
+def test_a_few_pairs_hold_what_partial_slip_wears(name: str, key: str, fewest: int) -> None:
+    load, contact = (1.2e5, A_LINE) if key == "strips" else (100.0, A_POINT)
+    for share in (0.1, 0.5, 0.8, 0.9):
+        for number in range(fewest, 25, 2):
+            model = build_scene(name, Q=share * 0.6 * load, **{key: number})
+            whole = float(model.linear[0].load_static[2 * model.contact.n_contact])
+            stuck = pressed(model, (1.0 - share) * whole)[0] > 0.0
+            if key == "strips":
+                stuck = model.contact.position[:, 0] < contact * math.sqrt(1.0 - share)
+            edge = model.contact.edge
+            assert edge is not None
+            assert edge.any()
+            assert not pressed(model, whole)[0][edge].any()
+            assert not limit_depth(model, stuck)[edge].any(), (share, number)
