@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import queue
 import threading
 from collections.abc import Callable
@@ -23,7 +24,8 @@ class Writer(Generic[Job, Done]):
     def __init__(self, do: Callable[[Job], Done]) -> None:
         self._do = do
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._ended: Mailbox[tuple[Job, Done | BaseException]] = Mailbox()
+        # each with its number: counting is one step, which an interrupt leaves undone or done
+        self._ended: Mailbox[tuple[int, Job, Done | BaseException]] = Mailbox()
         self._n_begun = self._n_taken = 0
         # A daemon: a process that ends in disorder does not wait for a disk that hangs.
         self._thread = threading.Thread(target=self._work, name="writer", daemon=True)
@@ -54,13 +56,13 @@ class Writer(Generic[Job, Done]):
         """
         while True:
             while (ended := self._ended.first()) is not None:
-                job, done = ended
+                number, job, done = ended
                 if isinstance(done, BaseException):
                     refuse(job)
                 else:
                     accept(job, done)
+                self._n_taken = number
                 self._ended.take()
-                self._n_taken += 1
                 if isinstance(done, BaseException):
                     raise done
             if not wait or not self.busy:
@@ -74,9 +76,11 @@ class Writer(Generic[Job, Done]):
             self._thread.join()
 
     def _work(self) -> None:
-        while (job := self._jobs.get()) is not None:
+        for number in itertools.count(1):
+            if (job := self._jobs.get()) is None:
+                return
             try:
                 done: Done | BaseException = self._do(job)
             except BaseException as error:  # handed to the other thread, which raises it
                 done = error
-            self._ended.put((job, done))
+            self._ended.put((number, job, done))

@@ -61,6 +61,7 @@ def without_folder(_: Solver) -> None:
     shutil.rmtree("out.nc.parts")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leave", [finished, unfinished, killed, without_folder])
 @pytest.mark.parametrize("other", [OTHER, RENAMED], ids=["another scene", "another name"])
 def test_what_is_left_of_another_study_stays(
@@ -91,6 +92,7 @@ def test_what_is_left_of_another_study_stays(
     assert main(SMALL) == 2
 
 
+@pytest.mark.slow
 def test_the_same_study_with_other_values_goes_on(solver: Solver) -> None:
     assert main(SMALL) == 0
     n_tasks = len(solver.tasks)
@@ -103,6 +105,7 @@ def test_the_same_study_with_other_values_goes_on(solver: Solver) -> None:
     assert main([*FINER, "-o", "again.nc"]) == 0
 
 
+@pytest.mark.slow
 def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: Solver) -> None:
     assert main(SMALL) == 0
     end_at_once(solver)
@@ -113,6 +116,7 @@ def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: So
     assert name_in("out.nc") == "two_masses"
 
 
+@pytest.mark.slow
 def test_in_python(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(SMALL) == 0
     overrides = {"axes.scheme": "implicit", "axes.frequency": 0.05}
