@@ -117,6 +117,10 @@ class Chore:
     cost, n_results, opens_others = 1.0, 1, False
     kin = (("chore",),)
 
+    def cost_of(self, *, first: bool) -> float:
+        del first
+        return self.cost
+
 
 def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
     dispatcher: Dispatcher[Chore] = Dispatcher(3, LearnedCosts(), time.monotonic)
