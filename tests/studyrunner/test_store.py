@@ -188,7 +188,8 @@ def test_a_file_appears_whole_or_not_at_all(opened: Store, monkeypatch: pytest.M
                 full.setattr(module, name, lambda *_: os.close(-1))
             else:
                 full.setattr(module, name, fail)
-            with pytest.raises(StorageError, match=r"No space left on device: make room there|Bad file descriptor: mend that"):
+            said = r"No space left on device: make room there|Bad file descriptor: mend that"
+            with pytest.raises(StorageError, match=said):
                 opened.flush()
         assert opened.numbers == []
         assert names(opened.folder) == ["lock"]
