@@ -31,6 +31,7 @@ class Outcome(IntEnum):
     SENSITIVE = 15
     STEP_TOO_LONG = 16
     NO_FINAL_STATE = 17
+    UNSETTLED = 19
 
     @property
     def complete(self) -> bool:
@@ -75,6 +76,9 @@ _SENTENCES = {
     " wears. Give slow_time.cycles or slow_time.until an end.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
+    Outcome.UNSETTLED: "The vibration does not settle: left to itself for some hundred periods it comes to none that"
+    " repeats, as where the joint slips or opens all over. More static load, friction or damping, or less excitation,"
+    " would give it grip.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up.",
     Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",

@@ -121,6 +121,10 @@ def follow_branch(
             kept = counted
 
 
+_REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
+"""Why a walk has ended: they say more than that it has."""
+
+
 class _Found:
     """What is known of the state at a frequency. branch, fold: folds jumped over before it, and the last, rad/s."""
 
@@ -235,7 +239,8 @@ class FrequencySweep:
             if reached is None:
                 return _Found(self._why_lost(walk))
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
-            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
+            known = refined.accurate or refined.estimate.response <= self.settings.rtol
+            if not known and self.model.contact.n_contact <= LOADING.few_pairs:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)
@@ -302,7 +307,7 @@ class FrequencySweep:
 
     def _why_lost(self, walk: Sweep) -> Outcome:
         never = np.isnan(walk.lost_at)
-        return walk.failure if never or walk.failure in (Outcome.UNSTABLE, Outcome.ADRIFT) else Outcome.BRANCH_LOST
+        return walk.failure if never or walk.failure in _REASONS else Outcome.BRANCH_LOST
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics, where those of the branch lead to none."""

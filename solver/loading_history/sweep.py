@@ -35,6 +35,10 @@ from solver.settings import Resolution, first_resolution
 from solver.structure.joint import Case
 
 
+_FINAL = (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
+"""Ends of a transient just beyond a node, which a shorter step does not change."""
+
+
 class NodeState(TypedDict):
     """What goes on from node to node: attributes of `Sweep`."""
 
@@ -199,6 +203,7 @@ class Sweep:
         wanted = LOADING.history_change_per_rtol * self.case.settings.rtol
         most = float(np.clip(wanted, LOADING.smallest_history_change, LOADING.largest_history_change))
         aim = LOADING.aimed_history_change * most
+        free = LOADING.free_step * scale
         while True:
             length = min(self.length, LOADING.longest_sweep_step * scale)
             target = here.parameter + self.direction * length
@@ -208,7 +213,7 @@ class Sweep:
             at_last = length <= shortest
             if step is not None:
                 change = self._history_change(here, step.point)
-                if change <= most or at_last or (step.folds and length <= LOADING.free_step * scale):
+                if change <= most or at_last or (step.folds and length <= free):
                     # towards a resonance the history changes ever faster: as much faster as in the last step
                     slope = max(change, 1e-12) / length
                     growth = float(np.clip(slope / self.slope, 1.0, LOADING.most_growth)) if self.slope > 0.0 else 1.0
@@ -216,7 +221,7 @@ class Sweep:
                     self.length, self.slope = length * float(ratio), slope
                     return step
                 shorter = 0.8 * most / change
-            elif at_last or self.effort.exhausted:
+            elif at_last or self.effort.exhausted or (length <= free and self.failure in _FINAL):
                 return None
             else:
                 shorter = 0.25
