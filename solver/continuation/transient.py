@@ -177,7 +177,7 @@ def relax_to_periodic(
         CONVERGED. ADRIFT where the mean positions run away: a joint that slips all over forgets where it was, nothing
         but friction may hold its parts, and then there is no periodic state. UNSTABLE where the motion comes to a
         periodic state that is unstable. UNSETTLED where it comes to none, in `CONTINUATION.transient_steps` steps of
-        a period or more, or in the Newton iterations that the effort allows.
+        a period or more, or in `CONTINUATION.transient_effort` Newton iterations.
     point : PathPoint or None
         The state; its parameter is NaN.
     """
@@ -187,8 +187,9 @@ def relax_to_periodic(
     period = 2.0 * np.pi / joint.omega
     length, tried, failures = 1.0, np.inf, 0
     size = float(np.abs(start.displacement_h).max())
+    last = min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
     for _ in range(CONTINUATION.transient_steps):
-        if effort.exhausted:
+        if effort.iterations > last:
             break
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)

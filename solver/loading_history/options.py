@@ -57,7 +57,10 @@ class LoadingOptions:
     many_nodes: int = 300
     """From here on the shortest step grows with the square of the number of nodes: no sweep takes for ever."""
     node_iterations: int = 2500
-    """Newton iterations from one node to the next, of a first state, and from a node to a point."""
+    """Newton iterations from one node to the next, and from a node to a point."""
+    first_iterations: int = 1000
+    """Newton iterations of all attempts to begin a sweep, and of those to begin it anew: a joint with a grip takes
+    tens to hundreds, one that slips all over as many as it is given."""
     sweep_iterations: int = 8000
     """Newton iterations of a sweep: one that takes more, in jumps and searches, leads nowhere (the dovetail: 1500)."""
     nodes_per_save: int = 8

@@ -234,6 +234,7 @@ class FrequencySweep:
             reached, coarse = walk.state_at(target, self.effort)
             case = walk.case
             if reached is None:
+                self.effort.limit = self.effort.iterations + LOADING.first_iterations
                 case, point = self._first(omega)
                 reached = None if point is None else Step(point)
             if reached is None:
@@ -271,7 +272,7 @@ class FrequencySweep:
 
     def _begin(self, walk: Sweep, origin: Origin) -> None:
         """A state where the walk begins; none where there is none, or where the structure is singular there."""
-        self.effort.limit = self.effort.iterations + LOADING.node_iterations
+        self.effort.limit = self.effort.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(walk, place):
@@ -285,11 +286,12 @@ class FrequencySweep:
             return False
         if point is None:
             return False
-        walk.begin(case, PathPoint(place, point.evaluation, point.history))
-        return True
+        return walk.begin(case, PathPoint(place, point.evaluation, point.history))
 
     def _walk_to(self, walk: Sweep, target: float) -> None:
         """As far as the target; where the walk ends before, it is begun anew a little behind its end."""
+        # all attempts together: where a joint has no grip none of them leads on
+        self.effort.limit = self.effort.iterations + LOADING.first_iterations
         for _ in range(LOADING.most_restarts):
             try:
                 walk.walk_to(target)
@@ -301,7 +303,8 @@ class FrequencySweep:
             behind = walk.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
             if (behind - target) * walk.direction >= 0.0:
                 return
-            self.effort.limit = self.effort.iterations + LOADING.node_iterations
+            if self.effort.exhausted:
+                return
             if not self._begin_at(walk, behind):
                 walk.lost_at = behind
 
@@ -333,6 +336,7 @@ class FrequencySweep:
             why = outcome if attempt == 0 else why
             if outcome is Outcome.STATIC_FAILED:
                 why = outcome
+            if outcome is Outcome.STATIC_FAILED or self.effort.exhausted:
                 break
         self.walk.failure = why
         return self.walk.case, None
