@@ -110,7 +110,7 @@ def follow_branch(
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
-                message=message,
+                message=message or found.message,
             ),
         )
         started, counted = now, walks.n_iterations
@@ -135,6 +135,7 @@ class _Found:
         self.coarse: PeriodicState | None = None
         self.resolution: Resolution | None = None
         self.estimate = UNKNOWN
+        self.message = ""
 
 
 class FrequencySweepState(TypedDict):
@@ -238,7 +239,9 @@ class FrequencySweep:
                 case, point = self._first(omega)
                 reached = None if point is None else Step(point)
             if reached is None:
-                return _Found(self._why_lost(walk))
+                lost = _Found(self._why_lost(walk))
+                lost.message = self._where_lost(walk)
+                return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
             known = refined.accurate or refined.estimate.response <= self.settings.rtol
             if not known and self.model.contact.n_contact <= LOADING.few_pairs:
@@ -311,6 +314,14 @@ class FrequencySweep:
     def _why_lost(self, walk: Sweep) -> Outcome:
         never = np.isnan(walk.lost_at)
         return walk.failure if never or walk.failure in _REASONS else Outcome.BRANCH_LOST
+
+    def _where_lost(self, walk: Sweep) -> str:
+        """How far a walk came that has lost its branch; empty for one that never began, and for a ramp."""
+        if np.isnan(walk.lost_at):
+            return ""
+        if walk.omega is not None:
+            return f"the vibration repeats up to {100.0 * walk.lost_at:.3g} % of the excitation"
+        return f"the sweep goes on in stable states as far as {walk.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics, where those of the branch lead to none."""

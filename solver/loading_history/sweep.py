@@ -34,7 +34,6 @@ from solver.packing import attributes, set_attributes
 from solver.settings import Resolution, first_resolution
 from solver.structure.joint import Case
 
-
 _FINAL = (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
 """Ends of a transient just beyond a node, which a shorter step does not change."""
 
