@@ -33,6 +33,7 @@ class Outcome(IntEnum):
     STEP_TOO_LONG = 16
     NO_FINAL_STATE = 17
     CONTACT_CUT_OFF = 18
+    UNSETTLED = 19
 
     @property
     def complete(self) -> bool:
@@ -78,6 +79,9 @@ _SENTENCES = {
     " a larger half_width, or none so that it is chosen, and as many more strips or patches.",
     Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
     " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
+    Outcome.UNSETTLED: "The vibration does not settle: left to itself for some hundred periods it comes to none that"
+    " repeats, as where the joint slips or opens all over. More static load, friction or damping, or less excitation,"
+    " would give it grip.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"
     " with a larger one.",
     Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",

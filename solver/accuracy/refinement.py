@@ -156,6 +156,9 @@ def _allowed(here: Level, resolution: Resolution, most_unknowns: float) -> bool:
     if not here.case.model.holds(resolution.highest):
         return False
     n_rel = here.joint.component_index.size
+    # what the pairs take at all samples, in all harmonics
+    if here.unknowns(resolution) * resolution.samples > ACCURACY.samples_of_unknowns * room_for(most_unknowns, n_rel):
+        return False
     small = n_rel <= NEWTON.small_joint_displacements
     most = room_for(min(most_unknowns, ACCURACY.few_pairs_unknowns) if small else most_unknowns, n_rel)
     if resolution.highest > ACCURACY.most_mixed_harmonics:

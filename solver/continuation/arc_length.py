@@ -43,6 +43,7 @@ def follow_arc(
     effort: Effort,
     accept: Callable[[PathPoint], bool] = lambda _: True,
     toward: float = 0.0,
+    beyond: bool = True,
 ) -> ArcResult:
     """Follow the branch by arc length, through folds, until it crosses the target in a state that is accepted.
 
@@ -63,6 +64,9 @@ def follow_arc(
         Whether a state at the target ends the search.
     toward : float
         Sign of the parameter's first step where that is not towards the target; the target may then be the start.
+    beyond : bool
+        False ends the search where the branch comes to the target before any fold in a state that is not accepted. It
+        has lost its stability otherwise than at a fold, and where it comes to later no slow change leads.
     """
     toward = toward or float(np.sign(target - start.parameter)) or 1.0
     arc = _Arc(
@@ -112,6 +116,8 @@ def follow_arc(
             found = arc.state_at(point, reached, target, tolerance, effort)
             if found is not None and accept(found):
                 return ArcResult(found, tuple(folds), _jumps(folds, turns, [*points, found], toward))
+            if found is not None and not folds and not beyond:
+                break
         if not low <= reached.parameter <= high:
             break
         direction = path[-1] - path[-2]

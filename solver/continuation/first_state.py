@@ -157,8 +157,11 @@ def solve_first_state(
     if relaxed is not None:
         return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
+        # it comes last, and where the joint has no grip it goes round and round
+        limit, effort.limit = effort.limit, min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
         span = CONTINUATION.load_length
         reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, effort, stays).point
+        effort.limit = limit
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None

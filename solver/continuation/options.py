@@ -102,6 +102,9 @@ class ContinuationOptions:
     # relaxation in time; changes are those of all amplitudes, over the larger ones
     transient_steps: int = 120
     """Steps of one relaxation."""
+    transient_effort: int = 800
+    """Newton iterations of one relaxation, those for the periodic state included: a fall behind a fold of vibro-impact
+    takes 400 to 500, and what does not settle (16 pairs of a blade that slips and lifts all over) thousands."""
     transient_failures: int = 60
     """Steps that do not converge or change too much."""
     transient_iterations: int = 12

@@ -175,8 +175,9 @@ def relax_to_periodic(
     -------
     outcome : Outcome
         CONVERGED. ADRIFT where the mean positions run away: a joint that slips all over forgets where it was, nothing
-        but friction may hold its parts, and then there is no periodic state. START_FAILED where no stable state is
-        found otherwise, in `CONTINUATION.transient_steps` steps.
+        but friction may hold its parts, and then there is no periodic state. UNSTABLE where the motion comes to a
+        periodic state that is unstable. UNSETTLED where it comes to none, in `CONTINUATION.transient_steps` steps of
+        a period or more, or in `CONTINUATION.transient_effort` Newton iterations.
     point : PathPoint or None
         The state; its parameter is NaN.
     """
@@ -186,7 +187,10 @@ def relax_to_periodic(
     period = 2.0 * np.pi / joint.omega
     length, tried, failures = 1.0, np.inf, 0
     size = float(np.abs(start.displacement_h).max())
+    last = min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
     for _ in range(CONTINUATION.transient_steps):
+        if effort.iterations > last:
+            break
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         tolerance = max(CONTINUATION.transient_tolerance, case.settings.tolerance)
@@ -210,8 +214,11 @@ def relax_to_periodic(
         renewed = change < CONTINUATION.renewed_attempt * tried or length >= CONTINUATION.longest_transient
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
-            found = _periodic(case, joint, wear_depth, predicted, history, solver, effort)
-            if found is not None:
+            found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, effort)
+            if found is not None and not stable and length >= CONTINUATION.longest_transient:
+                # no step is longer, and this is where they lead
+                return Outcome.UNSTABLE, None
+            if found is not None and stable:
                 distance = _change(transient.periodic(found.evaluation), motion)
                 if distance < CONTINUATION.relaxed_distance:
                     return Outcome.CONVERGED, found
@@ -220,7 +227,7 @@ def relax_to_periodic(
         # amplitudes have no meaning over less than a period: only where Newton's method fails are steps shorter
         growth = float(np.clip(CONTINUATION.wanted_change / max(change, 1e-300), *CONTINUATION.transient_growth))
         length = min(max(length * growth, 1.0), CONTINUATION.longest_transient)
-    return Outcome.START_FAILED, None
+    return Outcome.UNSETTLED, None
 
 
 def _periodic(
@@ -231,13 +238,14 @@ def _periodic(
     history: FloatArray,
     solver: JacobianSolver,
     effort: Effort,
-) -> PathPoint | None:
-    """Stable periodic state from a motion that has relaxed."""
+) -> tuple[PathPoint | None, bool]:
+    """Periodic state from a motion that has relaxed, and whether it is stable."""
     balance = Balance.frozen(joint, history, wear_depth)
     result = solve_balance(balance, predicted, solver, case.settings.tolerance, effort, CONTINUATION.near_iterations)
-    if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
-        return None
-    return PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
+    if not result.converged:
+        return None, False
+    found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
+    return found, is_stable(balance.linearise(result.evaluation), solver)
 
 
 def _change(before: Motion, after: Motion) -> float:

@@ -59,7 +59,10 @@ class LoadingOptions:
     many_nodes: int = 300
     """From here on the shortest step grows with the square of the number of nodes: no sweep takes for ever."""
     node_iterations: int = 2500
-    """Newton iterations from one node to the next, of a first state, and from a node to a point."""
+    """Newton iterations from one node to the next, and from a node to a point."""
+    first_iterations: int = 1000
+    """Newton iterations of all attempts to begin a sweep, and of those to begin it anew: a joint with a grip takes
+    tens to hundreds, one that slips all over as many as it is given."""
     sweep_iterations: int = 8000
     """Newton iterations of a sweep: one that takes more, in jumps and searches, leads nowhere (the dovetail: 1500)."""
     nodes_per_save: int = 8
@@ -75,7 +78,7 @@ class LoadingOptions:
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))
     """Harmonics and samples with which a first state is sought where those of the sweep find none."""
     few_pairs: int = 12
-    """Pairs up to which a state that is not accurate is sought from the static one as well: impacts have many
+    """Pairs up to which a state whose response is not accurate is sought from the static one as well: impacts have many
     others."""
 
 

@@ -76,9 +76,13 @@ class Route:
                 return Step(point, tuple(folds))
             # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
             end = start if arrived else point
-            arc = follow_arc(self.balance_at, end, target, LOADING.arc_span * scale, solver, tolerance, effort, stays)
+            span = LOADING.arc_span * scale
+            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, effort, stays, beyond=False)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))
+            if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
+                # a shorter step leads nearer to where the branch loses its stability without a fold
+                return Outcome.UNSTABLE
             landed = self._settled(end, target, arc.folds, solver, effort)
             if isinstance(landed, Outcome):
                 return landed

@@ -121,6 +121,10 @@ def follow_branch(
             kept = counted
 
 
+_REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
+"""Why a walk has ended: they say more than that it has."""
+
+
 class _Found:
     """What is known of the state at a frequency. branch, fold: folds jumped over before it, and the last, rad/s."""
 
@@ -231,12 +235,16 @@ class FrequencySweep:
             reached, coarse = walk.state_at(target, self.effort)
             case = walk.case
             if reached is None:
+                self.effort.limit = self.effort.iterations + LOADING.first_iterations
                 case, point = self._first(omega)
                 reached = None if point is None else Step(point)
             if reached is None:
-                return _Found(self._why_lost(walk))
+                lost = _Found(self._why_lost(walk))
+                lost.message = self._where_lost(walk)
+                return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
-            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
+            known = refined.accurate or refined.estimate.response <= self.settings.rtol
+            if not known and self.model.contact.n_contact <= LOADING.few_pairs:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)
@@ -268,7 +276,7 @@ class FrequencySweep:
 
     def _begin(self, walk: Sweep, origin: Origin) -> None:
         """A state where the walk begins; none where there is none, or where the structure is singular there."""
-        self.effort.limit = self.effort.iterations + LOADING.node_iterations
+        self.effort.limit = self.effort.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(walk, place):
@@ -282,11 +290,12 @@ class FrequencySweep:
             return False
         if point is None:
             return False
-        walk.begin(case, PathPoint(place, point.evaluation, point.history))
-        return True
+        return walk.begin(case, PathPoint(place, point.evaluation, point.history))
 
     def _walk_to(self, walk: Sweep, target: float) -> None:
         """As far as the target; where the walk ends before, it is begun anew a little behind its end."""
+        # all attempts together: where a joint has no grip none of them leads on
+        self.effort.limit = self.effort.iterations + LOADING.first_iterations
         for _ in range(LOADING.most_restarts):
             try:
                 walk.walk_to(target)
@@ -298,13 +307,22 @@ class FrequencySweep:
             behind = walk.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
             if (behind - target) * walk.direction >= 0.0:
                 return
-            self.effort.limit = self.effort.iterations + LOADING.node_iterations
+            if self.effort.exhausted:
+                return
             if not self._begin_at(walk, behind):
                 walk.lost_at = behind
 
     def _why_lost(self, walk: Sweep) -> Outcome:
         never = np.isnan(walk.lost_at)
-        return walk.failure if never or walk.failure in (Outcome.UNSTABLE, Outcome.ADRIFT) else Outcome.BRANCH_LOST
+        return walk.failure if never or walk.failure in _REASONS else Outcome.BRANCH_LOST
+
+    def _where_lost(self, walk: Sweep) -> str:
+        """How far a walk came that has lost its branch; empty for one that never began, and for a ramp."""
+        if np.isnan(walk.lost_at):
+            return ""
+        if walk.omega is not None:
+            return f"the vibration repeats up to {100.0 * walk.lost_at:.3g} % of the excitation"
+        return f"the sweep goes on in stable states as far as {walk.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics, where those of the branch lead to none."""
@@ -330,6 +348,7 @@ class FrequencySweep:
             why = outcome if attempt == 0 else why
             if outcome is Outcome.STATIC_FAILED:
                 why = outcome
+            if outcome is Outcome.STATIC_FAILED or self.effort.exhausted:
                 break
         self.walk.failure = why
         return self.walk.case, None

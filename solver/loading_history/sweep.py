@@ -29,10 +29,13 @@ from solver.loading_history.options import LOADING
 from solver.loading_history.route import Route, Step
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, move_point
-from solver.outcome import Outcome
+from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import attributes, set_attributes
 from solver.settings import Resolution, first_resolution
 from solver.structure.joint import Case
+
+_FINAL = (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
+"""Ends of a transient just beyond a node, which a shorter step does not change."""
 
 
 class NodeState(TypedDict):
@@ -115,15 +118,23 @@ class Sweep:
     def _take_cases(self, case: Case, coarse: Case) -> None:
         self.route, self.coarse_route = (replace(self.route, case=one) for one in (case, coarse))
 
-    def begin(self, case: Case, point: PathPoint) -> None:
-        """Take up the first state, which has the harmonics and samples of a case."""
+    def begin(self, case: Case, point: PathPoint) -> bool:
+        """Take up the first state, which has the harmonics and samples of a case; False where it is none.
+
+        A state that more harmonics change by more than half is none: one harmonic gives a joint that slips and opens
+        all over a state that it does not have.
+        """
         self.solver, self.coarse_solver = JacobianSolver(), JacobianSolver()
         self._take_cases(case, case)
         self.here = point
         self.length = LOADING.longest_sweep_step * self.route.scale(point.parameter)
         self._begin_coarse()
-        self._choose_harmonics()
+        if self._choose_harmonics() > SENSITIVE_ERROR:
+            self.here = self.coarse = None
+            self.failure = Outcome.UNSETTLED
+            return False
         self._save()
+        return True
 
     def _begin_coarse(self) -> None:
         """Both walks are at the current node."""
@@ -199,6 +210,7 @@ class Sweep:
         wanted = LOADING.history_change_per_rtol * self.case.settings.rtol
         most = float(np.clip(wanted, LOADING.smallest_history_change, LOADING.largest_history_change))
         aim = LOADING.aimed_history_change * most
+        free = LOADING.free_step * scale
         while True:
             length = min(self.length, LOADING.longest_sweep_step * scale)
             target = here.parameter + self.direction * length
@@ -208,7 +220,7 @@ class Sweep:
             at_last = length <= shortest
             if step is not None:
                 change = self._history_change(here, step.point)
-                if change <= most or at_last or (step.folds and length <= LOADING.free_step * scale):
+                if change <= most or at_last or (step.folds and length <= free):
                     # towards a resonance the history changes ever faster: as much faster as in the last step
                     slope = max(change, 1e-12) / length
                     growth = float(np.clip(slope / self.slope, 1.0, LOADING.most_growth)) if self.slope > 0.0 else 1.0
@@ -216,7 +228,7 @@ class Sweep:
                     self.length, self.slope = length * float(ratio), slope
                     return step
                 shorter = 0.8 * most / change
-            elif at_last or self.effort.exhausted:
+            elif at_last or self.effort.exhausted or (length <= free and self.failure in _FINAL):
                 return None
             else:
                 shorter = 0.25
@@ -263,12 +275,15 @@ class Sweep:
         limit = float(np.linalg.norm(friction_limit(self.case.friction_coefficient, after.evaluation.force_h[:, 0, 0])))
         return float(change) / limit if limit > 0.0 else 0.0
 
-    def _choose_harmonics(self) -> None:
-        """Give the nodes the harmonics and samples that the current state needs, as far as they are automatic."""
+    def _choose_harmonics(self) -> float:
+        """Give the nodes the harmonics and samples that the current state needs, as far as they are automatic.
+
+        Returns the estimated relative error of the response, 0 where it is not asked for.
+        """
         assert self.here is not None
         self.checked = self.here
         if not self.case.settings.automatic:
-            return
+            return 0.0
         joint = self.route.joint_at(self.here.parameter)
         # what the walk misses for want of harmonics shows in the difference to the coarse one
         most = ACCURACY.coarse_unknowns
@@ -277,7 +292,7 @@ class Sweep:
         if refined.case.resolution.highest < fewest.highest:
             # a joint that sticks needs one harmonic, but the next node may be the first one that slips
             if self.case.resolution == fewest:
-                return
+                return refined.estimate.response
             case = self.case.at(fewest)
             level = move_point(
                 refined.case, case, case.joint(joint.omega, joint.excitation_amplitude), refined.point, self.effort
@@ -288,6 +303,7 @@ class Sweep:
         else:
             self.here = replace(refined.point, parameter=self.here.parameter)
         self.checked = self.here
+        return refined.estimate.response
 
     def _change_case(self, refined: Refined) -> None:
         assert self.here is not None

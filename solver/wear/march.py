@@ -209,7 +209,14 @@ def _judge(march: Trajectory, history: WearHistory, compared: FloatArray) -> tup
         coarser = "steps twice as long from the start state of a coarser sweep"
         if not np.isfinite(other):
             return Outcome.SENSITIVE, f"worn volume {volume:.3g} mm3, {known}: {coarser} do not lead so far"
-        if abs(volume - other) < 0.5 * history.error_estimate * volume:
+        agree = abs(volume - other) < 0.5 * history.error_estimate * volume
+        if agree and march.worst.wear_rate > SENSITIVE_ERROR:
+            return Outcome.INACCURATE, (
+                f"worn volume {volume:.3g} mm3, {known}: more harmonics and samples change the wear rate by "
+                f"{100.0 * march.worst.wear_rate:.2g} % (pairs slip only for moments, as they open and close); steps"
+                f" twice as long change little, {other:.3g} mm3"
+            )
+        if agree:
             elsewhere = "where other pairs wear, or by other values on the way"
             return (
                 Outcome.SENSITIVE,

@@ -82,3 +82,25 @@ def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> Non
     assert result.point is None
     attempts = CONTINUATION.arc_steps + CONTINUATION.arc_failures
     assert effort.iterations <= attempts * CONTINUATION.arc_iterations
+
+
+def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> None:
+    """No slow change of the parameter leads to what the branch comes to beyond the target."""
+    balance_at, first, _ = wall(0.9)
+    spent, farthest = [], []
+    for beyond in (True, False):
+        visited: list[float] = []
+        effort = Effort()
+
+        def watched(amplitude: float, history: FloatArray, visited: list[float] = visited) -> Balance:
+            visited.append(amplitude)
+            return balance_at(amplitude, history)
+
+        result = follow_arc(
+            watched, first(0.01), 0.03, 0.02, JacobianSolver(), TOLERANCE, effort, lambda _: False, beyond=beyond
+        )
+        assert result.point is None
+        spent.append(effort.iterations)
+        farthest.append(max(visited))
+    assert farthest[1] < 0.05 < farthest[0]
+    assert spent[1] < 0.5 * spent[0]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.error_estimate import NOTHING, UNKNOWN
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.refinement import Refined, refine
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -241,6 +241,18 @@ def test_a_sensitive_volume_is_told_with_what_differs(other: float, error: float
     outcome, message = march_module._judge(march, history, np.array([[0.0], [0.5e-9 * other]]))
     assert outcome is Outcome.SENSITIVE
     assert message.startswith(said)
+
+
+def test_a_wear_rate_that_more_harmonics_change_is_told_as_the_cause() -> None:
+    """Steps and start state agree: it is not they that leave the volume unknown."""
+    area, worst = np.array([2.0]), Estimate(1e-4, 5.2, 0.02)
+    march: Any = SimpleNamespace(joint=SimpleNamespace(contact=SimpleNamespace(area=area)), worst=worst)
+    history: Any = SimpleNamespace(error_estimate=6.9, wear_depth=np.array([[0.0], [0.5e-9]]))
+    outcome, message = march_module._judge(march, history, np.array([[0.0], [0.5e-9]]))
+    assert outcome is Outcome.INACCURATE
+    assert message.startswith(
+        "worn volume 1 mm3, not known: more harmonics and samples change the wear rate by 5.2e+02 %"
+    )
 
 
 @pytest.mark.slow

@@ -156,3 +156,26 @@ def test_a_ramp_finds_a_state_at_every_frequency() -> None:
     found = starts([205.0, 212.0, 213.0], "ramp")
     assert [start.outcome for start in found.values()] == [Outcome.CONVERGED] * 3
     assert all(np.isnan(start.fold_frequency) for start in found.values())
+
+
+def test_a_joint_without_grip_ends_within_bounded_effort() -> None:
+    """Two masses on a structure that friction alone keeps in place: no state stays, and the search for one ends."""
+    model = scene("two_masses")
+    loose = replace(model.linear[0], stiffness=np.array([[0.5, -1.0], [-1.0, 1.0]]))
+    for amplitude in (5.0, 200.0):
+        found = follow_branch(replace(model, linear={0: loose}), 0.5, amplitude, np.array([0.1]), "up", AUTOMATIC)
+        ((_, start),) = found
+        assert start.state is None
+        assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
+        # to begin the walk, to begin it anew, and at the point; each ends with one solve under way
+        assert start.newton_iterations < 4 * LOADING.first_iterations
+
+
+def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep_module.Sweep, "_choose_harmonics", lambda _: 0.6)
+    sweep = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC)
+    origin = find_origin(sweep.model, 100.0, "up")
+    sweep.origin, sweep.walk = origin, sweep._new_walk(origin, None)
+    sweep._begin(sweep.walk, origin)
+    assert sweep.walk.here is None
+    assert sweep.walk.failure is Outcome.UNSETTLED

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from solver.continuation import transient
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
@@ -17,6 +18,7 @@ from solver.loading_history.origin import find_origin
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance
+from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
 from solver.structure.fourier import change_orders
@@ -167,3 +169,22 @@ def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> N
     assert found is None
     most = CONTINUATION.transient_iterations + CONTINUATION.near_iterations
     assert effort.iterations < CONTINUATION.transient_steps * most
+
+
+def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
+    case = build_case(model, 0.3, 0.8 * NATURAL, settings)
+    quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)
+    idle = np.zeros(1)
+    rest = first_point(case, 0.8 * NATURAL, 0.0, idle)
+    outcomes = []
+    for most in (CONTINUATION.transient_effort, 10):
+        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, transient_effort=most))
+        effort = Effort()
+        outcome, _ = relax_to_periodic(
+            case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), effort
+        )
+        outcomes.append(outcome)
+        # one step and one search for the periodic state may be under way
+        assert effort.iterations <= most + CONTINUATION.transient_iterations + CONTINUATION.near_iterations
+    assert outcomes == [Outcome.CONVERGED, Outcome.UNSETTLED]
