@@ -3,8 +3,8 @@
 A root in a prismatic slot is held along it by friction alone. Where every pair slips at some time of the period,
 nothing remembers the mean position along the slot: the Jacobian is singular, and the mean friction along this direction
 has to be zero by itself. It is, where the joint is symmetric; but pairs that have worn unequally, if only by 1e-5 of
-their depth, leave a small force (dovetail, friction 0.3, 1 N: up to 5e-7 of the friction). Strictly no periodic state is
-left: the root creeps. A force g over the friction F turns the directions of slip by g / F, so that it moves
+their depth, leave a small force (dovetail, friction 0.3, 1 N: up to 5e-7 of the friction). Strictly no periodic state
+is left: the root creeps. A force g over the friction F turns the directions of slip by g / F, so that it moves
 by about g / F of its slip path in a period, some 1e-12 m here, while motion and wear change by g / F at most.
 
 So a soft spring holds the mean position from there on, and what it holds is what drives the creep. Where that is no
