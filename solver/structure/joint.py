@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
 from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis, from_complex, to_complex
@@ -125,12 +126,34 @@ def step_mean_factor(orders: tuple[int, ...], n_samples: int) -> FloatArray:
     return factor
 
 
+@packable
+@dataclass(frozen=True)
+class Hold:
+    """A soft spring, N/m, on the mean position along a free `direction` (n_rel,), of norm 1, from `position` on, m."""
+
+    direction: FloatArray
+    stiffness: float
+    position: float
+
+    def force(self, motion: FloatArray) -> float:
+        """What it holds, N, at mean relative displacements (n_rel,), m."""
+        return self.stiffness * (float(self.direction @ motion) - self.position)
+
+    def on(self, structure: CondensedStructure) -> CondensedStructure:
+        """The structure with it."""
+        return replace(
+            structure,
+            static_stiffness=structure.static_stiffness + self.stiffness * np.outer(self.direction, self.direction),
+            static_force=structure.static_force + self.stiffness * self.position * self.direction,
+        )
+
+
 @dataclass(frozen=True)
 class Case:
     """What all states of one computation have in common; `joint` gives the joint at a frequency and amplitude.
 
     friction_coefficient (n_contact,): of each pair. penalty_omega: rad/s, where the penalty is taken. resolution:
-    harmonics and samples in use.
+    harmonics and samples in use. hold: of a joint that slides all over, see `solver.wear.free_slide`; None for none.
     """
 
     model: ReducedModel
@@ -139,6 +162,7 @@ class Case:
     penalty: Penalty
     settings: SolverSettings
     resolution: Resolution
+    hold: Hold | None = None
     _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -171,10 +195,15 @@ class Case:
         found = self._structures.get(key)
         if found is None:
             found = build_structure(self.model, *key)
+            found = found if self.hold is None else self.hold.on(found)
             while len(self._structures) >= STRUCTURE.kept_structures:
                 del self._structures[next(iter(self._structures))]
             self._structures[key] = found
         return found
+
+    def held(self, hold: Hold | None) -> Case:
+        """The same case with another hold."""
+        return replace(self, hold=hold, _structures={})
 
     def at(self, resolution: Resolution) -> Case:
         """The same case with other harmonics and samples."""

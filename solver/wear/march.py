@@ -22,6 +22,7 @@ from solver.structure.joint import build_case
 from solver.wear.bdf2 import AdaptiveSteps
 from solver.wear.companion import Companion
 from solver.wear.final_state.end import EndWatch
+from solver.wear.free_slide import describe_hold
 from solver.wear.options import WEAR
 from solver.wear.step_limit import StepTooLongError
 from solver.wear.trajectory import Trajectory
@@ -181,6 +182,8 @@ def march_wear(
         outcome, message = _judge(march, history, recorder.compared)
     elif outcome in (Outcome.UNSTABLE, Outcome.PERIOD_DOUBLED):
         message = march.reason
+    if outcome.complete and not np.isnan(march.held_from):
+        message = "; ".join(filter(None, (message, describe_hold(march.held_from))))
     ended = replace(
         history,
         outcome=outcome,

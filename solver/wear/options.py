@@ -99,6 +99,16 @@ class WearOptions:
     jump_iterations: int = 800
     """Newton iterations of the search for the state behind a jump: one that takes more leads nowhere."""
 
+    # joints that slide all over
+    free_stiffness: float = 1e-9
+    """Of the largest eigenvalue of the static stiffness: a direction with less is free. Of the dovetail the free one
+    has 1e-15, the next one, by spin softening, -1.6e-6."""
+    free_closing: float = 1e-6
+    """Largest closing part of a free direction of norm 1: sliding closes nothing."""
+    held_force: float = 1e-6
+    """Of the friction of all pairs, that a hold may take up: the error of motion and wear that it stands for. Measured
+    where it is needed: up to 5e-7."""
+
     # companion
     companion_steps: int = 40
     """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""

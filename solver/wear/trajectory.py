@@ -29,9 +29,10 @@ from solver.results.oscillation import RatesState, WearRates
 from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution, Scheme
 from solver.stability.floquet import find_instability
-from solver.structure.joint import Case, Joint
+from solver.structure.joint import Case, Hold, Joint
 from solver.wear.branch_loss import state_after_fold, stays
 from solver.wear.euler import euler_step
+from solver.wear.free_slide import creeps, held_on
 from solver.wear.options import WEAR
 from solver.wear.step_limit import check_step, explicit_step_limit
 
@@ -47,6 +48,7 @@ class Progress(TypedDict):
     jumps: int
     jump_cycle: float
     failure: Outcome
+    held_from: float
     step_limit: float
     largest_rate: float
     estimate: Estimate
@@ -65,6 +67,7 @@ class TrajectoryState(TypedDict):
     resolution: Resolution
     iterations: int
     rates: RatesState
+    hold: Hold | None
 
 
 @dataclass
@@ -99,6 +102,8 @@ class Trajectory:
         # N m, against which the slip work of a state in which next to nothing wears is judged
         self.usual_work = 0.0
         self.failure, self.reason = Outcome.MARCH_FAILED, ""
+        # count from which on the mean position of a joint that slides all over is held (`free_slide`)
+        self.held_from = float("nan")
         self.step_limit = float("nan")
         # m3 per cycle, of every pair and of all together
         self.rates = WearRates(self.case.model.contact.n_contact + 1)
@@ -118,13 +123,14 @@ class Trajectory:
             "resolution": self.case.resolution,
             "iterations": self.effort.iterations,
             "rates": self.rates.state_dict(),
+            "hold": self.case.hold,
         }
 
     def load_state(self, state: TrajectoryState) -> None:
         """Go on from the state of another one, without its kept factorisation."""
         set_attributes(self, state["progress"])
         self.rates.load_state(state["rates"])
-        self.case = self.case.at(state["resolution"])
+        self.case = self.case.held(state["hold"]).at(state["resolution"])
         self.joint = self.case.joint(self.joint.omega, self.joint.excitation_amplitude)
         self.effort.iterations = state["iterations"]
         self.solver = JacobianSolver()
@@ -170,6 +176,8 @@ class Trajectory:
                 self.worst = self.estimate if known else UNKNOWN
         if not holds:
             return Outcome.CERTIFICATE_FAILED
+        if self.case.hold is not None and creeps(self.joint, self.case.hold, self.point.evaluation):
+            return Outcome.ADRIFT
         return self._judge(every=False) if anew else Outcome.CONVERGED
 
     def _wears_otherwise(self) -> bool:
@@ -284,7 +292,9 @@ class Trajectory:
 
     def _land(self, beyond: float, worn: FloatArray) -> bool:
         """Take up a stable state at the depths `worn`, so many cycles ahead; False where there is none."""
-        landed = state_after_fold(self.case, self.joint, self.point, worn, self.solver, self.effort)
+        landed: PathPoint | Outcome | None = self._held(worn)
+        if landed is None:
+            landed = state_after_fold(self.case, self.joint, self.point, worn, self.solver, self.effort)
         if not isinstance(landed, PathPoint):
             self.failure = landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED
             return False
@@ -295,6 +305,19 @@ class Trajectory:
         self.point = landed
         self.cycle += beyond
         return True
+
+    def _held(self, worn: FloatArray) -> PathPoint | None:
+        """The same vibration at the depths `worn`, m, of a joint that slides all over, its mean position held from here
+        on; None where that is not why the branch ends.
+        """
+        if self.case.hold is not None:
+            return None
+        held = held_on(self.case, self.joint, self.point, worn, self.solver, self.effort)
+        if held is None:
+            return None
+        self.case, self.joint, point = held
+        self.held_from = self.cycle
+        return point
 
     def stability(self) -> Outcome:
         """Whether the current state is one that the vibration stays at."""

@@ -133,7 +133,8 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retention_stiffness: float
     A prismatic slot holds the root along its axis by friction alone. Once every pair slips at some time of the period,
     vibration carries the root along. Under a travelling wave it walks, and without a retainer there is no periodic
     state (measured: at the resonance of nodal diameter 3 and 0.5 N of excitation a force of about 100 N holds it). At
-    nodal diameter 0 nothing drives it one way: only its mean position is not determined.
+    nodal diameter 0 nothing but unequal wear drives it one way, by 1e-7 of the friction: its mean position is not
+    determined (`solver.wear.free_slide`).
     """
     axial = np.zeros(len(stiffness))
     axial[1 : 3 * len(pairs.area) : 3] = pairs.area / pairs.area.sum()

@@ -1,0 +1,81 @@
+"""A joint that slides all over: what holds its mean position where its structure does not.
+
+A root in a prismatic slot is held along it by friction alone. Where every pair slips at some time of the period,
+nothing remembers the mean position along the slot: the Jacobian is singular, and the mean friction along this direction
+has to be zero by itself. It is, where the joint is symmetric; but pairs that have worn unequally, if only by 1e-5 of
+their depth, leave a small force (dovetail, friction 0.3, 1 N: up to 5e-7 of the friction). Strictly no periodic state
+is left: the root creeps. A force g over the friction F turns the directions of slip by g / F, so that it moves
+by about g / F of its slip path in a period, some 1e-12 m here, while motion and wear change by g / F at most.
+
+So a soft spring holds the mean position from there on, and what it holds is what drives the creep. Where that is no
+longer next to nothing there is no periodic state in earnest: ADRIFT.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.contact.coulomb import STICK
+from solver.continuation.natural import follow_naturally
+from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
+from solver.structure.joint import Case, Hold, Joint
+from solver.structure.options import STRUCTURE
+from solver.wear.branch_loss import stays
+from solver.wear.euler import held_wear
+from solver.wear.options import WEAR
+
+
+def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
+    """Hold of the mean position of a state, where every pair slips at some time and the structure is free to slide in
+    one direction; None elsewhere.
+    """
+    if (at.status_t == STICK).all(axis=1).any() or joint.penalty.inertial.any():
+        return None
+    stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
+    # spin softening may leave small negative ones
+    free = np.abs(stiffness) < WEAR.free_stiffness * stiffness[-1]
+    along = directions[:, int(np.argmin(np.abs(stiffness)))]
+    closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
+    if np.count_nonzero(free) != 1 or closes > WEAR.free_closing:
+        return None
+    motion = joint.to_relative(at.displacement_h)[:, 0]
+    return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
+
+
+def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
+    """Whether a hold takes up so much that the joint would not stay where it is held."""
+    friction = float(joint.friction_coefficient @ at.force_h[:, 0, 0])
+    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > WEAR.held_force * friction
+
+
+def describe_hold(cycle: float) -> str:
+    """From which count on a joint is held, and by how little."""
+    return (
+        f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
+        f" position is held there, by at most {WEAR.held_force:g} of the friction"
+    )
+
+
+def held_on(
+    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
+) -> tuple[Case, Joint, PathPoint] | None:
+    """Case and joint with a hold, and their state at the depths `worn` (n_contact,), m, just beyond the last one.
+
+    None where the joint does not slide all over, or where the vibration beyond is another one: then a branch has ended.
+    """
+    hold = free_slide(joint, last.evaluation)
+    if hold is None:
+        return None
+    held = case.held(hold)
+    other = held.joint(joint.omega, joint.excitation_amplitude)
+    balance_at = held_wear(other, last.evaluation.wear_depth, worn)
+    found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, effort, keep_history=True)
+    changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
+    if not arrived or changed or creeps(other, hold, found.evaluation) or not stays(other, found.evaluation, solver):
+        return None
+    history = final_history(balance_at(1.0, last.history), found.evaluation)
+    return held, other, PathPoint(0.0, found.evaluation, history)
