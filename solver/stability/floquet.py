@@ -37,8 +37,8 @@ class Instability:
     """Why no vibration stays at a state.
 
     multiplier: the largest one, beyond the unit circle. frequency: Hz, of the excitation. by_structure: whether no pair
-    slips, opens or closes, so that the linear structure alone is unstable. driven: whether the structure without its
-    joint has vibrations that grow.
+    slips, opens or closes, so that the linear structure alone is unstable. driven: whether the structure itself gains
+    energy.
     """
 
     multiplier: complex
@@ -138,9 +138,13 @@ def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: 
 
 
 def _is_driven(joint: Joint) -> bool:
-    """Whether the structure without its joint has vibrations that grow."""
+    """Whether the structure itself gains energy: something grows while all pairs are held, or vibrates and grows while
+    none is. That a blade which nothing holds is thrown out of its spinning disk is no fault of its structure.
+    """
     linear = joint.model.harmonic_structure(1)[0]
-    return growing_exponents(linear, np.ones(len(linear.mass), bool)).size > 0
+    held = moving(joint, np.ones(joint.contact.n_contact, bool))
+    free = growing_exponents(linear, np.ones(len(linear.mass), bool))
+    return growing_exponents(linear, held).size > 0 or bool((np.abs(free.imag) > free.real).any())
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
