@@ -65,6 +65,7 @@ def follow(
         task.settings,
         keep=keep,
         resume=task.resume,
+        tell=keep,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:
@@ -101,9 +102,9 @@ def march(
     """
     reached = task.resume
 
-    def note(progress: Packed) -> None:
+    def note(progress: Packed | str) -> None:
         nonlocal reached
-        reached = progress
+        reached = reached if isinstance(progress, str) else progress
         keep(progress)
 
     history = _solve(model, friction_coefficient, task, law, note)

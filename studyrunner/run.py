@@ -336,5 +336,5 @@ def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, pro
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, tasks.begin(), evaluate, take, tasks.costs, tick, completion.keep, take_back, is_sick)
+    serve_tasks(ranks, tasks.begin(), evaluate, take, tasks.costs, tick, tasks.keep, take_back, is_sick)
     completion.store.flush()

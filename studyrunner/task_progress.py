@@ -41,6 +41,7 @@ class TaskProgress:
         self._n_lost: Counter[str] = Counter(n_crashes)
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[int] = Counter()
+        self._words: dict[str, str] = {}
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
         lines = completion.plan.marches
@@ -56,6 +57,7 @@ class TaskProgress:
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         """Takes a result; returns the tasks that it makes possible, or that are to be done again."""
         self._left[task.kind] -= task.cost_of(first=_is_first(task, result))
+        self._words.pop(task.key, None)
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
             last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
@@ -69,6 +71,13 @@ class TaskProgress:
             self.n_points += len(result.points)
             self._n_given[task.number] += len(result.points)
         return ()
+
+    def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
+        """Takes how far a task is, to go on from there, or what it is at, in words."""
+        if isinstance(progress, str):
+            self._words[task.key] = progress
+        else:
+            self._completion.keep(task, progress)
 
     def _try_again(self, task: BranchTask | MarchTask) -> Sequence[BranchTask | MarchTask]:
         """A task that a fault of the machine has ended, for once; then its points are left to another run."""
@@ -158,7 +167,8 @@ class TaskProgress:
         if isinstance(task, BranchTask):
             place = task.order_left[task.n_results - n_left]
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
-            return f"{how} to {task.frequencies[place]:.6g} Hz"
+            what = f"{how} to {task.frequencies[place]:.6g} Hz"
+            return f"{what} ({self._words[task.key]})" if task.key in self._words else what
         return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
 
 

@@ -181,6 +181,7 @@ def relax_to_periodic(
     point : PathPoint or None
         The state; its parameter is NaN.
     """
+    effort.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted = start.predicted_h

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.contact.coulomb import STICK
 from solver.continuation.arc_length import follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
@@ -91,6 +92,12 @@ class Route:
                 return Step(landed.point, tuple(folds))
             start = landed.point
         return Outcome.BRANCH_LOST
+
+    def describe(self, point: PathPoint) -> str:
+        """Where a state lies, and how much of the joint moves in it."""
+        at = f"{point.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {point.parameter:.3g}"
+        moving = int(np.count_nonzero((point.evaluation.status_t != STICK).any(axis=1)))
+        return f"at {at}, {moving} of {len(point.evaluation.status_t)} pairs slip or open"
 
     def _settled(
         self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort

@@ -45,6 +45,7 @@ def follow_branch(
     settings: SolverSettings,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at some frequencies: index and state, one by one.
 
@@ -71,6 +72,8 @@ def follow_branch(
     resume
         Such progress of a sweep that differs in its frequencies only. Frequencies beyond those that it had passed are
         reached from there; the states are the same to the last bit, but for `run_time`.
+    tell
+        Called with where the sweep is and what it does there, in words.
 
     Yields
     ------
@@ -79,6 +82,7 @@ def follow_branch(
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     walks = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
+    walks.effort.tell = tell or walks.effort.tell
     counted = 0
     if resume is not None:
         counted, state = unpack(resume)
@@ -214,7 +218,7 @@ class FrequencySweep:
     def _new_walk(self, origin: Origin, omega: float | None) -> Sweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
         walk = Sweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
-        walk.effort.deadline = self.effort.deadline
+        walk.effort.deadline, walk.effort.tell = self.effort.deadline, self.effort.tell
         return walk
 
     def advance(self, frequency: float) -> _Found:
@@ -284,6 +288,7 @@ class FrequencySweep:
 
     def _begin_at(self, walk: Sweep, place: float) -> bool:
         omega, load_factor = (place, 1.0) if walk.omega is None else (walk.omega, place)
+        self.effort.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
         try:
             case, point = self._first(omega, load_factor)
         except np.linalg.LinAlgError:

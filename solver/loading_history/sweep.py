@@ -164,6 +164,7 @@ class Sweep:
         """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
         while self.here is not None:
             if self.ahead is None:
+                self.effort.tell(self.route.describe(self.here))
                 self.effort.limit = self.effort.iterations + LOADING.node_iterations
                 lost = self.effort.iterations > LOADING.sweep_iterations
                 self.ahead = None if lost else self._look_ahead()

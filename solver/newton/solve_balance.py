@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,17 +17,22 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.structure.joint import Case, Joint
 
 
+def _silent(_: str) -> None:
+    """For computations of which nobody asks what they are at."""
+
+
 @dataclass
 class Effort:
     """Newton iterations of one computation, counted over all its parts.
 
     limit: iterations after which a branch is given up. deadline: CPU time of the thread, s, after which the whole
-    computation is.
+    computation is. tell: called with what the computation is at, in words, as often as that changes.
     """
 
     iterations: int = 0
     limit: float = np.inf
     deadline: float = np.inf
+    tell: Callable[[str], None] = _silent
 
     @property
     def exhausted(self) -> bool:

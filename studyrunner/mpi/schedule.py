@@ -29,6 +29,9 @@ With the second that this waits for that of others (`checkpoint.store`) a kill c
 5 s before, where steps are short and the disk keeps up.
 """
 
+SECONDS_TO_WORDS = 1.0
+"""A task says in words what it is at at most so often."""
+
 _MANY_RANKS = 100
 """More ranks say it less often, as rank 0 writes all of it to the disk."""
 
@@ -50,7 +53,7 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """How far a task is."""
+    """How far a task is: something to go on from, or words."""
 
     number: int
     progress: object
@@ -75,15 +78,16 @@ def _work(
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
-    began = sent = time.perf_counter()
+    began = time.perf_counter()
+    sent = dict.fromkeys((True, False), began)
 
     def keep(progress: object) -> None:
-        nonlocal sent
         raise_ending()
+        in_words, now = isinstance(progress, str), time.perf_counter()
         # a task that has given all its results has no progress
-        if n_given < task.n_results and time.perf_counter() > sent + seconds_to_progress:
+        if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
             send(_Progress(assignment.number, progress))
-            sent = time.perf_counter()
+            sent[in_words] = time.perf_counter()
 
     for result in run(task, keep):
         n_given += 1
@@ -190,7 +194,7 @@ def serve_tasks(
     tick
         Called many times a second, with what tells the tasks that run, as `Dispatcher.running`.
     keep
-        Called with how far a task is; never after its last result.
+        Called with how far a task is, or in words with what it is at; never after its last result.
     take_back
         Called with a rank that is lost and the tasks that it had.
     is_sick

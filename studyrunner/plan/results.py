@@ -69,7 +69,7 @@ class MarchResult:
         return str(self.values.get("message", ""))
 
 
-Keep = Callable[[Packed], None]
+Keep = Callable[[Packed | str], None]
 """Takes note of how far a task is."""
 
 Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]

@@ -239,6 +239,16 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> Non
 
 
 @pytest.mark.slow
+def test_a_sweep_says_where_it_is() -> None:
+    said: list[str] = []
+    list(follow_branch(scene("two_masses"), 0.5, 20.0, np.array([0.1]), "up", SolverSettings(3, 64), tell=said.append))
+    assert said[0].startswith("first state at ")
+    nodes = [float(text.split()[1]) for text in said if text.endswith(" of 1 pairs slip or open")]
+    assert len(nodes) > 3
+    assert nodes == sorted(nodes)
+    assert nodes[-1] < 0.1
+
+
 def test_a_sweep_is_the_same_twice() -> None:
     model = random_model(3, ("3d", "one_tangent"))
     settings = SolverSettings(3, 64)

@@ -59,6 +59,17 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
     assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
 
 
+def test_a_sweep_says_where_it_is_until_it_gives_a_state() -> None:
+    plan = plan_of()
+    progress = TaskProgress(MemoryIndex(plan))
+    up = plan.branches[0]
+    progress.keep(up, "at 0.7 Hz, 3 of 9 pairs slip or open")
+    running = [(up, up.n_results, 0.0)]
+    assert progress.look(running).running == ("sweep up to 1 Hz (at 0.7 Hz, 3 of 9 pairs slip or open)",)
+    progress.take(up, next(iter(fake_branch(up))))
+    assert progress.look(running).running == ("sweep up to 1 Hz",)
+
+
 @pytest.mark.parametrize("number", [0, 1])
 def test_the_way_to_the_first_state_is_most_of_a_sweep(number: int) -> None:
     branch = plan_of().branches[number]
