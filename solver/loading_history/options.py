@@ -78,7 +78,7 @@ class LoadingOptions:
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))
     """Harmonics and samples with which a first state is sought where those of the sweep find none."""
     few_pairs: int = 12
-    """Pairs up to which a state whose response is not accurate is sought from the static one as well: impacts have many
+    """Pairs up to which a state that is not accurate is sought from the static one as well: impacts have many
     others."""
 
 

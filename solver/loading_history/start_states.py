@@ -247,8 +247,7 @@ class FrequencySweep:
                 lost.message = self._where_lost(walk)
                 return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
-            known = refined.accurate or refined.estimate.response <= self.settings.rtol
-            if not known and self.model.contact.n_contact <= LOADING.few_pairs:
+            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)

@@ -80,8 +80,8 @@ def find_instability(
     effort
         Where Newton iterations are counted.
     every
-        False leaves out joints of which not all multipliers are computed: for states between the first and the last of
-        a march.
+        False leaves out joints that are not small, or that stay closed: for states between the first and the last of a
+        march, where impacts alone change suddenly how a joint moves.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def find_instability(
         return None
     linear = joint.model.linear[0]
     small = 4 * int(moving(joint, stuck).sum()) <= STABILITY.all_multipliers
-    if not (small or every):
+    if not (every or (small and _opens_and_closes(at))):
         return None
     if small:
         sharper = _sharper(case, joint, at, effort)
@@ -117,14 +117,18 @@ def find_instability(
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[Joint, Evaluation] | None:
     """The state with the harmonics that a joint that opens and closes is judged with; None where it is not found."""
-    opens = at.status_t == SEPARATED
     least = Resolution(all_orders(STABILITY.opening_harmonics), case.resolution.samples)
-    if case.resolution.highest >= least.highest or not (opens.any(axis=1) & ~opens.all(axis=1)).any():
+    if case.resolution.highest >= least.highest or not _opens_and_closes(at):
         return joint, at
     sharp = case.at(replace(least, samples=max(least.samples, STABILITY.opening_samples)))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
     moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), effort)
     return None if moved is None else (finer, moved.evaluation)
+
+
+def _opens_and_closes(at: Evaluation) -> bool:
+    opens = at.status_t == SEPARATED
+    return bool((opens.any(axis=1) & ~opens.all(axis=1)).any())
 
 
 def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: bool = False) -> Instability | None:

@@ -161,7 +161,8 @@ def test_bad_input_is_said_once(n_ranks: int, tmp_path: Path) -> None:
 def test_printed_once(option: str, tmp_path: Path) -> None:
     alone, together = (start(n_ranks, [FAKED, *CHEAP, option], tmp_path).stdout for n_ranks in (0, 2))
     assert alone
-    assert together == alone
+    # a plan tells the time with that of its own process
+    assert re.sub(r"[0-9.]+ s\b", "seconds", together) == re.sub(r"[0-9.]+ s\b", "seconds", alone)
 
 
 @pytest.mark.parametrize(

@@ -186,9 +186,9 @@ def test_errors_are_estimated_again_where_the_joint_wears_at_another_rate(monkey
     for change in (0.1, 10.0):
         estimated: list[float] = []
 
-        def note(*given: Any, estimated: list[float] = estimated) -> Refined:
+        def note(*given: Any, estimated: list[float] = estimated, **named: Any) -> Refined:
             estimated.append(float(given[3].evaluation.slip_work.sum()))
-            return refine(*given)
+            return refine(*given, **named)
 
         monkeypatch.setattr(trajectory, "WEAR", replace(trajectory.WEAR, rate_recheck=change))
         monkeypatch.setattr(trajectory, "refine", note)

@@ -38,6 +38,10 @@ HARD = {
 }
 
 
+UNSTABLE = {("grazing", 2): Outcome.PERIOD_DOUBLED}
+"""Motions with a multiplier of -1.33, exactly (`test_floquet`): no mass stays at them."""
+
+
 def check(scene: Scene, rtol: float, sweep: str) -> None:
     found = find(scene, rtol, sweep)
     assert found.outcome is Outcome.CONVERGED
@@ -51,7 +55,11 @@ def check(scene: Scene, rtol: float, sweep: str) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_random_state_is_accurate_and_its_error_not_played_down(kind: str, seed: int, rtol: float) -> None:
-    check(drawn(kind, seed), rtol, "up" if seed % 4 else "down")
+    sweep = "up" if seed % 4 else "down"
+    if (kind, seed) in UNSTABLE:
+        assert find(drawn(kind, seed), rtol, sweep).outcome is UNSTABLE[kind, seed]
+    else:
+        check(drawn(kind, seed), rtol, sweep)
 
 
 @pytest.mark.parametrize("name", HARD)

@@ -285,7 +285,7 @@ def test_a_failed_point_is_picked_and_says_why(page: Any, dataset: xr.Dataset) -
     index = np.unravel_index(FAILED, (4, 2, 1, 1, 2, 1))
     choose(page, "axis wear coefficient", int(index[1]))
     click_at(page, FAILED)
-    assert selected(page).endswith(SENTENCES[4])
+    assert selected(page).endswith(f'{SENTENCES[4]} Try scheme = "adaptive" or a smaller step.')
     assert np.isnan(numbers(page)["worn_volume"])
     assert map_values(page) == []
     click_at(page, int(FAILED + 4))
@@ -308,7 +308,8 @@ def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser: Any, tmp_p
     for name, index in zip(dataset["outcome"].dims, place, strict=True):
         if dataset.sizes[name] > 1:
             choose(browser, f"axis {str(name).replace('_', ' ')}", int(index))
-    assert selected(browser).endswith(f"{SENTENCES[4]} it ended at cycle 250")
+    advice = 'Try scheme = "adaptive" or a smaller step.'
+    assert selected(browser).endswith(f"{SENTENCES[4]} it ended at cycle 250. {advice}")
     script = "return document.getElementById('{}').data.map(({{meta, x, y}}) => [meta, x, y])"
     course = {meta: (x, y) for meta, x, y in browser.execute_script(script.format("course-plot"))}
     x, y = course["worn_volume_error"]

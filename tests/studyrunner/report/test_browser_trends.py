@@ -196,7 +196,11 @@ def test_a_failed_point_is_a_cross_that_says_why(page: Any, dataset: xr.Dataset)
         crosses = drawn(page, plot, "failed")
         assert crosses["customdata"] == [FAILED]
         why = SENTENCES[4].replace("<", "&lt;").replace(">", "&gt;")
-        assert crosses["text"][0].replace("<br>", " ").startswith(f"not known: {why} frequency 192.5")
+        assert (
+            crosses["text"][0]
+            .replace("<br>", " ")
+            .startswith(f'not known: {why} Try scheme = "adaptive" or a smaller step. frequency 192.5')
+        )
     missing = np.isnan(shown(drawn(page, "trend-map-plot", "map")["z"]))
     assert missing.sum() == 1
 
