@@ -32,7 +32,7 @@ from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.branch_loss import state_after_fold, stays
 from solver.wear.euler import euler_step
-from solver.wear.free_slide import creeps, held_on
+from solver.wear.free_slide import creeps, free_slide, held_on
 from solver.wear.options import WEAR
 from solver.wear.step_limit import check_step, explicit_step_limit
 
@@ -321,7 +321,9 @@ class Trajectory:
 
     def stability(self) -> Outcome:
         """Whether the current state is one that the vibration stays at."""
-        if not stays(self.joint, self.point.evaluation, self.solver):
+        # of a joint that is free to slide the determinant is zero, and its sign round-off
+        free = free_slide(self.joint, self.point.evaluation) is not None
+        if not free and not stays(self.joint, self.point.evaluation, self.solver):
             return Outcome.UNSTABLE
         return self._judge(every=True)
 
