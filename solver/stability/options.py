@@ -10,13 +10,14 @@ class StabilityOptions:
     """Resolution and size with which Floquet multipliers are computed, with the evidence."""
 
     small_samples: int = 512
-    """Of the law in a period, of a joint of which all multipliers are computed: within 0.04 of the exact ones of 64
-    scenes with one pair, all of which are told apart from 1 (256: one of a stiff wall is not)."""
+    """Of the law in a period, of a joint of which all multipliers are computed: of 72 scenes with one pair those whose
+    state is the exact motion are all on the right side of 1; most are within 0.01, sliders that turn or stop up to 0.16
+    off, where the multiplier is far below 1."""
     large_samples: int = 128
     """The same of larger joints, whose largest multipliers belong to few modes: within 0.003 of those with 512 (48
     pairs)."""
     samples_a_vibration: int = 40
-    """Of the fastest vibration that grows in the structure alone: the march takes 4e-4 of it in a period of its own."""
+    """Of the fastest vibration that grows in the structure alone: the march takes 0.6 % of it in a period of its own."""
     most_marched_samples: int = 4096
     """Of a march."""
     opening_harmonics: int = 19
