@@ -17,7 +17,7 @@ class StabilityOptions:
     """The same of larger joints, whose largest multipliers belong to few modes: within 0.003 of those with 512 (48
     pairs)."""
     samples_a_vibration: int = 40
-    """Of the fastest vibration that grows in the structure alone: the march takes 0.6 % of it in a period of its own."""
+    """Of the fastest vibration that grows in the structure alone: the march takes 0.6 % of it in its own period."""
     most_marched_samples: int = 4096
     """Of a march."""
     opening_harmonics: int = 19
