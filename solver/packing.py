@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -124,3 +124,15 @@ def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> object:
     if kind == "dict":
         return {key: _rebuilt(item, arrays) for key, item in content.items()}
     raise ValueError(f"unknown kind of value: {kind}")
+
+
+def in_rows(value: T) -> T:
+    """A value whose arrays lie in memory in rows, as those that `unpack` gives."""
+    found: Any = value
+    if isinstance(value, np.ndarray):
+        found = np.array(value, order="C")
+    elif isinstance(value, tuple):
+        found = tuple(in_rows(item) for item in value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        found = replace(value, **{field.name: in_rows(getattr(value, field.name)) for field in fields(value)})
+    return cast("T", found)

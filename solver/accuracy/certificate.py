@@ -104,6 +104,10 @@ _MEANING = {
 }
 
 
+NOT_CERTIFIED = Certificate(*[float("nan")] * 6)
+"""Of a state that is not handed out."""
+
+
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """What an evaluated state violates, without truncation errors and stability, which need other states."""
     force_t = evaluation.force_t

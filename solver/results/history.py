@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
@@ -88,6 +90,10 @@ class WearHistory:
         final state of an active set has the count inf, and nothing is known between the unworn one and it.
     cut_off_cycle: first of the counts at which a pair at an edge of the modelled contact carries load or has worn
         (`ContactInterface.edge`), NaN if never.
+    reference_volume (n_output,): m3, worn volume of the reference solution; NaN where it has not come to.
+    inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
+        never. inaccurate_in, inaccurate_error: of what, and the largest error from there on.
+    held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
     message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
         longer and the error reached; empty where there is nothing to add.
     """
@@ -129,3 +135,8 @@ class WearHistory:
     final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
+    reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
+    inaccurate_from: float = math.inf
+    inaccurate_in: str = ""
+    inaccurate_error: float = 0.0
+    held_from: float = math.inf

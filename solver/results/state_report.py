@@ -40,14 +40,11 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 class StateReport:
     """What is reported of a state; units and shapes as in `WearHistory`, without the cycle dimension.
 
-    wearing_work (n_contact,): J, the work that wears in a cycle: the slip work, but for what another wear law than
-    Archard's makes of it; and what it is wrong by for want of harmonics. resonance: as `resonance_frequency`, rad/s,
+    resonance: as `resonance_frequency`, rad/s,
     NaN where it was not asked for.
     """
 
     wear_depth: FloatArray
-    wearing_work: FloatArray
-    wearing_work_error: FloatArray
     mean_pressure: FloatArray
     slip_range: FloatArray
     open_fraction: FloatArray
@@ -64,7 +61,6 @@ def report_state(
     joint: Joint,
     evaluation: Evaluation,
     certificate: Certificate,
-    slip_work_error: FloatArray,
     loops: tuple[int, ...] = (),
     *,
     with_resonance: bool = False,
@@ -75,8 +71,6 @@ def report_state(
     ----------
     joint, evaluation, certificate
         The joint, its state, and what this violates.
-    slip_work_error
-        (n_contact,), N m, what the slip work is wrong by for want of harmonics.
     loops
         Pairs whose fretting loops are reported, too.
     with_resonance
@@ -86,8 +80,6 @@ def report_state(
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     return StateReport(
         wear_depth=evaluation.wear_depth,
-        wearing_work=evaluation.slip_work,
-        wearing_work_error=slip_work_error,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
         slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),

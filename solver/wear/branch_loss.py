@@ -15,7 +15,7 @@ from solver.structure.joint import Case, Joint
 from solver.wear.euler import held_wear
 
 
-def stays(joint: Joint, evaluation: Evaluation, solver: JacobianSolver) -> bool:
+def is_stable_when_held(joint: Joint, evaluation: Evaluation, solver: JacobianSolver) -> bool:
     """Whether a state is stable with its wear held."""
     held = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
     return is_stable(held.linearise(evaluation), solver)
@@ -36,6 +36,6 @@ def state_after_fold(
         point, arrived = follow_naturally(
             balance_at, start, 1.0, solver, case.settings.tolerance, effort, keep_history=True
         )
-        if arrived and stays(joint, point.evaluation, solver):
+        if arrived and is_stable_when_held(joint, point.evaluation, solver):
             return PathPoint(0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation))
     return Outcome.MARCH_FAILED

@@ -32,7 +32,7 @@ def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray, wearing: W
     return balance_at
 
 
-def euler_step(
+def euler_balance(
     joint: Joint, scheme: Scheme, before: Evaluation, length: float, wear_coefficient: float, wearing: WearingWork
 ) -> BalanceAt:
     """What a step from a state is solved for: Eqs. (20), (23) if explicit, else Eqs. (24) to (26).

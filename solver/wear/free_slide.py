@@ -22,9 +22,10 @@ from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort
+from solver.results.options import RESULTS
 from solver.structure.joint import Case, Hold, Joint
 from solver.structure.options import STRUCTURE
-from solver.wear.branch_loss import stays
+from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.euler import held_wear
 from solver.wear.options import WEAR
 
@@ -49,21 +50,13 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether a hold takes up so much that the joint would not stay where it is held."""
     friction = float(joint.friction_coefficient @ at.force_h[:, 0, 0])
-    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > WEAR.held_force * friction
-
-
-def describe_hold(cycle: float) -> str:
-    """From which count on a joint is held, and by how little."""
-    return (
-        f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
-        f" position is held there, by at most {WEAR.held_force:g} of the friction"
-    )
+    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > RESULTS.held_force * friction
 
 
 def held_on(
     case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
-) -> tuple[Case, Joint, PathPoint] | None:
-    """Case and joint with a hold, and their state at the depths `worn` (n_contact,), m, just beyond the last one.
+) -> tuple[Hold, PathPoint] | None:
+    """The hold of a joint, and the held state at the depths `worn` (n_contact,), m, just beyond the last state.
 
     None where the joint does not slide all over, or where the vibration beyond is another one: then a branch has ended.
     """
@@ -75,7 +68,7 @@ def held_on(
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
     found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, effort, keep_history=True)
     changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
-    if not arrived or changed or creeps(other, hold, found.evaluation) or not stays(other, found.evaluation, solver):
+    if not arrived or changed or creeps(other, hold, found.evaluation) or not is_stable_when_held(other, found.evaluation, solver):
         return None
     history = final_history(balance_at(1.0, last.history), found.evaluation)
-    return held, other, PathPoint(0.0, found.evaluation, history)
+    return hold, PathPoint(0.0, found.evaluation, history)

@@ -1,4 +1,4 @@
-"""Tuning constants of the march on slow time: steps, their limits, loss of a branch, the companion."""
+"""Tuning constants of the integration over the slow time: steps, their limits, loss of a branch, output."""
 
 from __future__ import annotations
 
@@ -49,6 +49,12 @@ class WearOptions:
     rate_recheck: float = 0.1
     """Relative change of wear rate and worn volume after which errors are estimated again (dovetail at 211.5 Hz:
     without it the wear rate is 8 % off between two estimates of 0.8 %)."""
+    alternations: int = 4
+    """Increments of a wear rate that alternate in sign and do not shrink, from where on the rate oscillates."""
+    noticeable_oscillation: float = 1e-3
+    """Of the largest wear rate of the joint: smaller increments are no oscillation."""
+    calming: float = 0.98
+    """Increment over the one before, below which an oscillation calms."""
     oscillation_round_off: float = 1e-9
     """Of the wear rate if all pairs slipped as far as they move: smaller changes are no oscillation."""
     no_wear: float = 1e-12
@@ -105,18 +111,20 @@ class WearOptions:
     has 1e-15, the next one, by spin softening, -1.6e-6."""
     free_closing: float = 1e-6
     """Largest closing part of a free direction of norm 1: sliding closes nothing."""
-    held_force: float = 1e-6
-    """Of the friction of all pairs, that a hold may take up: the error of motion and wear that it stands for. Measured
-    where it is needed: up to 5e-7."""
 
-    # companion
-    companion_steps: int = 40
-    """Steps, jumps included, in which the companion comes to the count of the history; else it begins there anew."""
-    companion_spare: int = 500
-    """Newton iterations that the companion may take beyond those of the history: more, and it is lost between jumps."""
-    companion_most_spare: int = 2500
-    """The same, beyond which it is not followed again and the history counts as one that no other computation confirms.
-    A travelling wave at its resonance: lost once, in a corner within the first 500 cycles, and found again."""
+    # output
+    kept_steps: int = 800
+    """Steps of a history to the steady state that are kept to be read, at most; half as many after those that go the
+    least way were left out. A result has 101 outputs by default."""
+    course_steps: int = 256
+    """Ends of steps at which a history is compared with its reference solution, at most; an adaptive history of 1e5
+    cycles has about 100."""
+    target_resolution: float = 1e-12
+    """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""
+
+    # reference solution
+    reference_iterations: int = 2500
+    """Newton iterations that the reference solution may take beyond those of the history."""
 
 
 WEAR = WearOptions()

@@ -80,10 +80,6 @@ def explicit_step_limit(
     return 2.0 * step / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
 
 
-class StepTooLongError(Exception):
-    """A step wears off so much that its end is no result; what the step would have to be."""
-
-
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> float:
     """Fraction of the mean normal forces, in their norm, that wear down to `wear_depth` (n_contact,), m, moves.
 
@@ -112,8 +108,8 @@ def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[Bo
     return normal, free, np.where(normal, (wear_depth - before.wear_depth)[pair], 0.0), preload
 
 
-def check_step(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> None:
-    """Refuse a step, or a jump, that wears down to a depth that is no result.
+def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> str | None:
+    """Why a step, or a jump, that wears down to a depth is no result; None where it is one.
 
     Parameters
     ----------
@@ -124,20 +120,21 @@ def check_step(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: 
     cycle, length
         Count at the start of the step, and its length in cycles.
 
-    Raises
-    ------
-    StepTooLongError
-        With the length of a step that would do.
+    Returns
+    -------
+    str or None
+        A sentence with the length of a step that would do.
     """
     normal, _, worn, preload = _parts(joint, before, wear_depth)
     # with all tangents held: then none need be followed
     held = float(np.linalg.norm((joint.structure.static_stiffness @ worn)[normal]))
     if held <= WEAR.largest_moved_load * preload:
-        return
+        return None
     fraction = moved_fraction(joint, before, wear_depth)
-    if fraction > WEAR.largest_moved_load:
-        advised = length * WEAR.advised_moved_load / fraction
-        raise StepTooLongError(
-            f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
-            f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
-        )
+    if fraction <= WEAR.largest_moved_load:
+        return None
+    advised = length * WEAR.advised_moved_load / fraction
+    return (
+        f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
+        f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
+    )

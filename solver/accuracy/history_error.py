@@ -1,0 +1,115 @@
+"""Errors of a wear history from its difference to the reference solution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.accuracy.options import ACCURACY
+from solver.model import FloatArray
+from solver.settings import Scheme
+
+
+@dataclass(frozen=True)
+class HistoryError:
+    """Estimated errors of a history at its counts; inf where nothing confirms it.
+
+    worn_volume (n_output,): relative; 0 where nothing has worn.
+    wear_depth (n_output, n_contact): m.
+    response, wear_rate (n_output,): relative, of the state at a count.
+    """
+
+    worn_volume: FloatArray
+    wear_depth: FloatArray
+    response: FloatArray
+    wear_rate: FloatArray
+
+
+@dataclass(frozen=True)
+class Met:
+    """Where a history and its reference solution are compared.
+
+    cycles (n,): ascending counts. differences (n,): of their depths, as volume of all pairs, m3; NaN where the
+    reference solution has not come to.
+    """
+
+    cycles: FloatArray
+    differences: FloatArray
+
+    def largest_before(self, counts: FloatArray) -> FloatArray:
+        """Largest difference (n_output,), m3, met since a fraction of each count; 0 where there is none.
+
+        Histories that differ by when something happens cross each other. Where they cross their difference is small and
+        says nothing.
+        """
+        known = np.isfinite(self.differences)
+        at, differences = self.cycles[known], self.differences[known]
+        first = np.searchsorted(at, ACCURACY.crossing_window * counts, "left")
+        last = np.searchsorted(at, counts, "right")
+        return np.array([differences[one:other].max(initial=0.0) for one, other in zip(first, last, strict=True)])
+
+
+def history_error(
+    counts: FloatArray, fine: Mapping[str, Any], reference: Mapping[str, Any], met: Met, area: FloatArray, scheme: Scheme
+) -> HistoryError:
+    """Errors of a history.
+
+    Parameters
+    ----------
+    counts
+        (n_output,), ascending, the first 0.
+    fine, reference
+        Values of both solutions at the counts, as `solver.wear.output.DenseOutput.read` gives them.
+    met
+        Differences of both at more counts.
+    area
+        (n_contact,), m2.
+    scheme
+        Of the history: how wrong it is beside its reference solution.
+    """
+    safety = ACCURACY.history_safety(scheme)
+    depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
+    difference = safety * np.abs(depth - reference["wear_depth"])
+    error = np.fmax(difference @ area, safety * met.largest_before(counts))
+    # the error of the start state grows while the joint wears
+    error = np.fmax(error, ACCURACY.start_safety * _start_error(fine, reference, area) * volume)
+    # in the first steps both histories have the same error, which only the wear rates at their ends show
+    error = np.fmax(error, fine["local"])
+    reached = np.isfinite(volume)
+    unknown = reached & ~np.isfinite(difference).all(axis=1)
+    relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    relative[unknown & (volume > 0.0)] = np.inf
+    relative[~reached] = np.nan
+    # what the volume is wrong by beyond the difference of the histories falls to the pairs as they are worn
+    rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    with np.errstate(invalid="ignore"):
+        of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
+    of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
+    return HistoryError(relative, of_pairs, _response_error(fine, reference), _rate_error(fine, reference, area))
+
+
+def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> float:
+    """Relative difference of the wear rates of both start states, pair by pair."""
+    rate, other = fine["depth_rate"][0] * area, reference["depth_rate"][0] * area
+    whole = float(rate.sum())
+    return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
+
+
+def _response_error(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
+    """Relative difference (n_output,) of the responses, of first harmonic or peak, at least that of the harmonics."""
+    found = fine["response_error"]
+    for name in ("response", "response_peak"):
+        size = np.linalg.norm(fine[name], axis=1)
+        apart = np.linalg.norm(fine[name] - reference[name], axis=1)
+        found = np.fmax(found, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
+    return np.asarray(found)
+
+
+def _rate_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> FloatArray:
+    """Relative difference (n_output,) of the wear rates, at least that of the harmonics."""
+    rate, other = fine["wear_rate"], reference["wear_rate"]
+    apart = np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0)
+    return np.asarray(np.fmax(fine["wear_rate_error"], apart))

@@ -1,0 +1,68 @@
+"""The outcome of a wear history and its sentence, for the history itself and for those that are read from it."""
+
+from __future__ import annotations
+
+import math
+
+from solver.model import IntArray
+from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
+from solver.results.cut_off import describe_cut_off
+from solver.results.history import WearHistory
+from solver.results.options import RESULTS
+
+
+def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0) -> tuple[Outcome, str]:
+    """How a history that was computed to its end came out, judged by some of its counts, and a sentence about this.
+
+    Parameters
+    ----------
+    history
+        The history that was integrated.
+    rows
+        Its counts that are judged, ascending: all of them, or those of another history that is read from it.
+    rtol
+        Relative error that was aimed at.
+    slower
+        Wear coefficient of the other history over that of the integrated one: its counts are so many times larger.
+    """
+    if not rows.size:
+        return Outcome.CONVERGED, ""
+    last, remarks = int(rows[-1]), _remarks(history, history.cycles[rows[-1]], slower)
+    if history.cycles[last] >= history.cut_off_cycle:
+        return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
+    error = float(history.worn_volume_error[last])
+    if error > SENSITIVE_ERROR:
+        return Outcome.SENSITIVE, "; ".join((_two_volumes(history, last, error, rtol), *remarks))
+    if history.cycles[last] >= history.inaccurate_from:
+        begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
+        said = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
+        return Outcome.INACCURATE, "; ".join((said, *remarks))
+    return Outcome.CONVERGED, "; ".join(remarks)
+
+
+def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> str:
+    """What a worn volume says that is hardly known: that of the history, and that of its reference solution."""
+    volume, other = 1e9 * history.worn_volume[row], 1e9 * history.reference_volume[row]
+    known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
+    coarser = "with steps twice as long, fewer harmonics and a coarser sweep"
+    if not math.isfinite(other):
+        return f"worn volume {volume:.3g} mm3, {known}: {coarser} the history does not go so far"
+    if abs(volume - other) < 0.5 * error * volume:
+        where = "where other pairs wear, or by other values on the way"
+        return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, {where}"
+    return f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 {coarser}: {known}"
+
+
+def _remarks(history: WearHistory, count: float, slower: float) -> list[str]:
+    """What else is to be said of a history that was computed up to a count of its own."""
+    if not count >= history.held_from:
+        return []
+    return [describe_hold(history.held_from / slower)]
+
+
+def describe_hold(cycle: float) -> str:
+    """From which count on a joint that slides as a whole is held."""
+    return (
+        f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
+        f" position is held there, by at most {RESULTS.held_force:g} of the friction"
+    )

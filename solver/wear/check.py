@@ -1,0 +1,164 @@
+"""Whether a state of a wearing joint may be reported: certificate, harmonics and samples, stability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.accuracy.certificate import NOT_CERTIFIED, certify
+from solver.accuracy.error_estimate import UNKNOWN
+from solver.accuracy.options import ACCURACY
+from solver.accuracy.period_events import lacks_even
+from solver.accuracy.refinement import refine
+from solver.harmonic_balance.dlft import worn_by
+from solver.newton.solve_balance import move_point
+from solver.outcome import Outcome
+from solver.results.state_report import StateReport, report_state
+from solver.settings import Resolution
+from solver.stability.floquet import find_instability
+from solver.wear.branch_loss import is_stable_when_held
+from solver.wear.free_slide import creeps, free_slide
+from solver.wear.options import WEAR
+from solver.wear.state import Choice, Failure, WearState
+from solver.wear.wearing_joint import WearingJoint
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A state that may be reported, possibly with other harmonics than before the check, and what is reported of it."""
+
+    state: WearState
+    report: StateReport
+
+
+@dataclass(frozen=True)
+class FullCheck:
+    """The check of a history that is handed out.
+
+    loops: pairs whose fretting loops are reported.
+    with_resonance: whether the resonance of the vibration is.
+    """
+
+    loops: tuple[int, ...] = ()
+    with_resonance: bool = False
+
+    def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
+        """The state with its report, or why it is none. Raises OutOfTimeError, LinAlgError."""
+        anew = chosen_for_another(work, state)
+        if anew:
+            state = choose_anew(work, state)
+        checked = self._report(work, state)
+        if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
+            # more harmonics or samples may be all that the state needs
+            state, anew = choose_anew(work, state), True
+            checked = self._report(work, state)
+        if isinstance(checked, Failure):
+            return checked
+        state = _note_accuracy(state)
+        joint, at = work.at(state), state.point.evaluation
+        if state.hold is not None and creeps(joint, state.hold, at):
+            return Failure(Outcome.ADRIFT)
+        if anew and (unstable := _multipliers(work, state, every=False)) is not None:
+            return unstable
+        return replace(checked, state=state)
+
+    def _report(self, work: WearingJoint, state: WearState) -> Checked | Failure:
+        """Report with certificate, whose errors are those for which the harmonics were chosen."""
+        joint, at, estimate = work.at(state), state.point.evaluation, state.choice.estimate
+        certificate = replace(
+            certify(joint, at),
+            response_error=estimate.response,
+            wear_rate_error=work.wearing.amplification(*worn_by(at)) * estimate.wear_rate,
+        )
+        if not certificate.holds(work.case.settings.tolerance):
+            return Failure(Outcome.CERTIFICATE_FAILED)
+        return Checked(state, report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance))
+
+
+@dataclass(frozen=True)
+class PlainCheck:
+    """The check of a reference solution: none but that its harmonics follow those of the history.
+
+    resolutions: count from which on, harmonics and samples, ascending by count; the first count is 0.
+    """
+
+    resolutions: tuple[tuple[float, Resolution], ...]
+
+    def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
+        """The state, with the harmonics wanted at its count where it is found with them."""
+        wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
+        state = with_harmonics(work, state, wanted) or state
+        return Checked(state, report_state(work.at(state), state.point.evaluation, NOT_CERTIFIED))
+
+
+def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:
+    """The state with other harmonics and samples; None where it is not found."""
+    if resolution == state.resolution:
+        return state
+    work.at(state)
+    old, case = work.case, work.case.at(resolution)
+    joint = case.joint(work.omega, work.excitation_amplitude)
+    point = move_point(old, case, joint, state.point, work.effort)
+    return None if point is None else replace(state, point=point, resolution=resolution, change=None)
+
+
+def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
+    """Whether harmonics and samples were chosen for a state so different that they are to be chosen again.
+
+    So is a state that vibrates otherwise, that has become asymmetric, or that wears at another rate although it
+    vibrates alike.
+    """
+    choice, at = state.choice, state.point.evaluation
+    if work.case.settings.harmonics == "auto" and lacks_even(state.resolution.orders, at):
+        return True
+    before = choice.predicted_h[:, 1:]
+    changed = float(np.linalg.norm(at.predicted_h[:, 1:] - before))
+    if changed > ACCURACY.vibration_recheck * float(np.linalg.norm(before)):
+        return True
+    rate, volume = float(state.rates.value[-1]), float(state.depth @ work.area)
+    other_rate = abs(rate - choice.wear_rate) > WEAR.rate_recheck * max(rate, choice.wear_rate)
+    return other_rate and volume - choice.worn_volume > WEAR.rate_recheck * volume
+
+
+def choose_anew(work: WearingJoint, state: WearState) -> WearState:
+    """The state with the harmonics and samples that it needs."""
+    work.at(state)
+    refined = refine(
+        work.case, work.omega, work.excitation_amplitude, state.point, work.effort, usual_work=work.usual_work
+    )
+    at = refined.point.evaluation
+    rate, volume = float(work.rate(at) @ work.area), float(at.wear_depth @ work.area)
+    choice = Choice(at.predicted_h, rate, volume, refined.estimate, refined.accurate)
+    resolution = refined.case.resolution
+    change = state.change if resolution == state.resolution else None
+    return replace(state, point=refined.point, resolution=resolution, choice=choice, change=change)
+
+
+def _note_accuracy(state: WearState) -> WearState:
+    """With the count from which on the harmonics no longer suffice."""
+    estimate = state.choice.estimate
+    # NaN where harmonics and samples are given and no state with others was found to compare with
+    known = not np.isnan(estimate.largest)
+    if state.choice.accurate and known:
+        return state
+    worst = state.worst
+    if not estimate.largest < worst.largest:
+        worst = estimate if known else UNKNOWN
+    return replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
+
+
+def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
+    """Why the vibration does not stay at a state by its multipliers; every: as in `find_instability`."""
+    joint = work.at(state)
+    unstable = find_instability(work.case, joint, state.point.evaluation, work.effort, every)
+    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
+
+
+def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
+    """Why the vibration does not stay at the last state of a history; None where it does."""
+    joint, at = work.at(state), state.point.evaluation
+    # of a joint that is free to slide the determinant is zero, and its sign round-off
+    if free_slide(joint, at) is None and not is_stable_when_held(joint, at, work.solver):
+        return Failure(Outcome.UNSTABLE)
+    return _multipliers(work, state, every=True)

@@ -1,0 +1,151 @@
+"""One wear history: integrated over the slow time, held against its reference solution, and judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from solver.accuracy.history_error import Met, history_error
+from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
+from solver.packing import Packed, unpack
+from solver.results.cut_off import first_cut_off
+from solver.results.history import StartState, WearHistory
+from solver.results.verdict import judge
+from solver.settings import SolverSettings, ToTheEnd
+from solver.structure.joint import build_case
+from solver.wear.options import WEAR
+from solver.wear.output import DenseOutput, no_output
+from solver.wear.solutions import Ended, SlowTime, Solutions
+
+
+def integrate_wear(
+    model: ReducedModel,
+    friction_coefficient: float | FloatArray | None,
+    settings: SolverSettings,
+    start: StartState,
+    asked: SlowTime,
+    keep: Callable[[Packed], None] | None = None,
+    resume: Packed | None = None,
+) -> WearHistory:
+    """Wear history of one point of a study.
+
+    Parameters
+    ----------
+    model, friction_coefficient, settings, start
+        The case, and the unworn state that the history starts from.
+    asked
+        What is computed.
+    keep
+        Called now and then with the progress.
+    resume
+        Such progress of a history with equal arguments, from which this one goes on: the result is the same to the last
+        bit, but for `run_time`.
+
+    Returns
+    -------
+    WearHistory
+        As far as it was computed; its outcome says how it ended. No error is raised for a history that fails.
+    """
+    if start.state is None:
+        return _without_state(model, start, asked)
+    case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
+    solutions = Solutions(case, start, asked, keep, None if resume is None else unpack(resume))
+    fine = solutions.history()
+    if fine.state is None:
+        failed = replace(start, outcome=fine.failure.outcome, message=fine.failure.message)
+        return replace(_without_state(model, failed, asked), newton_iterations=start.newton_iterations + fine.iterations)
+    reference = None
+    if fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
+        reference = solutions.reference(fine)
+        if reference.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
+            fine = replace(fine, failure=reference.failure)
+    history = _assembled(solutions, fine, reference)
+    if history.outcome is not Outcome.CONVERGED:
+        return history
+    rows = np.flatnonzero(np.isfinite(history.worn_volume))
+    outcome, message = judge(history, rows, settings.rtol)
+    return replace(history, outcome=outcome, message=message)
+
+
+def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> WearHistory:
+    """What is handed out, from the outputs of a history and of its reference solution."""
+    start, asked, model, state = solutions.start, solutions.asked, solutions.case.model, fine.state
+    assert state is not None
+    counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
+    own, course = output.read(counts), fine.output.course
+    coarse = None if reference is None else solutions.output_of(reference)
+    other = _read_or_nan(coarse, counts, own)
+    at_steps = np.array(course.cycles)
+    apart = _read_or_nan(coarse, at_steps, own)["wear_depth"] - np.array(course.depths)
+    error = history_error(counts, own, other, Met(at_steps, np.abs(apart) @ area), area, asked.scheme)
+    volume = own["wear_depth"] @ area
+    reached = np.flatnonzero(np.isfinite(volume))
+    last, target, worst = course.ends[-1], fine.output.reached, state.worst
+    values: dict[str, Any] = {name: own[name] for name in own if name not in ("local", "depth_rate")}
+    values |= {"response_error": error.response, "wear_rate_error": error.wear_rate}
+    iterations = fine.iterations + (0 if reference is None else reference.iterations)
+    return WearHistory(
+        **values,
+        outcome=fine.failure.outcome,
+        message=fine.failure.message,
+        cycles=counts,
+        worn_volume=volume,
+        worn_volume_error=error.worn_volume,
+        wear_depth_error=error.wear_depth,
+        reference_volume=other["wear_depth"] @ area,
+        error_estimate=float(error.worn_volume[reached[-1]]) if reached.size else math.nan,
+        newton_iterations=start.newton_iterations + iterations,
+        run_time=start.run_time + solutions.spent,
+        last_cycle=min(last, float(counts[-1])),
+        branch=start.branch,
+        fold_frequency=start.fold_frequency,
+        # adaptive steps go beyond the end
+        jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
+        cycles_to_target=target if target <= asked.end else math.nan,
+        cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
+        step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
+        # what alternates with the other schemes are small corners of the wear rate, not the steps
+        oscillates=asked.scheme == "explicit" and state.rates.oscillate(WEAR.oscillation_round_off * state.most_rate),
+        inaccurate_from=state.inaccurate_from,
+        inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
+        inaccurate_error=worst.largest,
+        held_from=math.inf if math.isnan(state.held_from) else state.held_from,
+    )
+
+
+def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str, Any]) -> dict[str, Any]:
+    """Values of the reference solution at counts, NaN at all counts where there is none; like: those of the history."""
+    found = {} if output is None else output.read(counts)
+    if found:
+        return found
+    return {
+        name: np.full((counts.size, *value.shape[1:]), np.nan) for name, value in like.items() if value.dtype.kind in "fc"
+    }
+
+
+def _without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> WearHistory:
+    """History of a point whose start state there is not, or is none: NaN everywhere."""
+    counts = np.zeros(asked.cycles.n_outputs) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
+    own = no_output(counts.size, model.contact.n_contact, len(model.response_names), len(asked.loops))
+    nothing = own["wear_rate"]
+    return WearHistory(
+        **{name: own[name] for name in own if name not in ("local", "depth_rate")},
+        outcome=start.outcome,
+        message=start.message,
+        cycles=counts,
+        worn_volume=nothing,
+        worn_volume_error=nothing,
+        wear_depth_error=own["wear_depth"],
+        reference_volume=nothing,
+        error_estimate=math.nan,
+        jump_cycle=math.nan,
+        newton_iterations=start.newton_iterations,
+        run_time=start.run_time,
+        branch=start.branch,
+        fold_frequency=start.fold_frequency,
+    )

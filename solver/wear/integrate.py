@@ -1,0 +1,128 @@
+"""The loop over the slow time: step, jump where the branch ends, check, keep, save."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from solver.newton.solve_balance import OutOfTimeError
+from solver.outcome import Outcome, describe_error
+from solver.packing import in_rows, packable
+from solver.wear.check import Checked
+from solver.wear.control import Control
+from solver.wear.jump import land
+from solver.wear.options import WEAR
+from solver.wear.output import DenseOutput
+from solver.wear.state import Failure, WearState
+from solver.wear.step import Step
+from solver.wear.wearing_joint import WearingJoint
+
+T = TypeVar("T")
+
+Check = Callable[[WearingJoint, WearState], Checked | Failure]
+"""Whether a state may be kept, and what is reported of it."""
+
+
+def guarded(compute: Callable[[], T]) -> T | Failure:
+    """What is computed, or the error that broke it off as a failure."""
+    try:
+        return compute()
+    except np.linalg.LinAlgError:
+        return Failure(Outcome.SINGULAR)
+    except OutOfTimeError:
+        return Failure(Outcome.TIME_LIMIT)
+    except Exception as error:
+        # one bad point is one bad point: the study goes on
+        return Failure(Outcome.EXCEPTION, describe_error(error))
+
+
+class Stop(Protocol):
+    """What ends an integration after a state; None goes on."""
+
+    def __call__(self, work: WearingJoint, state: WearState, output: DenseOutput) -> Failure | None:
+        """An end as it should be has the outcome CONVERGED."""
+
+
+@packable
+@dataclass(frozen=True)
+class Progress:
+    """Where an integration is: all that it goes on from. n_steps: steps so far."""
+
+    state: WearState
+    n_steps: int
+
+
+@dataclass(frozen=True)
+class Integration:
+    """What an integration is made of.
+
+    control: plans the steps.
+    check: judges each state.
+    stop: ends the integration.
+    output: takes the states.
+    save: called with the progress now and then.
+    bounded: whether a jump that moves many times the normal forces is refused.
+    most_iterations: Newton iterations beside `step_iterations` for each step, after which the history leads nowhere.
+    """
+
+    control: Control
+    check: Check
+    stop: Stop
+    output: DenseOutput
+    save: Callable[[Progress], None]
+    bounded: bool = True
+    most_iterations: float = WEAR.march_iterations
+
+    def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
+        """Check and keep the first state."""
+        checked = self.check(work, state)
+        if isinstance(checked, Failure):
+            return checked
+        self.output.add(state.cycle, checked.report, work.rate(checked.state.point.evaluation), 0.0)
+        return Progress(self.control.begin(work, checked.state), 0)
+
+    def run(self, work: WearingJoint, progress: Progress) -> tuple[WearState, Failure]:
+        """Steps until the end: the last state and how the integration ended."""
+        state, n_steps, saved = progress.state, progress.n_steps, work.effort.iterations
+        while (ended := self.stop(work, state, self.output)) is None:
+            n_steps += 1
+            if work.effort.iterations > self.most_iterations + WEAR.step_iterations * n_steps:
+                return state, Failure(Outcome.MARCH_FAILED)
+            after = guarded(lambda state=state: self._one(work, state))
+            if isinstance(after, Failure):
+                return state, after
+            state = after
+            if work.effort.iterations >= saved + WEAR.iterations_per_save:
+                # with or without anybody who keeps the progress, so that all histories go on from equal numbers
+                state, saved = in_rows(state), work.effort.iterations
+                work.drop_factor()
+                self.save(Progress(state, n_steps))
+        return state, ended
+
+    def _one(self, work: WearingJoint, state: WearState) -> WearState | Failure:
+        """One step, and the jump where the branch ends within the step."""
+        step = self.control.step(work, state)
+        if isinstance(step, Failure):
+            return step
+        if step.arrived:
+            return self._kept(work, step.state, step.error)
+        if step.state.cycle > state.cycle:
+            # what was reached of the step is a state, too
+            reached = self._kept(work, step.state, step.error)
+            if isinstance(reached, Failure):
+                return reached
+            step = Step(reached, 0.0, step.length, arrived=False, end_known_to=step.end_known_to)
+        landed = land(work, step, bounded=self.bounded)
+        return landed if isinstance(landed, Failure) else self._kept(work, landed, 0.0)
+
+    def _kept(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
+        """A state that has been checked and taken by the output."""
+        checked = self.check(work, state)
+        if isinstance(checked, Failure):
+            return checked
+        state = checked.state
+        self.output.add(state.cycle, checked.report, work.rate(state.point.evaluation), error)
+        return state

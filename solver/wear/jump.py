@@ -1,0 +1,67 @@
+"""The branch of the vibration has ended while the joint wears: on to a stable state a little beyond."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.harmonic_balance.converged import PathPoint, vibration_change
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.wear.branch_loss import state_after_fold
+from solver.wear.free_slide import held_on
+from solver.wear.options import WEAR
+from solver.wear.state import Failure, WearState
+from solver.wear.step import Step
+from solver.wear.step_limit import too_long
+from solver.wear.wearing_joint import WearingJoint
+
+
+def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failure:
+    """A stable state a little beyond the end of the branch that a step has come to.
+
+    The state beyond is that of a joint whose mean position is held, where the branch ends because the whole joint
+    slips (`free_slide`); else another branch (`branch_loss`).
+
+    bounded: whether a jump that moves many times the normal forces is refused.
+    """
+    state = step.state
+    if state.n_jumps >= WEAR.most_jumps:
+        return Failure(Outcome.MARCH_FAILED)
+    joint, at = work.at(state), state.point.evaluation
+    beyond = min(2.0 * step.end_known_to, step.length)
+    worn = state.depth + beyond * work.rate(at)
+    if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
+        return Failure(Outcome.STEP_TOO_LONG, said)
+    work.effort.limit = work.effort.iterations + WEAR.jump_iterations
+    landed = _held(work, state, worn)
+    if landed is None:
+        landed = _on_another_branch(work, state, worn)
+    work.effort.limit = float("inf")
+    if isinstance(landed, Failure):
+        return landed
+    return replace(landed, cycle=state.cycle + beyond, change=None, previous=None)
+
+
+def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
+    """The vibration with the mean position of the joint held; None where the joint does not slide as a whole."""
+    if state.hold is not None:
+        return None
+    found = held_on(work.case, work.at(state), state.point, worn, work.solver, work.effort)
+    if found is None:
+        return None
+    hold, point = found
+    return replace(state, point=point, hold=hold, held_from=state.cycle)
+
+
+def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
+    """A stable state of another branch at depths `worn` (n_contact,), m."""
+    landed = state_after_fold(work.case, work.at(state), state.point, worn, work.solver, work.effort)
+    if not isinstance(landed, PathPoint):
+        return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
+    if vibration_change(state.point.evaluation, landed.evaluation) <= WEAR.jump_change:
+        # a corner at which the branch folds back a little is no jump, and there may be many corners
+        return replace(state, point=landed)
+    first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
+    return replace(state, point=landed, n_jumps=state.n_jumps + 1, jump_cycle=first)

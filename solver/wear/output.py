@@ -1,0 +1,308 @@
+"""Dense output of a wear history: the steps are kept as far as they are needed, and read at any counts between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.model import BoolArray, FloatArray
+from solver.packing import packable
+from solver.results.loops import LOOP_PHASES
+from solver.results.state_report import StateReport
+from solver.settings import Resolution, WearTarget
+from solver.wear.interpolation import depth_within, fraction_where
+from solver.wear.options import WEAR
+
+INTERPOLATED = (
+    "wear_depth",
+    "mean_pressure",
+    "slip_range",
+    "open_fraction",
+    "response",
+    "response_peak",
+    "loop_displacement",
+    "loop_force",
+)
+"""What of a report lies between those of the two ends of a step."""
+
+CERTIFIED = ("residual", "penetration", "tension", "cone_violation", "energy_error", "response_error", "wear_rate_error")
+"""What of a certificate is the larger of both ends of a step."""
+
+
+@packable
+@dataclass(frozen=True)
+class Node:
+    """The end of a step.
+
+    cycle: count.
+    report: of the state.
+    rate (n_contact,): wear rates, m per cycle.
+    local: sum of the local errors of the steps so far, as worn volume, m3.
+    """
+
+    cycle: float
+    report: StateReport
+    rate: FloatArray
+    local: float
+
+
+@packable
+@dataclass(frozen=True)
+class Course:
+    """How a history went from step to step.
+
+    ends (n_steps,): counts at the ends of all steps; the first is that of the first state.
+    cycles (n,), depths (n, n_contact), rates (n,): count, depth, m, and wear rate of the joint, m3 per cycle, at the
+        ends of steps, thinned where the steps are many.
+    resolutions: count from which on, harmonics and samples.
+    """
+
+    ends: tuple[float, ...] = ()
+    cycles: tuple[float, ...] = ()
+    depths: tuple[FloatArray, ...] = ()
+    rates: tuple[float, ...] = ()
+    resolutions: tuple[tuple[float, Resolution], ...] = ()
+
+    def after(self, cycle: float, depth: FloatArray, rate: float, resolution: Resolution) -> Course:
+        """With the end of another step."""
+        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.course_steps else 1)
+        changed = not self.resolutions or self.resolutions[-1][1] != resolution
+        return Course(
+            ends=(*self.ends, cycle),
+            cycles=(*self.cycles[kept], cycle),
+            depths=(*self.depths[kept], depth),
+            rates=(*self.rates[kept], rate),
+            resolutions=(*self.resolutions, (cycle, resolution)) if changed else self.resolutions,
+        )
+
+
+@packable
+@dataclass(frozen=True)
+class OutputState:
+    """What a dense output has taken so far: data.
+
+    nodes: ends of the steps that are kept, ascending; no count that is read lies in a gap between two of them.
+    course: of all steps.
+    reached: count at which the target was reached, NaN until then.
+    """
+
+    nodes: tuple[Node, ...] = ()
+    course: Course = Course()
+    reached: float = math.nan
+
+
+class DenseOutput:
+    """Takes the state after every step and keeps what is read later.
+
+    Between the ends of a step values are linear in the fraction of the step. With adaptive steps the depth follows
+    cubics with the wear rates at both ends, and all other values are linear in the worn volume, of which the state is a
+    function. Fretting loops are interpolated phase by phase: so they close, stay within the friction cone and have the
+    mean pressure that is reported at the same count.
+
+    area (n_contact,): m2.
+    counts (n_output,): ascending counts that will be read; only steps that contain one of them are kept. None where the
+        counts are not known beforehand: then steps are kept evenly along the history.
+    smooth: whether the depth follows cubics.
+    target: wear whose count is looked for within the steps; None for none.
+    taken: what was taken so far.
+    """
+
+    def __init__(
+        self, area: FloatArray, counts: FloatArray | None, *, smooth: bool, target: WearTarget | None = None
+    ) -> None:
+        self.area, self.counts, self.smooth, self.target = area, counts, smooth, target
+        self.taken = OutputState()
+
+    @property
+    def last(self) -> Node | None:
+        """End of the last step; None before the first state."""
+        return self.taken.nodes[-1] if self.taken.nodes else None
+
+    @property
+    def reached_target(self) -> bool:
+        """Whether a step has reached the target."""
+        return not math.isnan(self.taken.reached)
+
+    def add(self, cycle: float, report: StateReport, rate: FloatArray, error: float) -> None:
+        """Take the state at the end of a step.
+
+        Parameters
+        ----------
+        cycle
+            Count at the end of the step; it never falls.
+        report
+            Of the state.
+        rate
+            (n_contact,), wear rates of the state, m per cycle.
+        error
+            Estimated local error of the step, as worn volume, m3.
+        """
+        last, nodes, reached = self.last, list(self.taken.nodes), self.taken.reached
+        node = Node(cycle, report, rate, error + (0.0 if last is None else last.local))
+        if last is not None:
+            if math.isnan(reached):
+                reached = self._target_within(last, node)
+            before = nodes[-2].cycle if len(nodes) > 1 else -math.inf
+            if not self._is_read(last.cycle, cycle) and not self._is_read(before, last.cycle):
+                del nodes[-1]
+        nodes.append(node)
+        if self.counts is None and len(nodes) > WEAR.kept_steps:
+            nodes = self._thinned(nodes)
+        course = self.taken.course.after(cycle, report.wear_depth, float(rate @ self.area), report.resolution)
+        self.taken = OutputState(tuple(nodes), course, reached)
+
+    def _is_read(self, before: float, cycle: float) -> bool:
+        """Whether a count that is read lies behind `before` and not behind `cycle`."""
+        if self.counts is None:
+            return True
+        place = int(np.searchsorted(self.counts, before, "right"))
+        return place < self.counts.size and bool(self.counts[place] <= cycle)
+
+    def _target_within(self, start: Node, end: Node) -> float:
+        """Count at which a step reaches the target, NaN where it does not."""
+        if self.target is None:
+            return math.nan
+        wanted = self.target.value
+        if self.target.quantity == "frequency_shift":
+            first = self.taken.nodes[0].report.resonance
+            shifts = [abs(node.report.resonance / first - 1.0) for node in (start, end)]
+            if not shifts[1] >= wanted:
+                return math.nan
+            # a function of the state, which is a function of what is worn, as all else that is reported
+            share = (wanted - shifts[0]) / (shifts[1] - shifts[0]) if shifts[1] > shifts[0] else 0.0
+            worn = [self._worn(node.report.wear_depth) for node in (start, end)]
+            wanted = worn[0] + max(share, 0.0) * (worn[1] - worn[0])
+        if self._worn(end.report.wear_depth) < wanted:
+            return math.nan
+
+        def worn_at(fraction: float) -> float:
+            return self._worn(self._depth(start, end, np.array([fraction]))[0])
+
+        return start.cycle + fraction_where(wanted, worn_at) * (end.cycle - start.cycle)
+
+    def _worn(self, depth: FloatArray) -> float:
+        """What tells how far wear is: the largest depth, m, or the volume, m3, of depths (n_contact,), m."""
+        assert self.target is not None
+        if self.target.quantity == "wear_depth":
+            return float(depth.max(initial=0.0))
+        return float(depth @ self.area)
+
+    def _depth(self, start: Node, end: Node, fraction: FloatArray) -> FloatArray:
+        """Depths (n, n_contact), m, at fractions (n,) of a step."""
+        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
+        return depth_within(fraction, end.cycle - start.cycle, ends[0], ends[1], self.smooth)
+
+    def read(self, counts: FloatArray) -> dict[str, Any]:
+        """All values at ascending counts (n,), by name, the first axis that of the counts.
+
+        With the names of `INTERPOLATED` and `CERTIFIED` as in `WearHistory`; `wear_rate`, m3 per cycle, and of each
+        pair `depth_rate`, m per cycle; `local`, m3; `harmonics_used`, `samples_used`, `stable`. Values behind the last
+        step are NaN, whole numbers 0.
+        """
+        nodes = self.taken.nodes
+        cycles = np.array([node.cycle for node in nodes])
+        reached = counts <= (cycles[-1] if nodes else -math.inf)
+        places = np.searchsorted(cycles, counts[reached], "left")
+        rows = [
+            self._row(nodes[max(place - 1, 0)], nodes[place], float(at))
+            for place, at in zip(places, counts[reached], strict=True)
+        ]
+        return {name: _column([row[name] for row in rows], reached) for name in (rows[0] if rows else ())}
+
+    def _row(self, start: Node, end: Node, count: float) -> dict[str, Any]:
+        """Values at a count within a step."""
+        length = end.cycle - start.cycle
+        fraction = (count - start.cycle) / length if length > 0.0 else 1.0
+        depth = self._depth(start, end, np.array([fraction]))[0]
+        if self.smooth and length > 0.0:
+            whole = float((end.report.wear_depth - start.report.wear_depth) @ self.area)
+            fraction = float((depth - start.report.wear_depth) @ self.area) / whole if whole > 0.0 else fraction
+        one, other = start.report, end.report
+        between: dict[str, Any] = {
+            name: getattr(one, name) + fraction * (getattr(other, name) - getattr(one, name)) for name in INTERPOLATED
+        }
+        between["wear_depth"] = depth
+        between["depth_rate"] = start.rate + fraction * (end.rate - start.rate)
+        between["wear_rate"] = float(between["depth_rate"] @ self.area)
+        between["local"] = end.local
+        for name in CERTIFIED:
+            # what holds for both states holds in between
+            between[name] = np.fmax(getattr(one.certificate, name), getattr(other.certificate, name))
+        between["harmonics_used"], between["samples_used"] = other.resolution.highest, other.resolution.samples
+        between["stable"] = other.certificate.stable
+        return between
+
+    def even_counts(self, n_outputs: int) -> FloatArray:
+        """Counts (n_outputs,) that divide the way of the history evenly, to its end or to where it reached its target.
+
+        The way from one count to the next is what wears over all that has worn, and the cycles over all cycles: so
+        neither a burst of wear nor the long calm behind it falls between two outputs, and straight lines between them
+        show the history.
+        """
+        nodes = self.taken.nodes
+        end = self.taken.reached if self.reached_target else nodes[-1].cycle
+        found = np.zeros(n_outputs)
+        found[-1] = end
+        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
+        if len(nodes) < 2 or volumes[-1] <= 0.0:
+            return found
+        last = int(np.clip(np.searchsorted(at, end), 1, len(nodes) - 1))
+        whole = self._volume_at(nodes[last - 1], nodes[last], end)
+        way = at / end + volumes / whole
+        for place in range(1, n_outputs - 1):
+            wanted = 2.0 * place / (n_outputs - 1)
+            step = int(np.clip(np.searchsorted(way, wanted), 1, last))
+            start, behind = nodes[step - 1], nodes[step]
+
+            def way_at(fraction: float, start: Node = start, behind: Node = behind) -> float:
+                count = start.cycle + fraction * (behind.cycle - start.cycle)
+                return count / end + self._volume_at(start, behind, count) / whole
+
+            within = fraction_where(wanted, way_at)
+            found[place] = min(start.cycle + within * (behind.cycle - start.cycle), end)
+        return found
+
+    def _volume_at(self, start: Node, end: Node, count: float) -> float:
+        """Worn volume at a count within a step, m3."""
+        fraction = np.array([(count - start.cycle) / (end.cycle - start.cycle)])
+        return float(self._depth(start, end, fraction)[0] @ self.area)
+
+    def _volumes(self, nodes: Sequence[Node]) -> FloatArray:
+        return np.array([node.report.wear_depth @ self.area for node in nodes])
+
+    def _thinned(self, nodes: list[Node]) -> list[Node]:
+        """Without the steps that go a little way."""
+        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
+        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
+        least, kept = 2.0 * way[-1] / WEAR.kept_steps, [0]
+        for place in range(1, len(nodes) - 1):
+            if way[place + 1] - way[kept[-1]] > least:
+                kept.append(place)
+        return [nodes[place] for place in (*kept, len(nodes) - 1)]
+
+
+def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:
+    """Values of one name at all counts: NaN, or 0 where they are whole numbers, at counts that are not reached.
+
+    reached (n,): which counts are reached.
+    """
+    found = np.array(values)
+    column = np.full((reached.size, *found.shape[1:]), np.nan if found.dtype.kind in "fc" else 0, found.dtype)
+    column[reached] = found
+    return column
+
+
+def no_output(n_outputs: int, n_contact: int, n_response: int, n_loops: int) -> dict[str, Any]:
+    """What `DenseOutput.read` gives where there is no state at all."""
+    of_pairs, of_responses = np.full((n_outputs, n_contact), np.nan), np.full((n_outputs, n_response), np.nan)
+    loops, whole = np.full((n_outputs, n_loops, LOOP_PHASES, 3), np.nan), np.zeros(n_outputs, np.int64)
+    found: dict[str, Any] = dict.fromkeys(("wear_depth", "mean_pressure", "slip_range", "open_fraction", "depth_rate"), of_pairs)
+    found |= {"response": of_responses.astype(complex), "response_peak": of_responses}
+    found |= dict.fromkeys(("loop_displacement", "loop_force"), loops)
+    found |= dict.fromkeys((*CERTIFIED, "wear_rate", "local"), np.full(n_outputs, np.nan))
+    return found | {"harmonics_used": whole, "samples_used": whole, "stable": np.zeros(n_outputs, np.bool_)}

@@ -1,0 +1,66 @@
+"""Wear rates from step to step: the largest so far, and whether the rates go up and down as unstable steps make them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.model import FloatArray, IntArray
+from solver.packing import packable
+from solver.wear.options import WEAR
+
+
+@packable
+@dataclass(frozen=True)
+class WearRates:
+    """Wear rates of the pairs and, as the last entry, of all pairs together (n,), m3 per cycle.
+
+    An explicit Euler step beyond its stable length turns the sign of an error and enlarges the error. A physical rise
+    and fall of the rate takes many steps.
+
+    value (n,): rates of the current state, NaN before the first state.
+    increment (n,): change of the rates in the last step.
+    n_alternating (n,): steps in a row in which the increment has changed its sign without becoming smaller.
+    last (alternations - 1, n): sizes of the last increments.
+    largest (n,): largest rates so far.
+    strongest (n,): the smallest increment of a row of `alternations` alternating ones, where it was largest.
+    """
+
+    value: FloatArray
+    increment: FloatArray
+    n_alternating: IntArray
+    last: FloatArray
+    largest: FloatArray
+    strongest: FloatArray
+
+    @classmethod
+    def none(cls, n: int) -> WearRates:
+        """Before the first state; n: pairs and one more."""
+        nothing, unknown = np.zeros(n), np.full(n, np.nan)
+        return cls(unknown, unknown, np.zeros(n, np.int64), np.zeros((WEAR.alternations - 1, n)), nothing, nothing)
+
+    def after(self, rates: FloatArray) -> WearRates:
+        """With the rates (n,) of the state after the next step."""
+        increment = rates - self.value
+        size = np.abs(increment)
+        alternates = (self.increment * increment < 0.0) & (size >= WEAR.calming * np.abs(self.increment))
+        n_alternating = np.where(alternates, self.n_alternating + 1, 0)
+        last = np.vstack([self.last[1:], size])
+        weakest = np.where(n_alternating >= WEAR.alternations - 1, last.min(axis=0), 0.0)
+        return WearRates(
+            value=rates,
+            increment=increment,
+            n_alternating=n_alternating,
+            last=last,
+            largest=np.maximum(self.largest, np.abs(rates)),
+            strongest=np.maximum(self.strongest, weakest),
+        )
+
+    def oscillate(self, least: float = 0.0) -> bool:
+        """Whether a rate went up and down `alternations` times in a row without calming.
+
+        A pair at the edge of the slip zone that wears next to nothing does so at any step. So the increments have to
+        be larger than `least`, m3 per cycle, and than a fraction of the wear rate of the whole joint.
+        """
+        return bool(self.strongest.max(initial=0.0) > max(WEAR.noticeable_oscillation * self.largest[-1], least))

@@ -1,0 +1,224 @@
+"""The two integrations of a wear history: the history itself and its reference solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.reference import coarser, every_second
+from solver.clock import computing_time
+from solver.contact.wear_law import ARCHARD, WearLaw
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.packing import Packed, pack, packable
+from solver.results.history import StartState
+from solver.settings import Scheme, ToTheEnd, WearTarget
+from solver.structure.joint import Case
+from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
+from solver.wear.control import AdaptiveSteps, Control, GivenSteps, ListedSteps
+from solver.wear.integrate import Integration, Progress, guarded
+from solver.wear.options import WEAR
+from solver.wear.output import DenseOutput, OutputState
+from solver.wear.state import Failure, WearState
+from solver.wear.stop import AtCount, InSteadyState
+from solver.wear.wearing_joint import WearingJoint
+
+
+@dataclass(frozen=True)
+class SlowTime:
+    """What is asked of a wear history, Eqs. (20) to (26).
+
+    wear_coefficient: k_w, 1/Pa.
+    scheme: "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.bdf2`).
+    cycles (n_output,): ascending counts to report, the first 0. Between two steps they are interpolated, and the last
+        Euler step is shortened to end on the last of them. Or `ToTheEnd`: until nothing wears any more, at counts that
+        are found on the way; then steps grow without bound, which explicit steps must not.
+    step: h, cycles; the adaptive scheme chooses its own steps.
+    largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
+    law: what of the slip work wears.
+    until: wear at which the history ends before its last count, with the step that reaches it.
+    loops: pairs whose fretting loops are kept at every count.
+    """
+
+    wear_coefficient: float
+    scheme: Scheme
+    cycles: FloatArray | ToTheEnd
+    step: float = math.inf
+    largest_depth: float | None = None
+    law: WearLaw = ARCHARD
+    until: WearTarget | None = None
+    loops: tuple[int, ...] = ()
+
+    @property
+    def end(self) -> float:
+        """Last cycle count; inf where it is not known."""
+        return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
+
+
+@packable
+@dataclass(frozen=True)
+class Ended:
+    """An integration that has come to its end: last state, how it ended, its output, Newton iterations spent."""
+
+    state: WearState | None
+    failure: Failure
+    output: OutputState
+    iterations: int
+
+
+@packable
+@dataclass(frozen=True)
+class Saved:
+    """The progress of a history: all that it goes on from.
+
+    progress, output, iterations: of the integration under way.
+    fine: the history itself, where its reference solution is under way; else None.
+    spent: CPU seconds so far.
+    """
+
+    progress: Progress
+    output: OutputState
+    iterations: int
+    fine: Ended | None
+    spent: float
+
+
+@dataclass
+class Solutions:
+    """Integrates a history and its reference solution, one after the other.
+
+    case, start, asked: as in `history.integrate_wear`; the start state is one.
+    keep: called with the packed progress now and then; None for nobody.
+    saved: progress to go on from; None to begin.
+    began: CPU time, s, at which the computation would have begun without an interruption.
+    fine: the history itself, where an earlier run has come to its end.
+    """
+
+    case: Case
+    start: StartState
+    asked: SlowTime
+    keep: Callable[[Packed], None] | None = None
+    saved: Saved | None = None
+    began: float = field(init=False, default_factory=computing_time)
+    fine: Ended | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.fine = None
+        if self.saved is not None:
+            self.began -= self.saved.spent
+            self.fine = self.saved.fine
+
+    @property
+    def spent(self) -> float:
+        """CPU seconds so far, those before an interruption included."""
+        return computing_time() - self.began
+
+    def history(self) -> Ended:
+        """The history itself."""
+        if self.fine is not None:
+            return self.fine
+        asked, settings = self.asked, self.case.settings
+        work, smooth = self._joint(), asked.scheme == "adaptive"
+        counts = None if isinstance(asked.cycles, ToTheEnd) else asked.cycles
+        control: Control = GivenSteps(asked.scheme, asked.step, asked.end, asked.largest_depth)
+        if smooth:
+            control = AdaptiveSteps(settings.rtol)
+        stop = InSteadyState(asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else AtCount(asked.end)
+        shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
+        integration = Integration(
+            control,
+            FullCheck(asked.loops, with_resonance=shifts),
+            stop,
+            DenseOutput(work.area, counts, smooth=smooth, target=asked.until),
+            lambda progress: self._save(integration, work, progress, None),
+        )
+        start = self.start
+        assert start.state is not None
+        estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
+        first = start.state
+        ended = self._run(
+            integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate)
+        )
+        if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
+            return ended
+        state = ended.state
+        unstable = guarded(lambda: unstable_at_end(work, state))
+        return replace(ended, failure=unstable or ended.failure, iterations=work.effort.iterations)
+
+    def reference(self, fine: Ended) -> Ended:
+        """The reference solution of a history, at all counts at which the two are compared or read."""
+        course = fine.output.course
+        assert fine.state is not None
+        assert self.start.state is not None
+        work, smooth = self._joint(), self.asked.scheme == "adaptive"
+        ends = np.array(every_second(course.ends))
+        resolutions = tuple((count, coarser(resolution)) for count, resolution in course.resolutions)
+        integration = Integration(
+            ListedSteps(ends, smooth),
+            PlainCheck(resolutions),
+            AtCount(float(ends[-1]) if ends.size else 0.0),
+            DenseOutput(work.area, self._compared(fine), smooth=smooth),
+            lambda progress: self._save(integration, work, progress, fine),
+            bounded=False,
+            most_iterations=fine.iterations + WEAR.reference_iterations,
+        )
+        begin, limit = self.start.coarse or self.start.state, fine.state.step_limit
+        return self._run(
+            integration,
+            work,
+            lambda: work.begin(begin, self.start.resolution, NOTHING, accurate=True, step_limit=limit),
+        )
+
+    def counts(self, fine: Ended) -> FloatArray:
+        """Counts (n_output,) at which the history is read."""
+        if not isinstance(self.asked.cycles, ToTheEnd):
+            return self.asked.cycles
+        if not fine.output.nodes:
+            return np.zeros(self.asked.cycles.n_outputs)
+        return self.output_of(fine).even_counts(self.asked.cycles.n_outputs)
+
+    def output_of(self, ended: Ended) -> DenseOutput:
+        """The output of an integration, to be read."""
+        output = DenseOutput(self.case.model.contact.area, None, smooth=self.asked.scheme == "adaptive")
+        output.taken = ended.output
+        return output
+
+    def _compared(self, fine: Ended) -> FloatArray:
+        """Ascending counts at which the reference solution is read."""
+        reached = min(fine.output.course.ends[-1], self.asked.end)
+        counts = self.counts(fine)
+        return np.unique(np.concatenate([counts[counts <= reached], fine.output.course.cycles]))
+
+    def _joint(self) -> WearingJoint:
+        """The joint, with what is left of the limit of time."""
+        assert self.start.state is not None
+        work = WearingJoint.of(self.case, self.start.state, self.asked.wear_coefficient, self.asked.law)
+        work.effort.deadline = self.began + self.case.settings.time_limit
+        return work
+
+    def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState]) -> Ended:
+        """An integration from its first state, or from where it was saved."""
+        progress: Progress | Failure
+        if self.saved is not None:
+            work.effort.iterations, integration.output.taken = self.saved.iterations, self.saved.output
+            progress, self.saved = self.saved.progress, None
+        else:
+            progress = guarded(lambda: integration.begin(work, begin()))
+        if isinstance(progress, Failure):
+            return Ended(None, progress, integration.output.taken, work.effort.iterations)
+        state, failure = integration.run(work, progress)
+        last, end = integration.output.last, self.asked.end
+        if failure.outcome is Outcome.CONVERGED and last is not None and math.isfinite(end) and not work.wears(state):
+            # nothing wears any more: the state holds for all later counts
+            integration.output.add(end, last.report, last.rate, 0.0)
+        return Ended(state, failure, integration.output.taken, work.effort.iterations)
+
+    def _save(self, integration: Integration, work: WearingJoint, progress: Progress, fine: Ended | None) -> None:
+        """Hand out the progress of an integration."""
+        if self.keep is not None:
+            saved = Saved(progress, integration.output.taken, work.effort.iterations, fine, self.spent)
+            self.keep(pack(saved))

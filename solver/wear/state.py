@@ -1,0 +1,97 @@
+"""The state of a joint that wears: data that a step takes and gives, and from which a history goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from solver.accuracy.error_estimate import Estimate
+from solver.harmonic_balance.converged import PathPoint
+from solver.model import FloatArray
+from solver.outcome import Outcome
+from solver.packing import packable
+from solver.settings import Resolution
+from solver.structure.joint import Hold
+from solver.wear.rates import WearRates
+
+
+@packable
+@dataclass(frozen=True)
+class Choice:
+    """The state for which harmonics and samples were chosen last.
+
+    predicted_h (n_rel, 2H+1): its predicted force, N.
+    wear_rate: of the joint, m3 per cycle.
+    worn_volume: m3.
+    estimate: errors of response and wear rate with these harmonics and samples.
+    accurate: whether these errors are below rtol; always true where harmonics and samples are given.
+    """
+
+    predicted_h: FloatArray
+    wear_rate: float
+    worn_volume: float
+    estimate: Estimate
+    accurate: bool
+
+
+@packable
+@dataclass(frozen=True)
+class WearState:
+    """A wearing joint at one cycle count.
+
+    Everything that the next step depends on is here. A factorisation that is kept from one solve to the next only
+    makes the solve faster.
+
+    cycle: count.
+    point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
+    resolution: harmonics and samples of the periodic state.
+    choice: for which state these were chosen.
+    rates: wear rates so far.
+    most_rate: m3 per cycle, the rate if every pair slipped as far as it moves; rates far below are round-off.
+    step_limit: cycles, largest stable explicit step at the first state that wears; NaN as long as nothing wears.
+    change: length, cycles, of the last step and change (n_rel, 2H+1), N, of the predicted force in this step, from which
+        the next state is extrapolated; None behind a jump and with other harmonics.
+    previous: length, cycles, of the last step and depth (n_contact,), m, at its start, for BDF2; None behind a jump.
+    length: cycles, of the next step; the control of the steps plans this length.
+    first_length: cycles, of the first step.
+    hold: soft hold of the mean position of a joint that slides all over; None for none.
+    held_from: count from which on the joint is held, NaN if never.
+    n_jumps, jump_cycle: jumps to another branch so far, and the count of the first, NaN if none.
+    inaccurate_from: count from which on harmonics and samples no longer bring the errors below rtol, inf if never.
+    worst: the largest errors from there on.
+    """
+
+    cycle: float
+    point: PathPoint
+    resolution: Resolution
+    choice: Choice
+    rates: WearRates
+    most_rate: float = 0.0
+    step_limit: float = float("nan")
+    change: tuple[float, FloatArray] | None = None
+    previous: tuple[float, FloatArray] | None = None
+    length: float = 0.0
+    first_length: float = 0.0
+    hold: Hold | None = None
+    held_from: float = float("nan")
+    n_jumps: int = 0
+    jump_cycle: float = float("nan")
+    inaccurate_from: float = float("inf")
+    worst: Estimate = Estimate(0.0, 0.0)
+
+    @property
+    def depth(self) -> FloatArray:
+        """Worn depth (n_contact,), m."""
+        return self.point.evaluation.wear_depth
+
+    def planned(self, length: float) -> WearState:
+        """With another length of the next step, cycles."""
+        return replace(self, length=length)
+
+
+@packable
+@dataclass(frozen=True)
+class Failure:
+    """Why a history does not go on; message: what the outcome does not say by itself."""
+
+    outcome: Outcome
+    message: str = ""

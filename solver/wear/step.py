@@ -1,0 +1,86 @@
+"""One step on the slow time scale: from a state to a state further on, or as far as the branch of the vibration goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from solver.accuracy.error_estimate import euler_error
+from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.newton.solve_balance import solve_balance
+from solver.outcome import Outcome
+from solver.settings import Scheme
+from solver.wear.branch_loss import is_stable_when_held
+from solver.wear.euler import euler_balance
+from solver.wear.options import WEAR
+from solver.wear.state import Failure, WearState
+from solver.wear.step_limit import too_long
+from solver.wear.wearing_joint import WearingJoint
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that was taken.
+
+    state: behind the step, or where the branch of the vibration ends in it.
+    error: estimated local error, as worn volume, m3.
+    length: of the step that was tried, cycles.
+    arrived: False where the branch ends within the step.
+    end_known_to: cycles, how exactly the end of the branch is known.
+    """
+
+    state: WearState
+    error: float
+    length: float
+    arrived: bool = True
+    end_known_to: float = 0.0
+
+
+def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step:
+    """One Euler step, Eq. (20) or (24); the adaptive scheme takes implicit ones.
+
+    Where the branch of the vibration ends within the step, the state of the result is the last stable one, to within
+    `fold_resolution`.
+    """
+    joint, tolerance = work.at(state), work.case.settings.tolerance
+    base = PathPoint(0.0, state.point.evaluation, state.point.history)
+    balance_at = euler_balance(joint, scheme, base.evaluation, length, work.wear_coefficient, work.wearing)
+    whole = balance_at(1.0, base.history)
+    start = work.predicted(state, whole, length)
+    if start is not base.evaluation.predicted_h:
+        most = WEAR.extrapolated_iterations
+        found = solve_balance(whole, start, work.solver, tolerance, work.effort, most)
+        if found.converged:
+            point = PathPoint(0.0, found.evaluation, final_history(whole, found.evaluation))
+            return _euler(work, state, point, length)
+    # the end of a branch is to be known to a fraction of the count; in the first step to that of the step
+    resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
+    shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
+    last, arrived = follow_naturally(
+        balance_at, base, 1.0, work.solver, tolerance, work.effort, keep_history=True, shortest=shortest
+    )
+    if not is_stable_when_held(joint, last.evaluation, work.solver):
+        # where the vibration has become unstable is not known: the jump is made from the start of the step
+        last, arrived = base, False
+    if not arrived and last.parameter <= 0.0:
+        return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
+    ahead = last.parameter * length
+    point = PathPoint(0.0, last.evaluation, final_history(balance_at(last.parameter, base.history), last.evaluation))
+    taken = _euler(work, state, point, ahead)
+    return replace(taken, length=length, arrived=arrived, end_known_to=shortest * length)
+
+
+def _euler(work: WearingJoint, state: WearState, point: PathPoint, length: float) -> Step:
+    """An Euler step that has come to a state."""
+    after = work.accepted(state, point, length)
+    change = abs(float(after.rates.value[-1] - state.rates.value[-1]))
+    return Step(after, euler_error(length, change), length)
+
+
+def bounded_euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | Failure:
+    """One Euler step, refused where what the step wears would move many times the normal forces."""
+    step = euler_step(work, state, length, scheme)
+    ahead = step.state.cycle - state.cycle
+    said = too_long(work.at(state), state.point.evaluation, step.state.depth, state.cycle, ahead)
+    return step if said is None else Failure(Outcome.STEP_TOO_LONG, said)

@@ -1,0 +1,84 @@
+"""What ends a wear history: a last count or a target, nothing that wears any more, or wear without end.
+
+In a steady state no pair slips, or carries a force while it slips. A history comes near to this state as fast as its
+slowest pair lets it: it ends where the wear rate of every pair is below a share of the largest rate of this pair. A
+joint that slips everywhere under a load that nothing else bears has no such state: it wears at a constant rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.outcome import Outcome
+from solver.wear.options import WEAR
+from solver.wear.output import DenseOutput
+from solver.wear.state import Failure, WearState
+from solver.wear.wearing_joint import WearingJoint
+
+AS_ASKED = Failure(Outcome.CONVERGED)
+"""The end of a history that was computed as far as it was asked for."""
+
+
+@dataclass(frozen=True)
+class AtCount:
+    """The end at a cycle count, or before where the target is reached or nothing wears."""
+
+    end: float
+
+    def __call__(self, work: WearingJoint, state: WearState, output: DenseOutput) -> Failure | None:
+        """AS_ASKED at the end, else None."""
+        if state.cycle >= self.end * (1.0 - 1e-12) or output.reached_target or not work.wears(state):
+            return AS_ASKED
+        return None
+
+
+@dataclass(frozen=True)
+class InSteadyState:
+    """The end where nothing wears any more, or where wear goes on without end.
+
+    share: `settings.ToTheEnd.final_share`.
+    """
+
+    share: float
+
+    def __call__(self, work: WearingJoint, state: WearState, output: DenseOutput) -> Failure | None:
+        """AS_ASKED in a steady state or at the target, NO_FINAL_STATE where there is none, else None."""
+        if output.reached_target or self._is_over(state) or not work.wears(state):
+            return AS_ASKED
+        rate, n_steps = float(state.rates.value[-1]), len(output.taken.course.ends) - 1
+        if self._is_steady(work, state, output):
+            said = f"all pairs slip, and from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, said)
+        if n_steps >= WEAR.steps_to_the_end or state.cycle > WEAR.longest_march:
+            said = f"after {n_steps} steps, at cycle {state.cycle:.4g}, the joint still wears at {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, said)
+        return None
+
+    def _is_over(self, state: WearState) -> bool:
+        """Whether the rate of every pair is below its share of the largest."""
+        rates, largest = state.rates.value[:-1], state.rates.largest[:-1]
+        floor = self.share * float(largest.max(initial=0.0))
+        return bool((rates <= self.share * np.maximum(largest, floor)).all())
+
+    def _is_steady(self, work: WearingJoint, state: WearState, output: DenseOutput) -> bool:
+        """Whether the joint slips at every pair that bears it and its wear rate is constant, though what it has worn is
+        so much that it has acted back.
+        """
+        joint, at = work.at(state), state.point.evaluation
+        normal = at.force_h[:, 0, 0]
+        pressed = normal > WEAR.bears * float(normal.max(initial=0.0))
+        if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
+            return False
+        course = output.taken.course
+        volumes, rates = np.array(course.depths) @ work.area, np.array(course.rates)
+        # over the last nine tenths of the worn volume
+        first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
+        if volumes[first] > 0.1 * volumes[-1] or (np.abs(rates[first:] - rates[-1]) > WEAR.steady_rate * rates[-1]).any():
+            return False
+        rows = np.flatnonzero(joint.component_index % 3 == 0)
+        rows = rows[pressed[joint.component_index[rows] // 3]]
+        pair = joint.component_index[rows] // 3
+        moved = joint.structure.static_stiffness[rows, rows] * at.wear_depth[pair]
+        return bool((moved >= WEAR.acted_back * normal[pair]).all())

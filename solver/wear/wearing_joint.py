@@ -1,0 +1,147 @@
+"""A joint that wears: what all states of one history have in common, and a factorisation kept between solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from solver.accuracy.error_estimate import Estimate
+from solver.contact.archard import volume_rate, wear_gain, wear_rate
+from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
+from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.model import FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort
+from solver.results.history import PeriodicState
+from solver.settings import Resolution
+from solver.structure.joint import Case, Hold, Joint
+from solver.wear.options import WEAR
+from solver.wear.rates import WearRates
+from solver.wear.state import Choice, WearState
+from solver.wear.step_limit import explicit_step_limit
+
+
+@dataclass
+class WearingJoint:
+    """The joint of one wear history.
+
+    case: model, friction and settings; its resolution and hold are those of the last state asked for.
+    omega, excitation_amplitude: rad/s, N.
+    wear_coefficient: 1/Pa.
+    wearing: what of the slip work wears.
+    effort: iterations spent, and the limit of time.
+    solver: keeps a factorisation from one solve to the next.
+    usual_work: N m, slip work against which a smaller one is judged when harmonics are chosen.
+    """
+
+    case: Case
+    omega: float
+    excitation_amplitude: float
+    wear_coefficient: float
+    wearing: WearingWork
+    effort: Effort = field(default_factory=Effort)
+    solver: JacobianSolver = field(default_factory=JacobianSolver)
+    usual_work: float = 0.0
+    _joint: Joint | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, case: Case, state: PeriodicState, wear_coefficient: float, law: WearLaw = ARCHARD) -> WearingJoint:
+        """The joint of a case at the frequency and load of its unworn state."""
+        wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
+        return cls(case, state.omega, state.excitation_amplitude, wear_coefficient, wearing)
+
+    @property
+    def area(self) -> FloatArray:
+        """Area of the pairs (n_contact,), m2."""
+        return self.case.model.contact.area
+
+    def joint(self, resolution: Resolution, hold: Hold | None) -> Joint:
+        """The joint with these harmonics and samples. Others than before give up the factorisation."""
+        if self._joint is None or resolution != self.case.resolution or hold is not self.case.hold:
+            case = self.case if hold is self.case.hold else self.case.held(hold)
+            self.case = case.at(resolution)
+            self._joint = self.case.joint(self.omega, self.excitation_amplitude)
+            self.drop_factor()
+        return self._joint
+
+    def at(self, state: WearState) -> Joint:
+        """The joint of a state."""
+        return self.joint(state.resolution, state.hold)
+
+    def drop_factor(self) -> None:
+        """Give up the kept factorisation: what follows depends on the state alone."""
+        self.solver = JacobianSolver()
+
+    def wearing_work(self, at: Evaluation) -> FloatArray:
+        """Work (n_contact,) that wears in a cycle, J."""
+        return self.wearing.work(*worn_by(at))
+
+    def rate(self, at: Evaluation) -> FloatArray:
+        """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
+        return wear_rate(self.wear_coefficient, self.area, self.wearing_work(at))
+
+    def gain(self, cycles: float) -> FloatArray:
+        """Growth of the depth (n_contact,), m/J, per wearing work in so many cycles."""
+        return wear_gain(self.wear_coefficient, self.area, cycles)
+
+    def wears(self, state: WearState) -> bool:
+        """Whether anything wears, more than round-off of the slip that the static load has caused."""
+        return bool(state.rates.value[-1] > WEAR.no_wear * state.most_rate)
+
+    def begin(
+        self,
+        start: PeriodicState,
+        resolution: Resolution,
+        estimate: Estimate,
+        *,
+        accurate: bool,
+        step_limit: float = float("nan"),
+    ) -> WearState:
+        """The unworn state. The start state is evaluated here, not solved again.
+
+        estimate, accurate: errors of the start state, and whether they are below rtol.
+        step_limit: cycles, largest stable explicit step, where it is known.
+        """
+        joint = self.joint(resolution, None)
+        balance = Balance.frozen(joint, start.start_history, start.wear_depth)
+        at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
+        n_rates = self.area.size + 1
+        rate, volume = float(self.rate(at) @ self.area), float(at.wear_depth @ self.area)
+        choice = Choice(at.predicted_h, rate, volume, estimate, accurate)
+        point = PathPoint(0.0, at, final_history(balance, at))
+        return self.noted(WearState(0.0, point, resolution, choice, WearRates.none(n_rates), step_limit=step_limit))
+
+    def accepted(self, state: WearState, point: PathPoint, length: float) -> WearState:
+        """The state behind a step of so many cycles that has come to `point`."""
+        change = length, point.evaluation.predicted_h - state.point.evaluation.predicted_h
+        after = replace(
+            state, cycle=state.cycle + length, point=point, change=change, previous=(length, state.depth)
+        )
+        return self.noted(after)
+
+    def noted(self, state: WearState) -> WearState:
+        """With the wear rates of the state, and at the first state that wears with the limit of the explicit step."""
+        at = state.point.evaluation
+        volumes = self.rate(at) * self.area
+        # with the static slip: where all pairs stick the vibration of the joint itself is round-off
+        pressed = np.abs(at.force_t[:, 0]).max(axis=1)
+        moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
+        most = volume_rate(self.wear_coefficient, self.wearing.largest_factor * moved)
+        rates = state.rates.after(np.append(volumes, volumes.sum()))
+        state = replace(state, rates=rates, most_rate=max(state.most_rate, most))
+        if np.isnan(state.step_limit) and self.wears(state):
+            limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.solver)
+            state = replace(state, step_limit=limit)
+        return state
+
+    def predicted(self, state: WearState, balance: Balance, length: float) -> FloatArray:
+        """Predicted force (n_rel, m), N, to begin a solve with: extrapolated over the last step, or that of the state."""
+        now = state.point.evaluation.predicted_h
+        if state.change is None:
+            return now
+        before, change = state.change
+        ahead = now + (length / before) * change
+        nearer = balance.evaluate(ahead).scaled_residual() <= balance.evaluate(now).scaled_residual()
+        return ahead if nearer else now
