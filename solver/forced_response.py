@@ -16,7 +16,8 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from solver.structure.joint import friction_of_pairs
-from solver.wear.march import march_wear as march_from_start
+from solver.wear.history import integrate_wear
+from solver.wear.solutions import SlowTime
 
 _UNWORN = np.zeros(1)  # the only cycle count
 
@@ -85,7 +86,7 @@ def frequency_response(
     branch = follow_branch(model, friction, load, ascending, sweep, settings)
     for index, start in branch:
         # a state is reported as at cycle 0 of any wear history; nothing wears until then
-        found[index] = march_from_start(model, friction, start, 0.0, 1.0, "implicit", _UNWORN, settings)
+        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _UNWORN, 1.0))
     points = [found[index] for index in place.tolist()]
     return FrequencyResponse(
         frequency=wanted,

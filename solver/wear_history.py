@@ -17,7 +17,8 @@ from solver.results.history import WearHistory
 from solver.settings import TARGETS, Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import friction_of_pairs
 from solver.wear.final_state.find import find_final_state
-from solver.wear.march import march_wear as march_from_start
+from solver.wear.history import integrate_wear
+from solver.wear.solutions import SlowTime
 
 
 def march_wear(
@@ -107,7 +108,7 @@ def march_wear(
     # that the law is none of these pairs is the fault of the caller, not of the march
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
-    if scheme == "final":
-        return find_final_state(model, friction, start, per_pressure, ToTheEnd(outputs, final_share), settings, law=law)
-    asked = ToTheEnd(outputs, final_share) if to_the_end else counts
-    return march_from_start(model, friction, start, per_pressure, length, scheme, asked, settings, law=law, until=until)
+    read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
+    asked = SlowTime(per_pressure, "adaptive" if scheme == "final" else scheme, read_at, length, law=law, until=until)
+    solve = find_final_state if scheme == "final" else integrate_wear
+    return solve(model, friction, settings, start, asked)

@@ -104,7 +104,7 @@ _MEANING = {
 }
 
 
-NOT_CERTIFIED = Certificate(*[float("nan")] * 6)
+NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 """Of a state that is not handed out."""
 
 

@@ -53,7 +53,12 @@ class Met:
 
 
 def history_error(
-    counts: FloatArray, fine: Mapping[str, Any], reference: Mapping[str, Any], met: Met, area: FloatArray, scheme: Scheme
+    counts: FloatArray,
+    fine: Mapping[str, Any],
+    reference: Mapping[str, Any],
+    met: Met,
+    area: FloatArray,
+    scheme: Scheme,
 ) -> HistoryError:
     """Errors of a history.
 
@@ -88,7 +93,7 @@ def history_error(
     with np.errstate(invalid="ignore"):
         of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
-    return HistoryError(relative, of_pairs, _response_error(fine, reference), _rate_error(fine, reference, area))
+    return HistoryError(relative, of_pairs, _response_error(fine, reference), _rate_error(fine, reference))
 
 
 def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> float:
@@ -108,7 +113,7 @@ def _response_error(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> Fl
     return np.asarray(found)
 
 
-def _rate_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> FloatArray:
+def _rate_error(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
     """Relative difference (n_output,) of the wear rates, at least that of the harmonics."""
     rate, other = fine["wear_rate"], reference["wear_rate"]
     apart = np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0)

@@ -34,7 +34,7 @@ def coarser(resolution: Resolution) -> Resolution:
 
 
 def every_second(ends: tuple[float, ...]) -> tuple[float, ...]:
-    """Ends of the steps of the reference solution, from the ends of all steps of a history; the first one begins both."""
+    """Ends of the steps of the reference solution; ends: the first count of a history and the ends of all its steps."""
     later = ends[1:]
     chosen = later[1::2]
     return chosen if not later or (chosen and chosen[-1] == later[-1]) else (*chosen, later[-1])

@@ -24,7 +24,7 @@ from solver.wear.wearing_joint import WearingJoint
 class Control(Protocol):
     """What plans the steps of an integration."""
 
-    def begin(self, work: WearingJoint, state: WearState) -> WearState:
+    def begin(self, work: WearingJoint, state: WearState, /) -> WearState:
         """The unworn state with the length of its first step."""
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
@@ -47,7 +47,7 @@ class GivenSteps:
     end: float
     largest_depth: float | None = None
 
-    def begin(self, work: WearingJoint, state: WearState) -> WearState:
+    def begin(self, _: WearingJoint, state: WearState) -> WearState:
         """As in `Control`."""
         return replace(state, length=self.length, first_length=self.length)
 
@@ -128,7 +128,7 @@ class ListedSteps:
     ends: FloatArray
     second_order: bool
 
-    def begin(self, work: WearingJoint, state: WearState) -> WearState:
+    def begin(self, _: WearingJoint, state: WearState) -> WearState:
         """As in `Control`."""
         return state
 

@@ -68,7 +68,12 @@ def held_on(
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
     found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, effort, keep_history=True)
     changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
-    if not arrived or changed or creeps(other, hold, found.evaluation) or not is_stable_when_held(other, found.evaluation, solver):
+    if (
+        not arrived
+        or changed
+        or creeps(other, hold, found.evaluation)
+        or not is_stable_when_held(other, found.evaluation, solver)
+    ):
         return None
     history = final_history(balance_at(1.0, last.history), found.evaluation)
     return hold, PathPoint(0.0, found.evaluation, history)

@@ -58,7 +58,9 @@ def integrate_wear(
     fine = solutions.history()
     if fine.state is None:
         failed = replace(start, outcome=fine.failure.outcome, message=fine.failure.message)
-        return replace(_without_state(model, failed, asked), newton_iterations=start.newton_iterations + fine.iterations)
+        return replace(
+            _without_state(model, failed, asked), newton_iterations=start.newton_iterations + fine.iterations
+        )
     reference = None
     if fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
         reference = solutions.reference(fine)
@@ -124,7 +126,9 @@ def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str,
     if found:
         return found
     return {
-        name: np.full((counts.size, *value.shape[1:]), np.nan) for name, value in like.items() if value.dtype.kind in "fc"
+        name: np.full((counts.size, *value.shape[1:]), np.nan)
+        for name, value in like.items()
+        if value.dtype.kind in "fc"
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -91,7 +92,7 @@ class Integration:
             n_steps += 1
             if work.effort.iterations > self.most_iterations + WEAR.step_iterations * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
-            after = guarded(lambda state=state: self._one(work, state))
+            after = guarded(partial(self._one, work, state))
             if isinstance(after, Failure):
                 return state, after
             state = after

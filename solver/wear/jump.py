@@ -35,9 +35,7 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
         return Failure(Outcome.STEP_TOO_LONG, said)
     work.effort.limit = work.effort.iterations + WEAR.jump_iterations
-    landed = _held(work, state, worn)
-    if landed is None:
-        landed = _on_another_branch(work, state, worn)
+    landed = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.effort.limit = float("inf")
     if isinstance(landed, Failure):
         return landed

@@ -30,7 +30,15 @@ INTERPOLATED = (
 )
 """What of a report lies between those of the two ends of a step."""
 
-CERTIFIED = ("residual", "penetration", "tension", "cone_violation", "energy_error", "response_error", "wear_rate_error")
+CERTIFIED = (
+    "residual",
+    "penetration",
+    "tension",
+    "cone_violation",
+    "energy_error",
+    "response_error",
+    "wear_rate_error",
+)
 """What of a certificate is the larger of both ends of a step."""
 
 
@@ -301,7 +309,9 @@ def no_output(n_outputs: int, n_contact: int, n_response: int, n_loops: int) -> 
     """What `DenseOutput.read` gives where there is no state at all."""
     of_pairs, of_responses = np.full((n_outputs, n_contact), np.nan), np.full((n_outputs, n_response), np.nan)
     loops, whole = np.full((n_outputs, n_loops, LOOP_PHASES, 3), np.nan), np.zeros(n_outputs, np.int64)
-    found: dict[str, Any] = dict.fromkeys(("wear_depth", "mean_pressure", "slip_range", "open_fraction", "depth_rate"), of_pairs)
+    found: dict[str, Any] = dict.fromkeys(
+        ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "depth_rate"), of_pairs
+    )
     found |= {"response": of_responses.astype(complex), "response_peak": of_responses}
     found |= dict.fromkeys(("loop_displacement", "loop_force"), loops)
     found |= dict.fromkeys((*CERTIFIED, "wear_rate", "local"), np.full(n_outputs, np.nan))

@@ -1,4 +1,4 @@
-"""Wear rates from step to step: the largest so far, and whether the rates go up and down as unstable steps make them."""
+"""Wear rates from step to step: the largest so far, and whether unstable steps make the rates go up and down."""
 
 from __future__ import annotations
 

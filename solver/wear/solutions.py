@@ -140,9 +140,7 @@ class Solutions:
         assert start.state is not None
         estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
         first = start.state
-        ended = self._run(
-            integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate)
-        )
+        ended = self._run(integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate))
         if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
             return ended
         state = ended.state

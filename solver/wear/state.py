@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from solver.accuracy.error_estimate import Estimate
+from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray
 from solver.outcome import Outcome
@@ -48,8 +48,8 @@ class WearState:
     rates: wear rates so far.
     most_rate: m3 per cycle, the rate if every pair slipped as far as it moves; rates far below are round-off.
     step_limit: cycles, largest stable explicit step at the first state that wears; NaN as long as nothing wears.
-    change: length, cycles, of the last step and change (n_rel, 2H+1), N, of the predicted force in this step, from which
-        the next state is extrapolated; None behind a jump and with other harmonics.
+    change: length, cycles, of the last step and change (n_rel, 2H+1), N, of the predicted force in this step. The next
+        state is extrapolated from them; None behind a jump and with other harmonics.
     previous: length, cycles, of the last step and depth (n_contact,), m, at its start, for BDF2; None behind a jump.
     length: cycles, of the next step; the control of the steps plans this length.
     first_length: cycles, of the first step.
@@ -76,7 +76,7 @@ class WearState:
     n_jumps: int = 0
     jump_cycle: float = float("nan")
     inaccurate_from: float = float("inf")
-    worst: Estimate = Estimate(0.0, 0.0)
+    worst: Estimate = NOTHING
 
     @property
     def depth(self) -> FloatArray:

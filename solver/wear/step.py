@@ -1,4 +1,4 @@
-"""One step on the slow time scale: from a state to a state further on, or as far as the branch of the vibration goes."""
+"""One step on the slow time scale: from a state to the next, or as far as the branch of the vibration goes."""
 
 from __future__ import annotations
 

@@ -49,11 +49,11 @@ class InSteadyState:
             return AS_ASKED
         rate, n_steps = float(state.rates.value[-1]), len(output.taken.course.ends) - 1
         if self._is_steady(work, state, output):
-            said = f"all pairs slip, and from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
-            return Failure(Outcome.NO_FINAL_STATE, said)
+            steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
         if n_steps >= WEAR.steps_to_the_end or state.cycle > WEAR.longest_march:
-            said = f"after {n_steps} steps, at cycle {state.cycle:.4g}, the joint still wears at {rate:.6g} m3 a cycle"
-            return Failure(Outcome.NO_FINAL_STATE, said)
+            still = f"the joint still wears at {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {state.cycle:.4g}, {still}")
         return None
 
     def _is_over(self, state: WearState) -> bool:
@@ -75,7 +75,10 @@ class InSteadyState:
         volumes, rates = np.array(course.depths) @ work.area, np.array(course.rates)
         # over the last nine tenths of the worn volume
         first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
-        if volumes[first] > 0.1 * volumes[-1] or (np.abs(rates[first:] - rates[-1]) > WEAR.steady_rate * rates[-1]).any():
+        if (
+            volumes[first] > 0.1 * volumes[-1]
+            or (np.abs(rates[first:] - rates[-1]) > WEAR.steady_rate * rates[-1]).any()
+        ):
             return False
         rows = np.flatnonzero(joint.component_index % 3 == 0)
         rows = rows[pressed[joint.component_index[rows] // 3]]

@@ -116,9 +116,7 @@ class WearingJoint:
     def accepted(self, state: WearState, point: PathPoint, length: float) -> WearState:
         """The state behind a step of so many cycles that has come to `point`."""
         change = length, point.evaluation.predicted_h - state.point.evaluation.predicted_h
-        after = replace(
-            state, cycle=state.cycle + length, point=point, change=change, previous=(length, state.depth)
-        )
+        after = replace(state, cycle=state.cycle + length, point=point, change=change, previous=(length, state.depth))
         return self.noted(after)
 
     def noted(self, state: WearState) -> WearState:
@@ -137,7 +135,7 @@ class WearingJoint:
         return state
 
     def predicted(self, state: WearState, balance: Balance, length: float) -> FloatArray:
-        """Predicted force (n_rel, m), N, to begin a solve with: extrapolated over the last step, or that of the state."""
+        """Predicted force (n_rel, m), N, to begin a solve with: extrapolated over the last step, or of the state."""
         now = state.point.evaluation.predicted_h
         if state.change is None:
             return now

@@ -30,9 +30,8 @@ from solver.model import ReducedModel
 from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
 from tests.random_scenes import random_scene
-from tests.solver.models import random_model, scene
+from tests.solver.models import march_wear, random_model, scene
 from tests.solver.option_fields import all_options
 from tests.solver.test_branch_loss import worn_wall
 

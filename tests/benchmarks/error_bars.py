@@ -21,8 +21,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, random_model, scene
+from tests.solver.models import branch_states, march_wear, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa
 STEPS = (250.0, 500.0, 1000.0, 2000.0)

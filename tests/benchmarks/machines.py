@@ -29,8 +29,7 @@ def one_variant(mesh: int, seed: int) -> None:
     from solver.loading_history.start_states import follow_branch
     from solver.model import LinearModel
     from solver.settings import SolverSettings
-    from solver.wear.march import march_wear
-    from tests.solver.models import scene
+    from tests.solver.models import march_wear, scene
 
     model = scene("dovetail_sector", 13, mesh=mesh)
     if seed:

@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from solver.results.recorder import CERTIFIED
 
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
-from solver.results.recorder import CERTIFIED
 from solver.settings import SolverSettings
-from solver.wear.march import march_wear
 from tests.random_scenes import RandomScene, random_scene
+from tests.solver.models import march_wear
 
 SETTINGS = SolverSettings()
 BOUND = 60  # s: a scene that takes longer hangs

@@ -27,9 +27,9 @@ from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
 from tests.benchmarks import ranks
+from tests.solver.models import march_wear
 
 FREQUENCY, AMPLITUDE, FRICTION, WEAR = 211.75, 0.5, 0.5, 1.1e-11
 SETTINGS = SolverSettings(harmonics=5, samples=128)

@@ -16,8 +16,8 @@ from scipy.linalg import eigh
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.settings import SolverSettings
-from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
+from tests.solver.models import march_wear
 
 HARMONICS = 21  # whose nodal diameters the scene holds
 FRICTION = 0.5

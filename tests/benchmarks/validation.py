@@ -21,7 +21,6 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings, ToTheEnd
 from solver.wear.final_state.find import find_final_state
-from solver.wear.march import march_wear as march_from_start
 from studies import build_scene
 from studies.scenes.closed_forms.hertz import (
     line_half_width,
@@ -32,6 +31,7 @@ from studies.scenes.closed_forms.hertz import (
     point_worn_depth,
 )
 from studies.scenes.half_space.influence import composite_modulus
+from tests.solver.models import march_wear as march_from_start
 from tests.studies.half_space_twin import limit_depth, pressed
 
 MODULUS = composite_modulus(200e9, 0.3)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,13 @@ from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort
 from solver.outcome import Outcome
-from solver.results.history import PeriodicState, StartState
+from solver.packing import Packed
+from solver.results.history import PeriodicState, StartState, WearHistory
 from solver.results.state_report import periodic_state
-from solver.settings import Resolution, SolverSettings, first_resolution
+from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, Joint, build_case
+from solver.wear.history import integrate_wear
+from solver.wear.solutions import SlowTime
 from studies.scenes import build_scene, scene_parameters
 
 STIFFNESS = 1e7  # N/m
@@ -210,3 +214,21 @@ def start_state(joint: Joint, point: PathPoint, iterations: int = 0) -> StartSta
         newton_iterations=iterations,
         run_time=0.0,
     )
+
+
+def march_wear(
+    model: ReducedModel,
+    friction_coefficient: float | FloatArray | None,
+    start: StartState,
+    wear_coefficient: float,
+    step: float,
+    scheme: Scheme,
+    cycles: FloatArray | ToTheEnd,
+    settings: SolverSettings,
+    keep: Callable[[Packed], None] | None = None,
+    resume: Packed | None = None,
+    **asked: Any,
+) -> WearHistory:
+    """The history from a start state; asked: what else `SlowTime` has."""
+    wanted = SlowTime(wear_coefficient, scheme, cycles, step, **asked)
+    return integrate_wear(model, friction_coefficient, settings, start, wanted, keep, resume)

@@ -14,8 +14,8 @@ from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import build_case
-from solver.wear.march import march_wear
 from tests.contact_pair import ContactPair
+from tests.solver.models import march_wear
 
 Draw = Callable[[np.random.Generator], "Scene"]
 

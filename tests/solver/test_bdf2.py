@@ -12,8 +12,7 @@ from scipy.interpolate import CubicSpline
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.wear import bdf2
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, scene
+from tests.solver.models import branch_states, march_wear, scene
 from tests.solver.test_march import AREA, COARSE, CYCLES, END, FRICTION, OMEGA, WEAR, march, slider_start
 
 FINE_OUTPUT = np.linspace(0.0, END, 101)

@@ -11,9 +11,8 @@ from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
 from tests.references import vibro_impact_orbit
-from tests.solver.models import branch_states
+from tests.solver.models import branch_states, march_wear
 
 OMEGA = 1.5
 FORCE = 0.02

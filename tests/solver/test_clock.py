@@ -15,8 +15,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.results import state_report
 from solver.settings import SolverSettings
-from solver.wear.march import march_wear
-from tests.solver.models import scene
+from tests.solver.models import march_wear, scene
 
 
 def fresh_kernel() -> None:

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from solver.results.recorder import _before
+from solver.wear.companion import Companion
+from solver.wear.trajectory import Trajectory
 
 from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.refinement import Refined, refine
@@ -17,15 +20,11 @@ from solver.outcome import Outcome
 from solver.results import recorder
 from solver.results.history import StartState, WearHistory
 from solver.results.options import RESULTS
-from solver.results.recorder import _before
 from solver.settings import Scheme, SolverSettings
 from solver.wear import march as march_module
 from solver.wear import trajectory
-from solver.wear.companion import Companion
-from solver.wear.march import march_wear
-from solver.wear.trajectory import Trajectory
 from tests.references import slider_amplitude, slider_wear_depth
-from tests.solver.models import branch_states, dovetail, scene
+from tests.solver.models import branch_states, dovetail, march_wear, scene
 
 WEAR = 1.1e-11  # 1/Pa
 GIVEN = SolverSettings(harmonics=5, samples=64)

@@ -12,9 +12,8 @@ from solver.outcome import Outcome
 from solver.results.history import PeriodicState, StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.penalty import build_penalty
-from solver.wear.march import march_wear
 from tests.solver.contact_twin import pair_period
-from tests.solver.models import branch_states, dovetail
+from tests.solver.models import branch_states, dovetail, march_wear
 from tests.solver.reconstruction import contact_work, full_motion, series
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)

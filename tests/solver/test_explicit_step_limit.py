@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from solver.results.oscillation import WearRates
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.results.history import WearHistory
-from solver.results.oscillation import WearRates
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, scene
+from tests.solver.models import branch_states, march_wear, scene
 
 STIFFNESS = 1e6  # N/m, of each pair towards the block
 SETTINGS = SolverSettings(3, 128)

@@ -20,9 +20,8 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.march import march_wear
 from tests.references import slider_amplitude
-from tests.solver.models import OMEGA, dovetail, random_model, scene
+from tests.solver.models import OMEGA, dovetail, march_wear, random_model, scene
 
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 BOUND = 60.0  # s of the processor for a case that takes a few at most: what is found is a hang, not a busy machine

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from solver.wear.trajectory import Trajectory
 
 from solver import march_wear
 from solver.contact.wear_law import WearLaw
@@ -23,10 +24,9 @@ from solver.structure.joint import build_case
 from solver.wear.final_state.active_set import NoActiveSetError, wear_off
 from solver.wear.final_state.cooperation import failure, work_slopes
 from solver.wear.final_state.find import find_final_state
-from solver.wear.march import march_wear as march_from_start
 from solver.wear.options import WEAR
-from solver.wear.trajectory import Trajectory
 from studies import build_scene
+from tests.solver.models import march_wear as march_from_start
 from tests.studies.half_space_twin import limit_depth
 
 COARSE = SolverSettings(harmonics=3, samples=64)

@@ -21,9 +21,8 @@ from solver.stability.floquet import find_instability, growing_exponents, moving
 from solver.stability.monodromy import build_monodromy, switching_pairs
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Case, Joint, build_case
-from solver.wear.march import march_wear
 from tests import references
-from tests.solver.models import cyclic_model, random_balance, random_model
+from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 from tests.solver.random_orbits import Scene, drawn
 

@@ -15,9 +15,8 @@ from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.results.history import PeriodicState, WearHistory
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case, friction_of_pairs
-from solver.wear.march import march_wear
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
-from tests.solver.models import OMEGA, branch_states, first_point, random_balance, random_model, scene
+from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_balance, random_model, scene
 
 SETTINGS = SolverSettings(5, 128)
 KINDS = ("3d", "one_tangent", "constant_load")

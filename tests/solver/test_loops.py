@@ -13,8 +13,7 @@ from solver.results.history import StartState, WearHistory
 from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
 from solver.settings import Scheme, SolverSettings, first_resolution
 from solver.structure.fourier import synthesis
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, random_model, scene
+from tests.solver.models import branch_states, march_wear, random_model, scene
 
 FRICTION = 0.5
 AREA = 1e-4

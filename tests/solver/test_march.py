@@ -15,9 +15,8 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings, first_resolution
 from solver.structure.joint import build_case
-from solver.wear.march import march_wear
 from tests.references import slider_amplitude, slider_orbit, slider_wear_depth
-from tests.solver.models import branch_states, random_model, scene
+from tests.solver.models import branch_states, march_wear, random_model, scene
 
 OMEGA = 2 * np.pi * 160.0
 FRICTION = 0.5

@@ -13,8 +13,8 @@ from solver.newton.options import NEWTON
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
 from studies.scenes import build_scene, scene_parameters
+from tests.solver.models import march_wear
 
 SETTINGS = SolverSettings(harmonics=5, samples=64, tolerance=1e-10)
 # one: what a joint keeps of its slip from one frequency to the next depends on the steps between them

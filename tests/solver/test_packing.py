@@ -17,8 +17,7 @@ from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings
 from solver.wear import march
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, dovetail, scene
+from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
 from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR

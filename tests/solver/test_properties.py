@@ -27,9 +27,8 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import Joint, build_case
-from solver.wear.march import march_wear
 from tests.random_scenes import RandomScene, random_scene
-from tests.solver.models import start_state
+from tests.solver.models import march_wear, start_state
 
 # for the module: a mark on a test itself would change its source, and with it what hypothesis draws
 pytestmark = pytest.mark.slow

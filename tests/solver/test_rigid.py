@@ -20,11 +20,10 @@ from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import synthesis
 from solver.structure.joint import build_case
 from solver.structure.penalty import build_penalty
-from solver.wear.march import march_wear
 from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact import NATURAL
-from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
+from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
 
 SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
 CASES = [  # spring, force, N, frequency, rad/s

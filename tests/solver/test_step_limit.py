@@ -15,10 +15,9 @@ from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.march import march_wear
 from solver.wear.options import WEAR
 from solver.wear.step_limit import StepTooLongError, check_step, moved_fraction
-from tests.solver.models import OMEGA, branch_states, dovetail, random_model
+from tests.solver.models import OMEGA, branch_states, dovetail, march_wear, random_model
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 FREQUENCY = 212.5  # Hz

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import Scheme, WearTarget
-from solver.wear.march import march_wear
+from tests.solver.models import march_wear
 from tests.solver.test_march import AREA, COARSE, END, FRICTION, WEAR, march, slider_start
 
 CYCLES = np.linspace(0.0, END, 9)

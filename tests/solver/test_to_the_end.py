@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from solver.results.trail import TrailRecorder
 
 from solver import march_wear as march_from_model
 from solver.loading_history.start_states import follow_branch
@@ -17,12 +18,11 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
-from solver.results.trail import TrailRecorder
 from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.wear.final_state.find import find_final_state
-from solver.wear.march import march_wear
 from solver.wear.options import WEAR
 from studies import build_scene
+from tests.solver.models import march_wear
 from tests.studies.half_space_twin import limit_depth
 
 COARSE = SolverSettings(harmonics=3, samples=64)

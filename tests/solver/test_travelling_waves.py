@@ -18,8 +18,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, build_case
-from solver.wear.march import march_wear
-from tests.solver.models import branch_states, dovetail
+from tests.solver.models import branch_states, dovetail, march_wear
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 FRICTION = 0.5

@@ -15,8 +15,7 @@ from solver.contact.archard import slip_work_rate, slip_work_slopes, volume_rate
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
-from solver.wear.march import march_wear
-from tests.solver.models import random_balance, random_model
+from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
 from tests.solver.test_march import AREA as PAIR_AREA
 from tests.solver.test_march import COARSE, END, FRICTION, march, slider_start

@@ -12,7 +12,7 @@ Whether the joint is cooperative is tested at states between the unworn and the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,8 @@ from solver.newton.solve_balance import solve_balance
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
 from solver.wear.options import WEAR
-from solver.wear.trajectory import Trajectory
+from solver.wear.state import WearState
+from solver.wear.wearing_joint import WearingJoint
 
 
 class NoActiveSetError(Exception):
@@ -36,27 +37,29 @@ class NoActiveSetError(Exception):
 class WornOff:
     """The joint without its worn pairs.
 
-    point: state in which they just graze. off (n_contact,): those pairs. n_rounds: how often pairs were taken off.
+    state: in which the worn pairs just graze.
+    off (n_contact,): the worn pairs.
+    n_rounds: how often pairs were taken off.
     """
 
-    point: PathPoint
+    state: WearState
     off: BoolArray
     n_rounds: int
 
 
-def least_rate(trajectory: Trajectory, share: float) -> float:
-    """Wear rate of a pair, m3 per cycle, that counts as none: as `EndWatch` and `Trajectory.wears` have it."""
-    largest = float(trajectory.rates.largest[:-1].max(initial=0.0))
-    return max(share**2 * largest, WEAR.no_wear * trajectory.largest_rate)
+def least_rate(state: WearState, share: float) -> float:
+    """Wear rate of a pair, m3 per cycle, that counts as none, as in `solver.wear.stop` and `WearingJoint.wears`."""
+    largest = float(state.rates.largest[:-1].max(initial=0.0))
+    return max(share**2 * largest, WEAR.no_wear * state.most_rate)
 
 
-def wear_off(trajectory: Trajectory, unworn: FloatArray, off: BoolArray, share: float) -> WornOff:
+def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray, share: float) -> WornOff:
     """Take off pairs that slip under pressure until none is left.
 
     Parameters
     ----------
-    trajectory
-        At the unworn state, or at that without some pairs; it is at the final one afterwards.
+    work, state
+        The joint at its unworn state, or at the state without some pairs.
     unworn
         (n_contact,), m, depth to begin with.
     off
@@ -71,18 +74,19 @@ def wear_off(trajectory: Trajectory, unworn: FloatArray, off: BoolArray, share: 
     """
     off, n_rounds = off.copy(), 0
     for _ in range(unworn.size + 2):
-        begin = (trajectory.rates.value[:-1] > least_rate(trajectory, share)) & ~off
+        begin = (state.rates.value[:-1] > least_rate(state, share)) & ~off
         if not begin.any() and (n_rounds > 0 or not off.any()):
-            return WornOff(trajectory.point, off, n_rounds)
-        if not trajectory.joint.has_normal[begin].all():
+            return WornOff(state, off, n_rounds)
+        joint = work.at(state)
+        if not joint.has_normal[begin].all():
             raise NoActiveSetError("pairs slip whose normal force no wear changes")
         off, n_rounds = off | begin, n_rounds + 1
-        point = without(trajectory, unworn, off)
-        depth = grazing_depth(trajectory.joint, point.evaluation, unworn, off)
-        held = Balance.frozen(trajectory.joint, point.evaluation.history, depth)
+        point = without(work, state, unworn, off)
+        depth = grazing_depth(joint, point.evaluation, unworn, off)
+        held = Balance.frozen(joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
-        trajectory.accept(PathPoint(0.0, grazing, final_history(held, grazing)), 0.0)
-        trajectory.last_change = None
+        grazes = PathPoint(0.0, grazing, final_history(held, grazing))
+        state = replace(work.accepted(state, grazes, 0.0), change=None, previous=None)
     raise NoActiveSetError("pairs begin to slip without end")
 
 
@@ -96,9 +100,9 @@ def closing(joint: Joint, at: Evaluation) -> FloatArray:
     return np.asarray((at.displacement_h[:, 0] @ joint.basis.synthesis).max(axis=1) - joint.contact.gap)
 
 
-def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathPoint:
+def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray) -> PathPoint:
     """State in which the pairs that are off are open all period long. Raises NoActiveSetError."""
-    joint, last = trajectory.joint, trajectory.point
+    joint, last, tolerance = work.at(state), state.point, work.case.settings.tolerance
     rows = np.flatnonzero(joint.component_index % 3 == 0)
     stiffness = np.zeros(unworn.size)
     stiffness[joint.component_index[rows] // 3] = joint.structure.static_stiffness[rows, rows]
@@ -110,8 +114,7 @@ def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathP
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
         balance = Balance.frozen(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
-        tolerance = trajectory.case.settings.tolerance
-        found = solve_balance(balance, start, trajectory.solver, tolerance, trajectory.effort)
+        found = solve_balance(balance, start, work.solver, tolerance, work.effort)
         point = PathPoint(0.0, found.evaluation, last.history)
         if not found.converged:
             before = last.evaluation.wear_depth
@@ -120,9 +123,9 @@ def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathP
                 balance_at,
                 PathPoint(0.0, last.evaluation, last.history),
                 1.0,
-                trajectory.solver,
+                work.solver,
                 tolerance,
-                trajectory.effort,
+                work.effort,
                 keep_history=True,
             )
             if not arrived:
@@ -131,7 +134,7 @@ def without(trajectory: Trajectory, unworn: FloatArray, off: BoolArray) -> PathP
             continue
         if (point.evaluation.status_t[off] == SEPARATED).all():
             finer = WEAR.off_tolerance * tolerance
-            exact = solve_balance(balance, found.evaluation.predicted_h, trajectory.solver, finer, trajectory.effort)
+            exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.effort)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
         margin *= 10.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")

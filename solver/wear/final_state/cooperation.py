@@ -18,14 +18,13 @@ makes it slip less at first, and it wears off all the same. This is a test of so
 
 from __future__ import annotations
 
-from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
 from solver.contact.alternating_frequency_time import law_tangent
 from solver.contact.wear_law import WearingWork
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray, IntArray
 from solver.newton.linear_solver import JacobianSolver
@@ -33,7 +32,8 @@ from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
 from solver.wear.final_state.active_set import WornOff, grazing_depth, least_rate, without
 from solver.wear.options import WEAR
-from solver.wear.trajectory import Trajectory
+from solver.wear.state import WearState
+from solver.wear.wearing_joint import WearingJoint
 
 
 def work_slopes(
@@ -57,31 +57,29 @@ def work_slopes(
     return found
 
 
-def failure(trajectory: Trajectory, unworn: PathPoint, final: WornOff, share: float) -> str:
-    """Why the final state of an active set is not that of a march as far as the tests say; empty where they hold.
+def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float) -> str:
+    """Why the final state of an active set is not that of a wear history, as far as the tests say; empty if it is.
 
-    trajectory: of the joint, whose state is not used. unworn: state that a march begins at.
+    unworn: state that a history begins at, with the harmonics and samples of the final one.
     """
-    joint, tolerance, solver = trajectory.joint, trajectory.case.settings.tolerance, JacobianSolver()
-    before, after = unworn.evaluation.wear_depth, final.point.evaluation.wear_depth
-    balance_at, point = held_wear(joint, before, after), unworn
+    joint, tolerance, solver = work.at(unworn), work.case.settings.tolerance, JacobianSolver()
+    before, after = unworn.depth, final.state.depth
+    balance_at, point = held_wear(joint, before, after), unworn.point
     largest = np.zeros(before.size)
     for place in range(WEAR.tested_states + 1):
         fraction = place / WEAR.tested_states
-        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, trajectory.effort)
+        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, work.effort)
         if not arrived:
             return f"the vibration does not go on to {100 * fraction:.0f} % of the final depths"
         at = point.evaluation
         # m3 per cycle of each pair
-        rate = trajectory.wear_coefficient * trajectory.wearing.work(*worn_by(at))
+        rate = work.wear_coefficient * work.wearing.work(*worn_by(at))
         largest = np.maximum(largest, rate)
-        floor = max(least_rate(trajectory, share), share**2 * float(largest.max(initial=0.0)))
+        floor = max(least_rate(final.state, share), share**2 * float(largest.max(initial=0.0)))
         if fraction == 1.0:
             if (rate > np.maximum(share * largest, floor)).any():
                 return "pairs still wear at the final depths, which the vibration comes to in another state"
-            there = copy(trajectory)
-            there.point, there.solver = point, solver
-            free = without(there, before, final.off)
+            free = without(work, replace(unworn, point=point), before, final.off)
             apart = float(np.abs(grazing_depth(joint, free.evaluation, before, final.off) - after).max(initial=0.0))
             if apart > WEAR.same_depth * float(after.max(initial=0.0)):
                 return f"residual shear makes the depths depend on the way to them, by {apart:.2g} m or more"
@@ -95,7 +93,7 @@ def failure(trajectory: Trajectory, unworn: PathPoint, final: WornOff, share: fl
         if (final.off & pressed & ~wears).any():
             return f"{where} pairs stick under pressure that wear before"
         pairs = np.flatnonzero(wears)
-        slopes = work_slopes(joint, at, trajectory.wearing, solver, pairs)[pairs]
+        slopes = work_slopes(joint, at, work.wearing, solver, pairs)[pairs]
         depth_rate = rate[pairs] / joint.contact.area[pairs]
         own = np.abs(np.diagonal(slopes)) * depth_rate
         np.fill_diagonal(slopes, 0.0)

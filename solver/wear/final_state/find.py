@@ -1,203 +1,195 @@
-"""The final state by an active set where the joint is cooperative, by a march to the end where it is not."""
+"""The final state by an active set where the joint is cooperative, by a wear history to the end where it is not."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer
+from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.reference import coarser
 from solver.clock import computing_time
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, ReducedModel
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import OutOfTimeError, move_point
-from solver.outcome import SENSITIVE_ERROR, Outcome, describe_error, known_to
+from solver.newton.solve_balance import OutOfTimeError
+from solver.outcome import Outcome, describe_error
 from solver.packing import Packed
-from solver.results.cut_off import judge_cut_off
+from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState, WearHistory
-from solver.results.recorder import Recorder
-from solver.settings import RESOLUTION, SolverSettings, ToTheEnd
-from solver.structure.joint import build_case
-from solver.wear.final_state.active_set import NoActiveSetError, wear_off
+from solver.results.verdict import judge
+from solver.settings import SolverSettings, ToTheEnd
+from solver.structure.joint import Case, build_case
+from solver.wear.check import Checked, FullCheck, unstable_at_end, with_harmonics
+from solver.wear.final_state.active_set import NoActiveSetError, WornOff, wear_off
 from solver.wear.final_state.cooperation import failure
-from solver.wear.march import march_wear
+from solver.wear.history import integrate_wear
 from solver.wear.options import WEAR
-from solver.wear.trajectory import Trajectory
+from solver.wear.output import DenseOutput
+from solver.wear.solutions import SlowTime
+from solver.wear.state import Failure, WearState
+from solver.wear.wearing_joint import WearingJoint
 
 
 def find_final_state(
     model: ReducedModel,
     friction_coefficient: float | FloatArray | None,
-    start: StartState,
-    wear_coefficient: float,
-    end: ToTheEnd,
     settings: SolverSettings,
-    loops: tuple[int, ...] = (),
+    start: StartState,
+    asked: SlowTime,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
-    law: WearLaw = ARCHARD,
 ) -> WearHistory:
-    """The state at which nothing wears any more; arguments as of `march_wear`.
+    """The state at which nothing wears any more; arguments as of `integrate_wear`.
+
+    asked: with `ToTheEnd` in place of cycles; where there is no active set, its scheme integrates the history.
 
     Returns
     -------
     WearHistory
-        `final_method` says how it was found. "active_set": the first output is the unworn state, the last the final
-        one, whose count is inf; those in between are NaN. "march": that of the adaptive scheme, and its message says
-        why and what the active set has instead.
+        `final_method` says how the state was found. "active_set": the first output is the unworn state, the last the
+        final one, whose count is inf; those in between are NaN. "march": the history of the scheme, and its message
+        says why and what the active set has instead.
     """
     direct: WearHistory | None = None
     reason, spent = "", 0.0
     if start.state is not None:
         began = computing_time()
         try:
-            direct, reason = _directly(model, friction_coefficient, start, wear_coefficient, end, settings, loops, law)
+            case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
+            direct, reason = _directly(case, start, asked)
         except NoActiveSetError as error:
             reason = str(error)
         except OutOfTimeError:
             reason = "it was not found in solver.time_limit"
         except Exception as error:
-            # the march is there all the same
+            # the history is there all the same
             reason = describe_error(error)
         spent = computing_time() - began
     if direct is not None and not reason:
         return direct
-    marched = march_wear(
-        model,
-        friction_coefficient,
-        start,
-        wear_coefficient,
-        np.inf,
-        "adaptive",
-        end,
-        settings,
-        loops=loops,
-        keep=keep,
-        resume=resume,
-        law=law,
-    )
+    integrated = integrate_wear(model, friction_coefficient, settings, start, asked, keep, resume)
     remark = f"no active set: {reason}" if reason else ""
-    if direct is not None and direct.worn_volume[-1] > 0.0 and np.isfinite(marched.worn_volume[-1]):
-        volumes = 1e9 * direct.worn_volume[-1], 1e9 * marched.worn_volume[-1]
-        apart = float(np.abs(direct.wear_depth[-1] - marched.wear_depth[-1]).max())
+    if direct is not None and direct.worn_volume[-1] > 0.0 and np.isfinite(integrated.worn_volume[-1]):
+        volumes = 1e9 * direct.worn_volume[-1], 1e9 * integrated.worn_volume[-1]
+        apart = float(np.abs(direct.wear_depth[-1] - integrated.wear_depth[-1]).max())
         remark += f"; it has {volumes[0]:.4g} mm3, the march {volumes[1]:.4g} mm3, depths differ by {apart:.2g} m"
-    message = "; ".join(filter(None, (marched.message, remark)))
-    return replace(marched, final_method="march", run_time=marched.run_time + spent, message=message)
+    message = "; ".join(filter(None, (integrated.message, remark)))
+    return replace(integrated, final_method="march", run_time=integrated.run_time + spent, message=message)
 
 
-def _directly(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    start: StartState,
-    wear_coefficient: float,
-    end: ToTheEnd,
-    settings: SolverSettings,
-    loops: tuple[int, ...],
-    law: WearLaw,
-) -> tuple[WearHistory, str]:
+@dataclass(frozen=True)
+class _Found:
+    """The final state of an active set, its unworn state and the outputs of both."""
+
+    unworn: WearState
+    final: WornOff
+    output: DenseOutput
+    reason: str
+
+
+def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHistory, str]:
     """The history by the active set, and why it is not to be taken. Raises NoActiveSetError where there is none."""
-    began, share = computing_time(), end.final_share
-    case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-    trajectory = Trajectory(case, start, wear_coefficient, "implicit", loops, law)
-    trajectory.effort.deadline = began + settings.time_limit
-    outcome = trajectory.begin()
-    if outcome is not Outcome.CONVERGED:
-        raise NoActiveSetError(f"{outcome.meaning} at the unworn state")
-    counts = np.full(end.n_outputs, np.nan)
-    counts[0], counts[-1] = 0.0, 1.0
-    recorder = Recorder(model, counts, start.newton_iterations, start.run_time, "implicit", len(loops))
-    recorder.add(0.0, trajectory.report(), wear_coefficient)
-    unworn = trajectory.point
+    assert start.state is not None
+    assert isinstance(asked.cycles, ToTheEnd)
+    began, share = computing_time(), asked.cycles.final_share
+    work = WearingJoint.of(case, start.state, asked.wear_coefficient, asked.law)
+    work.effort.deadline = began + case.settings.time_limit
+    estimate = Estimate(start.response_error, start.wear_rate_error)
+    state = work.begin(start.state, start.resolution, estimate, accurate=start.outcome is Outcome.CONVERGED)
+    found = _solved(work, state, FullCheck(asked.loops), share)
+    depth = found.final.state.depth
+    # no depth is known better than the states are solved
+    error = np.abs(_reference_depth(work, start, found, share) - depth) + case.settings.tolerance * depth
+    history = _assembled(work, start, asked, found, error)
+    spent = replace(
+        history,
+        newton_iterations=start.newton_iterations + work.effort.iterations,
+        run_time=start.run_time + computing_time() - began,
+    )
+    return spent, found.reason
+
+
+def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float) -> _Found:
+    """The unworn and the final state, both checked, and why they are not to be taken; empty where they are."""
+    first = check(work, state)
+    if isinstance(first, Failure):
+        raise NoActiveSetError(f"{first.outcome.meaning} at the unworn state")
+    unworn, output = first.state, DenseOutput(work.area, None, smooth=False)
+    output.add(0.0, first.report, work.rate(unworn.point.evaluation), 0.0)
     # the wear rate of the final state is round-off: its error counts for what it is beside that of the unworn one
-    trajectory.usual_work = float(unworn.evaluation.slip_work.sum())
-    none = np.zeros(model.contact.n_contact, bool)
-    off = wear_off(trajectory, unworn.evaluation.wear_depth, none, share)
-    reason = failure(trajectory, unworn, off, share)
+    work.usual_work = float(unworn.point.evaluation.slip_work.sum())
+    final = wear_off(work, unworn, unworn.depth, np.zeros(unworn.depth.size, bool), share)
+    reason = failure(work, unworn, final, share)
+    last: Checked | Failure = check(work, final.state)
     for _ in range(WEAR.off_attempts):
-        resolution = trajectory.case.resolution
-        outcome = trajectory.check()
-        if outcome is not Outcome.CONVERGED or trajectory.case.resolution == resolution:
+        if isinstance(last, Failure) or last.state.resolution == final.state.resolution:
             break
         # other harmonics move the pairs otherwise, and they graze at other depths
-        off = wear_off(trajectory, unworn.evaluation.wear_depth, off.off, share)
-    if outcome is Outcome.CONVERGED:
-        outcome = trajectory.stability()
-    if outcome is not Outcome.CONVERGED:
-        reason = reason or f"its final state is {outcome.meaning}"
-    recorder.add(1.0, trajectory.report(), wear_coefficient, 0.0)
-    depth = trajectory.point.evaluation.wear_depth
-    # no depth is known better than the states are solved
-    error = np.abs(_coarser(trajectory, start, share) - depth) + settings.tolerance * depth
-    history = recorder.finish(
-        outcome,
-        np.nan,
-        trajectory.effort.iterations,
-        computing_time() - began,
-        np.zeros_like(recorder.kept["wear_depth"]),
-    )
-    return _finished(history, trajectory, start, error), reason
+        final = wear_off(work, last.state, unworn.depth, final.off, share)
+        last = check(work, final.state)
+    if isinstance(last, Failure):
+        raise NoActiveSetError(f"its final state is {last.outcome.meaning}")
+    if (unstable := unstable_at_end(work, last.state)) is not None:
+        reason = reason or f"its final state is {unstable.outcome.meaning}"
+    output.add(1.0, last.report, work.rate(last.state.point.evaluation), 0.0)
+    return _Found(unworn, replace(final, state=last.state), output, reason)
 
 
-def _coarser(trajectory: Trajectory, start: StartState, share: float) -> FloatArray:
-    """Final depths (n_contact,), m, from the state of the coarser sweep with fewer harmonics; NaN if not found."""
-    resolution = fewer(trajectory.case.resolution, SolverSettings())
-    if resolution.highest < RESOLUTION.first_harmonics:
-        resolution = trajectory.case.resolution
-    coarse = replace(start, state=start.coarse or start.state)
-    first = Trajectory(
-        trajectory.case.at(start.resolution), coarse, trajectory.wear_coefficient, "implicit", (), trajectory.wear_law
-    )
-    first.effort = trajectory.effort
-    nothing = np.full(trajectory.slip_work_error.size, np.nan)
-    first.step_limit = trajectory.step_limit
-    first.take_start()
-    case = first.case.at(resolution)
-    joint = case.joint(first.joint.omega, first.joint.excitation_amplitude)
-    moved = move_point(first.case, case, joint, first.point, first.effort)
-    if moved is None:
-        return nothing
-    first.case, first.joint, first.point, first.solver = case, joint, moved, JacobianSolver()
-    unworn = moved.evaluation.wear_depth
-    first.accept(moved, 0.0)
+def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share: float) -> FloatArray:
+    """Final depths (n_contact,), m, of the reference solution, which starts from the state of the reference sweep with
+    fewer harmonics; NaN if not found.
+    """
+    begin = start.coarse or start.state
+    assert begin is not None
+    limit = found.unworn.step_limit
+    first = work.begin(begin, start.resolution, NOTHING, accurate=True, step_limit=limit)
+    state = with_harmonics(work, first, coarser(found.final.state.resolution))
+    if state is None:
+        return np.full(first.depth.size, np.nan)
+    state = work.noted(state)
     try:
-        return wear_off(first, unworn, np.zeros(unworn.size, bool), share).point.evaluation.wear_depth
+        return wear_off(work, state, state.depth, np.zeros(state.depth.size, bool), share).state.depth
     except NoActiveSetError:
-        return nothing
+        return np.full(first.depth.size, np.nan)
 
 
-def _finished(history: WearHistory, trajectory: Trajectory, start: StartState, error: FloatArray) -> WearHistory:
-    """The history with its count and errors. error (n_contact,): m, of the final depths."""
-    volume, area = float(history.worn_volume[-1]), trajectory.joint.contact.area
-    relative = float(error @ area) / volume if volume > 0.0 else 0.0
-    errors, depths = history.worn_volume_error.copy(), history.wear_depth_error.copy()
-    errors[0], errors[-1] = 0.0, relative
-    depths[0], depths[-1] = 0.0, error
-    cycles = history.cycles.copy()
-    # the recorder has the final state at count 1
-    cut_off = history.cut_off_cycle if history.cut_off_cycle != cycles[-1] else np.inf
-    cycles[-1] = np.inf
-    outcome, message = history.outcome, ""
-    if outcome is Outcome.CONVERGED and relative > SENSITIVE_ERROR:
-        outcome, message = Outcome.SENSITIVE, "the worn volume is another one with fewer harmonics and a coarser sweep"
-    elif outcome is Outcome.CONVERGED and not trajectory.accurate:
-        outcome = Outcome.INACCURATE
-        rtol = trajectory.case.settings.rtol
-        message = f"the response in the final state {known_to(trajectory.estimate.response, rtol)}"
-    ended = replace(
-        history,
-        outcome=outcome,
-        message=message,
-        cycles=cycles,
-        last_cycle=float("inf"),
+def _assembled(work: WearingJoint, start: StartState, asked: SlowTime, found: _Found, error: FloatArray) -> WearHistory:
+    """The history of the unworn and the final state. error (n_contact,): m, of the final depths."""
+    assert isinstance(asked.cycles, ToTheEnd)
+    counts = np.full(asked.cycles.n_outputs, np.nan)
+    # the output has the final state at count 1
+    counts[0], counts[-1] = 0.0, 1.0
+    own, state, area = found.output.read(counts), found.final.state, work.area
+    cut_off = first_cut_off(work.case.model.contact, counts, own["mean_pressure"], own["wear_depth"])
+    counts[-1] = math.inf
+    volume = own["wear_depth"] @ area
+    relative = float(error @ area) / float(volume[-1]) if volume[-1] > 0.0 else 0.0
+    relative = math.inf if math.isnan(relative) else relative
+    errors, depths = np.full(counts.size, np.nan), np.full(own["wear_depth"].shape, np.nan)
+    errors[0], errors[-1], depths[0], depths[-1] = 0.0, relative, 0.0, error
+    history = WearHistory(
+        **{name: own[name] for name in own if name not in ("local", "depth_rate")},
+        outcome=Outcome.CONVERGED,
+        cycles=counts,
+        worn_volume=volume,
         worn_volume_error=errors,
         wear_depth_error=depths,
+        reference_volume=np.where(np.isfinite(errors), volume + errors * volume, np.nan),
         error_estimate=relative,
+        newton_iterations=0,
+        run_time=0.0,
+        last_cycle=math.inf,
+        jump_cycle=math.nan,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
-        step_limit=trajectory.step_limit if trajectory.step_limit > 0.0 else float("inf"),
+        step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
         final_method="active_set",
-        cut_off_cycle=cut_off,
+        cut_off_cycle=math.inf if cut_off == 1.0 else cut_off,
+        inaccurate_from=state.inaccurate_from,
+        inaccurate_in="response",
+        inaccurate_error=state.worst.response,
     )
-    return judge_cut_off(ended)
+    rows = np.flatnonzero(np.isfinite(volume))
+    outcome, message = judge(history, rows, work.case.settings.rtol)
+    return replace(history, outcome=outcome, message=message)
