@@ -30,8 +30,6 @@ class WearOptions:
     """Newton iterations of a step: one that takes more is shortened. What a march may spend grows by them each step."""
 
     # Euler steps
-    extrapolated_iterations: int = 8
-    """Newton iterations of an Euler step from an extrapolated start; more of them, and the step is divided instead."""
     arnoldi_products: int = 16
     """Linear solves for the limit of the explicit step."""
     largest_moved_load: float = 10.0
@@ -40,9 +38,10 @@ class WearOptions:
     advised_moved_load: float = 0.1
     """Of the normal forces, of a step that is advised: the usual one of the dovetail root moves 0.001 to 0.01."""
 
-    # march
-    march_iterations: int = 3000
-    """Newton iterations of a march beside `step_iterations` for each step: one that takes more leads nowhere."""
+    # history
+    history_iterations: int = 3000
+    """Newton iterations of a history beside `step_iterations` for each step, and of its reference solution beside those
+    of the history: more lead nowhere. A travelling wave at its resonance: 1400 in a corner within 500 cycles."""
     iterations_per_save: int = 100
     """Newton iterations after which the factorisation kept from step to step is given up, so that a march can be kept
     on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing."""
@@ -62,7 +61,7 @@ class WearOptions:
     no_wear: float = 1e-12
     """Of the same: a joint that wears less sticks."""
 
-    # marches to the end
+    # steady state
     steady_rate: float = 0.01
     """Relative change of the wear rate of a joint that slips everywhere, over the last nine tenths of its worn volume,
     below which it has become steady and does not end."""
@@ -102,8 +101,6 @@ class WearOptions:
     jump_change: float = 0.05
     """Relative change of the vibration beyond the end of a branch that is a jump: corners at which the branch folds
     back a little are none, and there may be many of them."""
-    most_jumps: int = 12
-    """Jumps of a march."""
     jump_iterations: int = 800
     """Newton iterations of the search for the state behind a jump: one that takes more leads nowhere."""
 
@@ -121,12 +118,6 @@ class WearOptions:
     course_steps: int = 256
     """Ends of steps at which a history is compared with its reference solution, at most; an adaptive history of 1e5
     cycles has about 100."""
-    target_resolution: float = 1e-12
-    """Of a step: how exactly the count is found at which it reaches a target; no more than its ends are known."""
-
-    # reference solution
-    reference_iterations: int = 2500
-    """Newton iterations that the reference solution may take beyond those of the history."""
 
 
 WEAR = WearOptions()

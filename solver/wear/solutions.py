@@ -165,7 +165,7 @@ class Solutions:
             DenseOutput(work.area, self._compared(fine), smooth=smooth),
             lambda progress: self._save(integration, work, progress, fine),
             bounded=False,
-            most_iterations=fine.iterations + WEAR.reference_iterations,
+            most_iterations=fine.iterations + WEAR.history_iterations,
         )
         limit = fine.state.step_limit
         return self._run(integration, work, lambda: begin_reference(work, self.start, limit))

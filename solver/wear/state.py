@@ -52,7 +52,7 @@ class WearState:
     judged_h (n_rel, 2H+1): predicted force, N, of the state whose stability was judged last; None before.
     hold: soft hold of the mean position of a joint that slides all over; None for none.
     held_from: count from which on the joint is held, NaN if never.
-    n_jumps, jump_cycle: jumps to another branch so far, and the count of the first, NaN if none.
+    jump_cycle: count of the first jump to another branch, NaN if none.
     inaccurate_from: count from which on harmonics and samples no longer bring the errors below rtol, inf if never.
     worst: the largest errors from there on.
     """
@@ -71,7 +71,6 @@ class WearState:
     judged_h: FloatArray | None = None
     hold: Hold | None = None
     held_from: float = float("nan")
-    n_jumps: int = 0
     jump_cycle: float = float("nan")
     inaccurate_from: float = float("inf")
     worst: Estimate = NOTHING
