@@ -1,8 +1,12 @@
-"""One step along frequency or excitation to a stable state: naturally, through folds, or where the joint settles."""
+"""One step of a loading path: from a stable state to a stable state at another frequency or excitation.
+
+`LoadingPath.solve` solves one balance, from the line through the last states. Where Newton's method fails or the state
+is unstable, `LoadingPath.step` searches: by smaller natural steps, by arc length through folds, and in time.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +15,12 @@ from solver.continuation.arc_length import follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
-from solver.harmonic_balance.converged import PathPoint, vibration_change
+from solver.harmonic_balance.converged import PathPoint, final_history, history_at_rest, vibration_change
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.options import LOADING
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Effort, solve_balance
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.stability.hill import is_stable
@@ -33,7 +37,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Route:
+class LoadingPath:
     """The unworn joint along its frequency (parameter: rad/s; omega: None) or, at a frequency omega, rad/s, along its
     excitation (parameter: load factor, of excitation_amplitude, N).
     """
@@ -57,9 +61,56 @@ class Route:
         """What lengths of steps are relative to."""
         return abs(parameter) if self.omega is None else 1.0
 
+    def solve(
+        self,
+        nodes: tuple[PathPoint, ...],
+        target: float,
+        solver: JacobianSolver,
+        effort: Effort,
+        tolerance: float | None = None,
+    ) -> PathPoint | None:
+        """Stable state at a value of the parameter, by Newton's method alone; None where there is none so near.
+
+        Parameters
+        ----------
+        nodes : tuple of PathPoint
+            One or two states of the branch with the same harmonics: Newton's method begins on the line through them.
+            The pairs have the tangential history of the last one.
+        target : float
+            Value of the parameter.
+        solver, effort
+            As in `solve_balance`.
+        tolerance : float, optional
+            Of the scaled residual; that of the settings by default.
+        """
+        start = nodes[-1]
+        joint, begin = self.joint_at(target), start.evaluation.predicted_h
+        balance = Balance.frozen(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
+        if len(nodes) > 1:
+            ratio = (target - start.parameter) / (start.parameter - nodes[0].parameter)
+            begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
+        limit = self.case.settings.tolerance if tolerance is None else tolerance
+        result = solve_balance(balance, begin, solver, limit, effort, CONTINUATION.near_iterations)
+        if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
+            return None
+        return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
+
+    def reach(
+        self,
+        nodes: tuple[PathPoint, ...],
+        target: float,
+        solver: JacobianSolver,
+        effort: Effort,
+        tolerance: float | None = None,
+    ) -> Step | Outcome:
+        """Stable state at a target from the last of some nodes, by `solve` or else by `step`; or why there is none."""
+        point = self.solve(nodes, target, solver, effort, tolerance)
+        return self.step(nodes[-1], target, solver, effort) if point is None else Step(point)
+
     def step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | Outcome:
         """Stable state at a target from a state of the same harmonics and samples, or why there is none."""
         tolerance = self.case.settings.tolerance
+        start = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
         scale = self.scale(target)
         folds: list[float] = []
 
