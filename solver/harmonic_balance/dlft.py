@@ -21,12 +21,13 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.harmonic_balance.options import BALANCE
-from solver.model import ComplexArray, FloatArray, IntArray, Matrix
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from solver.packing import packable
 from solver.structure.joint import Joint
 
@@ -162,8 +163,11 @@ class Linearisation:
 
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        change = np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2))
-        return np.flatnonzero(change > BALANCE.passive)
+        return self._active
+
+    @cached_property
+    def _active(self) -> IntArray:
+        return np.flatnonzero(differs_from_identity(self.force_tangent, BALANCE.passive))
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
@@ -260,3 +264,20 @@ def _complex_part(tangent: FloatArray) -> ComplexArray:
     """Complex-linear part (..., 3, 3) of a real map (..., 3, 2, 3, 2) between amplitudes `cosine - i sine`."""
     cc, cs, sc, ss = tangent[:, :, 0, :, 0], tangent[:, :, 0, :, 1], tangent[:, :, 1, :, 0], tangent[:, :, 1, :, 1]
     return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))
+
+
+@njit(cache=True)
+def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
+    """Which of the matrices (n, k, k) differ from the identity by more than `by` in an entry."""
+    n, k, _ = matrices.shape
+    differs = np.zeros(n, np.bool_)
+    for place in range(n):
+        for row in range(k):
+            for column in range(k):
+                # the negation finds what is not a number as well
+                if not abs(matrices[place, row, column] - (row == column)) <= by:
+                    differs[place] = True
+                    break
+            if differs[place]:
+                break
+    return differs
