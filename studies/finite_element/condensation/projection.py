@@ -17,8 +17,8 @@ from scipy import sparse
 from scipy.linalg import blas, qr
 
 from solver.model import IntArray
-from studies.scenes.finite_element.condensation.dissection import Front, dofs_of
-from studies.scenes.finite_element.condensation.factor import (
+from studies.finite_element.condensation.dissection import Front, dofs_of
+from studies.finite_element.condensation.factor import (
     Dense,
     Factor,
     add_lower,
@@ -26,7 +26,7 @@ from studies.scenes.finite_element.condensation.factor import (
     solve_lower,
     times,
 )
-from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
+from studies.finite_element.condensation.ordered_form import OrderedForm
 
 _LARGE = 1400  # displacements of a boundary to which it costs more to condense forms than to follow combined shapes
 _ROUND_OFF = 1e-14  # of a unit displacement of the boundary: what shapes may lose

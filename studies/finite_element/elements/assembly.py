@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solver.model import FloatArray, IntArray
-from studies.fe_models.elements.element_matrices import ElementBatch, smallest_jacobians
-from studies.fe_models.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
-from studies.fe_models.elements.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.elements.element_matrices import ElementBatch, smallest_jacobians
+from studies.finite_element.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
+from studies.finite_element.elements.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
 _BATCH_BYTES = 32 * 2**20  # of intermediate arrays at a time

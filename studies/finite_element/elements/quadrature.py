@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.model import FloatArray
-from studies.scenes.finite_element.hex_element import GAUSS_POINTS
+from studies.finite_element.elements.hex_element import GAUSS_POINTS
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import FloatArray, Matrix
-from studies.fe_models.joint.ordering import KeptCoordinates, OrderedStructure
-from studies.scenes.finite_element.condensation.factor import (
+from studies.finite_element.condensation.factor import (
     Factor,
     FrontFactor,
     NotPositiveDefiniteError,
@@ -25,9 +24,10 @@ from studies.scenes.finite_element.condensation.factor import (
     solve_lower,
     times,
 )
-from studies.scenes.finite_element.condensation.modes import lowest_modes
-from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
-from studies.scenes.finite_element.condensation.projection import Projection
+from studies.finite_element.condensation.modes import lowest_modes
+from studies.finite_element.condensation.ordered_form import OrderedForm
+from studies.finite_element.condensation.projection import Projection
+from studies.finite_element.joint.ordering import KeptCoordinates, OrderedStructure
 
 _BLOCK = 8  # modes are looked for with so many vectors at a time
 _SMALL = 900  # displacements of a structure whose modes are found by dense matrices
@@ -206,15 +206,18 @@ class Reduction:
     def _modes(self, glued: GluedStructure, followers: sparse.csr_matrix, n_modes: int) -> tuple[FloatArray, Matrix]:
         """Frequencies and modes in the order of elimination, their phase fixed by what a random vector sees of them."""
         mass = (followers.conj().T @ self.forms["mass"] @ followers).tocsr()
-        rng = np.random.default_rng(0)
         # A singular mass leaves nothing of some vectors: those that inertia drives all have mass.
-        random = mass @ rng.standard_normal((mass.shape[0], _BLOCK)).astype(glued.last.lower.dtype)
+        random = mass @ np.random.default_rng(0).standard_normal((mass.shape[0], _BLOCK)).astype(glued.last.lower.dtype)
         if mass.shape[0] <= _SMALL:
             squares, modes = _all_modes(glued, mass.toarray().astype(random.dtype), n_modes)
         else:
             squares, modes = lowest_modes(glued.solve, lambda vectors: mass @ vectors, glued.solve(random), n_modes)
-        sees = rng.standard_normal(self.ordered.supports.n_nodes * 3).reshape(-1, 3)[self.ordered.free].ravel()
-        seen = sees @ modes
+        # No mode is orthogonal to a random vector: the component along the vector is made real and positive. The vector
+        # has entries at nodes that follow no other only: it is the same, whether cut faces are kept or eliminated.
+        sees = np.zeros((self.ordered.supports.n_nodes, 3))
+        leading = self.ordered.leading
+        sees[leading] = np.random.default_rng(0).standard_normal((len(leading), 3))
+        seen = sees[self.ordered.free].ravel() @ modes
         return np.sqrt(squares), modes * (seen.conj() / np.abs(seen))
 
 

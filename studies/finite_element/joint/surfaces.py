@@ -12,12 +12,12 @@ from functools import cached_property
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
-from studies.fe_models.elements.reference_element import HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
-from studies.fe_models.elements.solid_mesh import SolidMesh
+from studies.finite_element.elements.hex_element import CORNERS
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.elements.reference_element import HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
+from studies.finite_element.elements.solid_mesh import SolidMesh
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scenes.finite_element.hex_element import CORNERS
 
 
 @dataclass(frozen=True)

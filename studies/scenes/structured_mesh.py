@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,18 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray
-from studies.scenes.finite_element.assembly import HexMesh
+
+
+@dataclass(frozen=True)
+class HexMesh:
+    """Nodes and elements.
+
+    nodes (n_nodes, 3): m. elements (n_elements, 8): corner nodes in the order of `elements.hex_element.CORNERS`.
+    """
+
+    nodes: FloatArray
+    elements: IntArray
+
 
 # Points closer than this, in m, are one node.
 _SAME_NODE = 1e-9

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.scenes.finite_element.condensation.dissection import Dissection, Front
+from studies.finite_element.condensation.dissection import Dissection, Front
 
 
 @dataclass(frozen=True)

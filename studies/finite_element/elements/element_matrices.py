@@ -1,7 +1,7 @@
 """Element matrices of a batch of elements of one kind and one material.
 
 Displacements stand node by node in x, y, z. Stress is a full tensor (3, 3), Pa. Integration as in `kinds`. Elements
-with incompatible modes are those of `studies.scenes.finite_element.hex_element`.
+with incompatible modes are those of `studies.finite_element.elements.hex_element`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from solver.model import FloatArray
-from studies.fe_models.elements.kinds import ElementKind
-from studies.fe_models.elements.solid_mesh import Material
-from studies.scenes.finite_element.hex_element import HexElements, elasticity_matrix
+from studies.finite_element.elements.hex_element import HexElements, elasticity_matrix
+from studies.finite_element.elements.kinds import ElementKind
+from studies.finite_element.elements.solid_mesh import Material
 
 _TENSOR = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]  # of a stress vector in the order of `hex_element`
 
@@ -48,7 +48,7 @@ class ElementBatch:
     def _hexes(self) -> HexElements:
         material = self.material
         elasticity = elasticity_matrix(material.young_modulus, material.poisson_ratio)
-        return HexElements(self.coordinates, elasticity, material.density)
+        return HexElements(self.coordinates, elasticity)
 
     @cached_property
     def _geometry(self) -> tuple[FloatArray, FloatArray]:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.elements.solid_mesh import Rotation, SolidMesh
-from studies.fe_models.joint.cut_faces import CutFaces
-from studies.fe_models.joint.pairing import ContactSurfaces
+from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,15 @@ class MeshModel:
     rotation: None where it stands still. prestress: whether the stress and the displacements of the glued structure
     under the centrifugal load, and spin softening, are part of its stiffness. preload (3 n_nodes,): constant forces
     beside the centrifugal ones, N; they are no part of the prestress, as what presses on gaps and flanks does so
-    otherwise on a glued structure.
+    otherwise on a glued structure. layers (n_nodes, n_directions): place of each node in a structured grid, by which
+    the order of elimination is chosen; by the coordinates if None.
     """
 
     mesh: SolidMesh
     rotation: Rotation | None = None
     prestress: bool = True
     preload: FloatArray | None = None
+    layers: IntArray | None = None
 
     @property
     def coordinates(self) -> FloatArray:
@@ -92,7 +94,8 @@ class JointDefinition:
 
     contacts: at least one. held (n_nodes, 3): displacements that are 0. load: of 1 N. responses: by name. cut: cut
     faces, None where the structure is no cyclic sector. along (3,): direction near the first tangents; the axis of
-    rotation or of the cyclic structure if None, else z. retainer: None for none. ties: surfaces glued for good.
+    rotation or of the cyclic structure if None, else z. retainer: None for none. ties: surfaces glued for good. pairs:
+    the pairs of the contacts in an order and with frames of one's own; as `build_contact_pairs` finds them if None.
     """
 
     contacts: tuple[ContactSurfaces, ...]
@@ -103,6 +106,7 @@ class JointDefinition:
     along: FloatArray | None = None
     retainer: Retainer | None = None
     ties: tuple[ContactSurfaces, ...] = ()
+    pairs: ContactPairs | None = None
 
 
 @dataclass(frozen=True)

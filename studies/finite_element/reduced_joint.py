@@ -17,7 +17,7 @@ from solver.model import (
     ReducedModel,
     needed_nodal_diameters,
 )
-from studies.fe_models.elements.assembly import (
+from studies.finite_element.elements.assembly import (
     assemble_mass,
     assemble_stiffness,
     assemble_tangent_stiffness,
@@ -25,8 +25,18 @@ from studies.fe_models.elements.assembly import (
     check_elements,
     spin_softening,
 )
-from studies.fe_models.elements.solid_mesh import Rotation
-from studies.fe_models.fe_model import (
+from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.ordering import (
+    Supports,
+    consistent_supports,
+    order_structure,
+    pairs_of_sector,
+    ties_of_structure,
+)
+from studies.finite_element.joint.pairing import ContactPairs, build_contact_pairs
+from studies.finite_element.joint.reduction import GluedStructureError, Reduction
+from studies.finite_element.joint_model import (
     JointDefinition,
     MatrixModel,
     MeshModel,
@@ -34,16 +44,6 @@ from studies.fe_models.fe_model import (
     ReductionOptions,
     Retainer,
 )
-from studies.fe_models.joint.ordering import (
-    OrderedStructure,
-    Supports,
-    consistent_supports,
-    order_structure,
-    pairs_of_sector,
-    ties_of_structure,
-)
-from studies.fe_models.joint.pairing import ContactPairs, build_contact_pairs
-from studies.fe_models.joint.reduction import GluedStructureError, Reduction
 from studies.scene_answers import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
@@ -68,12 +68,14 @@ class PreparedModel:
     """A model, ready to be reduced at any nodal diameter.
 
     reduction: with the forms "stiffness", "mass", and "elastic" where prestress is no part of it. static_load
-    (3 n_nodes,): N. at_rest: the reduction without prestress, None where that is the same.
+    (3 n_nodes,): N. at_rest: the reduction without prestress, None where that is the same. rotation: None where the
+    model stands still.
     """
 
     reduction: Reduction
     static_load: FloatArray
     at_rest: Reduction | None
+    rotation: Rotation | None
 
     @property
     def pairs(self) -> ContactPairs:
@@ -108,9 +110,9 @@ def build_fe_scene(
             f"use at most n_sectors // 2 = {n_sectors // 2}" if n_sectors else "only a cyclic sector has one: use 0"
         )
         raise SceneError("nodal_diameter", str(excited), remedy)
-    prepared = prepare_model(model, joint, progress)
-    pairs, n_nodes = prepared.pairs, len(model.numbers)
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
+    prepared = prepare_model(model, joint, progress, n_reductions=len({excited, *wanted}))
+    pairs, n_nodes = prepared.pairs, len(model.numbers)
     vectors = [prepared.static_load, joint.load.row(n_nodes), *(each.row(n_nodes) for each in joint.responses.values())]
     linear: dict[int, LinearModel] = {}
     frequencies: dict[int, FloatArray] = {}
@@ -122,7 +124,7 @@ def build_fe_scene(
         try:
             reduced = prepared.reduction.reduce(k, options.n_modes, np.stack(vectors, axis=1))
         except GluedStructureError as error:
-            raise _refused(error, k) from error
+            raise _refused(error, k, model.rotation) from error
         frequencies[k] = reduced.frequencies / (2.0 * np.pi)
         if k == excited:
             damping = options.loss_factor / reduced.frequencies[0]
@@ -150,41 +152,50 @@ def build_fe_scene(
     )
 
 
-def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
+def prepare_model(
+    model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent, n_reductions: int = 1
+) -> PreparedModel:
     """Pairs, order of elimination and matrices of a model.
+
+    n_reductions: at how many nodal diameters the model will be reduced.
 
     Raises SceneError where the model describes no possible joint.
     """
     progress("pairing of the contact surfaces")
-    pairs = build_contact_pairs(model.coordinates, model.numbers, joint.contacts, _along(model, joint))
-    supports = consistent_supports(Supports(model.numbers, joint.held, joint.cut))
+    pairs = joint.pairs
+    if pairs is None:
+        pairs = build_contact_pairs(model.coordinates, model.numbers, joint.contacts, _along(model, joint))
+    supports = consistent_supports(Supports(model.numbers, joint.held, joint.cut, n_reductions))
     pairs = pairs_of_sector(pairs, supports)
     ties = None
     if joint.ties:
         glued = build_contact_pairs(model.coordinates, model.numbers, joint.ties, _along(model, joint))
         ties = ties_of_structure(glued, supports, pairs)
     if isinstance(model, MatrixModel):
-        ordered = _order(supports, pairs, ties, model.coordinates, model.stiffness, model.mass)
+        coupled = _couplings(model.stiffness) + _couplings(model.mass)
+        ordered = order_structure(supports, pairs, ties, coupled, _layers(model.coordinates, coupled, joint.cut))
         forms = {"stiffness": model.stiffness, "mass": model.mass}
         places = np.nan_to_num(model.coordinates, nan=np.nan)
-        return PreparedModel(Reduction(ordered, forms), _static_load(model.mass, places, model), None)
+        return PreparedModel(Reduction(ordered, forms), _static_load(model.mass, places, model), None, model.rotation)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
     elastic, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    ordered = _order(supports, pairs, ties, model.coordinates, elastic, mass)
+    coupled = _couplings(elastic)
+    layers = _layers(model.coordinates, coupled, joint.cut) if model.layers is None else model.layers.astype(float)
+    ordered = order_structure(supports, pairs, ties, coupled, layers)
     load = _static_load(mass, model.coordinates, model)
     still = Reduction(ordered, {"stiffness": elastic, "mass": mass})
     if not model.prestress or model.rotation is None:
-        return PreparedModel(still, load, None)
+        return PreparedModel(still, load, None, model.rotation)
     progress("static state of the glued structure under the centrifugal load")
     try:
         displacements = still.solve_static(_centrifugal_load(mass, model.coordinates, model.rotation))
     except GluedStructureError as error:
-        raise _refused(error, 0) from error
+        raise _refused(error, 0, model.rotation) from error
     progress("assembly of the prestressed stiffness")
     stiffness = assemble_tangent_stiffness(model.mesh, displacements) + spin_softening(mass, model.rotation)
     forms = {"stiffness": stiffness.tocsr(), "mass": mass, "elastic": elastic}
-    return PreparedModel(Reduction(ordered, forms), load, still)
+    return PreparedModel(Reduction(ordered, forms), load, still, model.rotation)
 
 
 def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:
@@ -195,7 +206,7 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
     try:
         return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
     except GluedStructureError as error:
-        raise _refused(error, nodal_diameter) from error
+        raise _refused(error, nodal_diameter, prepared.rotation) from error
 
 
 def natural_frequencies(prepared: PreparedModel) -> NaturalFrequencies:
@@ -212,22 +223,17 @@ def natural_frequencies(prepared: PreparedModel) -> NaturalFrequencies:
     return NaturalFrequencies(nodal_diameters, frequencies)
 
 
-def _order(
-    supports: Supports,
-    pairs: ContactPairs,
-    ties: ContactPairs | None,
-    coordinates: FloatArray,
-    stiffness: sparse.csr_matrix,
-    mass: sparse.csr_matrix,
-) -> OrderedStructure:
-    coupled = _couplings(stiffness) + _couplings(mass)
+def _layers(coordinates: FloatArray, coupled: sparse.csr_matrix, cut: CutFaces | None) -> FloatArray:
+    """Coordinates (n_nodes, n_directions) in which layers of a mesh are looked for, over its extent.
+
+    They are rounded, so that layers of a regular mesh are layers.
+    """
     positions = _positions(coordinates, coupled)
     extent = np.ptp(positions, axis=0).max()
     directions = [positions]
-    if supports.cut is not None:
-        directions.append(supports.cut.axis.cylinder(positions) * [1.0, extent, 1.0])
-    # without round-off, so that layers of a regular mesh are layers
-    return order_structure(supports, pairs, ties, coupled, np.round(np.hstack(directions) / extent, 7))
+    if cut is not None:
+        directions.append(cut.axis.cylinder(positions) * [1.0, extent, 1.0])
+    return np.asarray(np.round(np.hstack(directions) / extent, 7))
 
 
 def _couplings(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
@@ -319,9 +325,10 @@ def _summary(
     )
 
 
-def _refused(error: GluedStructureError, nodal_diameter: int) -> SceneError:
+def _refused(error: GluedStructureError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:
     if error.unstable:
-        return SceneError("rotation_speed", f"at nodal diameter {nodal_diameter} {error}", "reduce the speed")
+        speed = "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
+        return SceneError("rotation_speed", speed, f"reduce it: at nodal diameter {nodal_diameter} {error}")
     return SceneError(
         "clamp",
         f"at nodal diameter {nodal_diameter} {error}",

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.scenes.finite_element.hex_element import CORNERS
+from studies.finite_element.elements.hex_element import CORNERS
 
 Edges = tuple[tuple[int, int], ...]
 

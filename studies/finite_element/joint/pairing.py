@@ -9,8 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.joint.closest_point import closest_points
-from studies.fe_models.joint.surfaces import Surface
+from studies.finite_element.joint.closest_point import closest_points
+from studies.finite_element.joint.surfaces import Surface
 from studies.scene_error import SceneError
 
 _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, where none is given
@@ -23,7 +23,8 @@ class ContactSurfaces:
     first, second: the finer one moves, the first where they are alike, the other one where it alone is covered.
     tolerance: largest distance of a node that is paired, m; a share of the size of a facet if None.
     friction_coefficient: of these surfaces, None where one is given for all. with_gaps: distances in the mesh are gaps
-    of the joint; else they are the error of facets on curved surfaces, and the pairs touch.
+    of the joint; else they are the error of facets on curved surfaces, and the pairs touch. label: of the pairs; the
+    names of both surfaces if empty.
     """
 
     first: Surface
@@ -31,11 +32,12 @@ class ContactSurfaces:
     tolerance: float | None = None
     friction_coefficient: float | None = None
     with_gaps: bool = False
+    label: str = ""
 
     @property
     def name(self) -> str:
         """Label of the pairs."""
-        return f"{self.first.name}-{self.second.name}"
+        return self.label or f"{self.first.name}-{self.second.name}"
 
 
 @dataclass(frozen=True)

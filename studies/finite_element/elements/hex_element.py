@@ -29,11 +29,6 @@ _BATCH = 128
 _STRAIN_TERMS = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 0, 1), (3, 1, 0), (4, 1, 2), (4, 2, 1), (5, 0, 2), (5, 2, 0))
 
 
-def shape_functions(points: FloatArray) -> FloatArray:
-    """Values (n_points, 8) of the trilinear shape functions at the reference points (n_points, 3)."""
-    return np.asarray(np.prod(1.0 + points[:, None, :] * CORNERS[None], axis=2) / 8.0)
-
-
 def shape_derivatives(points: FloatArray) -> FloatArray:
     """Derivatives (n_points, 8, 3) of the shape functions by the reference coordinates at points (n_points, 3)."""
     factors = 1.0 + points[:, None, :] * CORNERS[None]
@@ -66,20 +61,12 @@ def _strain_rows(gradients: FloatArray) -> FloatArray:
 class HexElements:
     """Hexahedra of one material.
 
-    coordinates (n_elements, 8, 3): m, corner nodes in the order of `CORNERS`. elasticity (6, 6): Pa. density: kg/m3.
-    incompatible_modes: without them this is the plain trilinear element, which locks in bending.
-
-    Raises ValueError where an element is turned inside out at an integration point.
+    coordinates (n_elements, 8, 3): m, corner nodes in the order of `CORNERS`; the Jacobian determinant is positive at
+    all integration points. elasticity (6, 6): Pa.
     """
 
     coordinates: FloatArray
     elasticity: FloatArray
-    density: float
-    incompatible_modes: bool = True
-
-    def __post_init__(self) -> None:
-        if self.volumes.min(initial=np.inf) <= 0.0:
-            raise ValueError(f"element {int(np.argmin(self.volumes.min(axis=1)))} is turned inside out")
 
     @cached_property
     def _jacobians(self) -> FloatArray:
@@ -129,8 +116,6 @@ class HexElements:
     @cached_property
     def _effective_strains(self) -> FloatArray:
         """Strains (n_elements, 48, 24) from the nodal displacements, incompatible modes condensed."""
-        if not self.incompatible_modes:
-            return self._strains
         return self._strains + self._incompatible_strains @ self._incompatible_from_nodes
 
     def _batches(self) -> Iterator[HexElements]:
@@ -147,26 +132,10 @@ class HexElements:
         matrices = np.swapaxes(strains, 1, 2) @ (self._stresses(strains) * weights)
         return np.asarray(0.5 * (matrices + np.swapaxes(matrices, 1, 2)))
 
-    def mass(self) -> FloatArray:
-        """Consistent mass (n_elements, 8, 8), kg, the same for the three directions."""
-        values = shape_functions(GAUSS_POINTS)
-        products = values[:, :, None] * values[:, None, :]
-        return np.asarray(self.density * np.tensordot(self.volumes, products, axes=(1, 0)))
-
     def stress(self, displacements: FloatArray) -> FloatArray:
         """Stress (n_elements, 8 points, 6), Pa, under nodal displacements (n_elements, 24) in m."""
         parts = []
         for number, batch in enumerate(self._batches()):
             moved = displacements[number * _BATCH : (number + 1) * _BATCH, :, None]
             parts.append(batch._stresses(batch._effective_strains @ moved).reshape(-1, 8, 6))
-        return np.concatenate(parts)
-
-    def geometric_stiffness(self, stress: FloatArray) -> FloatArray:
-        """Geometric stiffness (n_elements, 8, 8), N/m, the same for the three directions, of a stress from `stress`."""
-        parts = []
-        for number, batch in enumerate(self._batches()):
-            own = stress[number * _BATCH : (number + 1) * _BATCH]
-            tensor = own[:, :, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] * batch.volumes[:, :, None, None]
-            terms = batch.gradients @ tensor @ np.swapaxes(batch.gradients, -1, -2)
-            parts.append(terms.sum(axis=1))
         return np.concatenate(parts)

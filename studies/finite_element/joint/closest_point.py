@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.fe_models.joint.surfaces import FACE_SHAPES, Surface, quad_derivatives, quad_values
+from studies.finite_element.joint.surfaces import FACE_SHAPES, Surface, quad_derivatives, quad_values
 
 _CHUNK = 2_000_000  # distances from nodes to facets looked at together
 _NEWTON_STEPS = 8

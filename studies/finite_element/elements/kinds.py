@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from studies.fe_models.elements.quadrature import (
+from studies.finite_element.elements.quadrature import (
     HEX_8_POINTS,
     HEX_27_POINTS,
     TET_1_POINT,
@@ -16,7 +16,7 @@ from studies.fe_models.elements.quadrature import (
     WEDGE_9_POINTS,
     Quadrature,
 )
-from studies.fe_models.elements.reference_element import (
+from studies.finite_element.elements.reference_element import (
     HEX_8,
     HEX_20,
     TET_4,

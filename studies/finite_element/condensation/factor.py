@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, eigvalsh, lapack
 
 from solver.model import BoolArray, IntArray
-from studies.scenes.finite_element.condensation.dissection import Dissection, dofs_of
-from studies.scenes.finite_element.condensation.ordered_form import OrderedForm
+from studies.finite_element.condensation.dissection import Dissection, dofs_of
+from studies.finite_element.condensation.ordered_form import OrderedForm
 
 Dense = NDArray[Any]
 """A dense matrix, real or complex."""
