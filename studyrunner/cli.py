@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.own_modules_only  # noqa: F401 - where all others are looked for
 
 # isort: split
 import sys

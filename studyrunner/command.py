@@ -149,7 +149,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.mpi.hand_out import LostError, take_over
+    from studyrunner.mpi.broadcast import LostError, take_over
     from studyrunner.mpi.version_check import report_version
 
     report_version(ranks)
@@ -167,7 +167,7 @@ def _follow(ranks: Ranks) -> int:
 
 def _show_plan(study: Study) -> int:
     from studyrunner.plan.estimate import largest_memory
-    from studyrunner.plan.printed import format_plan
+    from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.tasks import build_tasks
     from studyrunner.scene.scene import build_study_scene, describe_scene
 
@@ -184,7 +184,7 @@ def _show_plan(study: Study) -> int:
 
 def _check(study: Study) -> int:
     from studyrunner.netcdf.output import check_output
-    from studyrunner.scene.model_check import check_study_model
+    from studyrunner.scene.check_command import check_study_model
 
     picture = Path(f"{study.study.name}.check.png")
     target = check_output("--check", picture, study.files)
@@ -194,8 +194,8 @@ def _check(study: Study) -> int:
 
 
 def _write_scene(study: Study, path: Path) -> int:
+    from studyrunner.netcdf.existing_result import check_scene_file
     from studyrunner.netcdf.output import check_output
-    from studyrunner.netcdf.standing import check_scene_file
     from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
@@ -206,10 +206,10 @@ def _write_scene(study: Study, path: Path) -> int:
 
 
 def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
-    from studyrunner.mpi.hand_out import HandOut
+    from studyrunner.mpi.broadcast import Broadcast
+    from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.netcdf.standing import check_result
     from studyrunner.run import Interrupted, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
@@ -218,7 +218,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = HandOut(ranks, machines, build_study_scene(study, _SlowSteps().say))
+    model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say))
     for line in compare_with_archived(study, model.value):
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:

@@ -18,7 +18,7 @@ from solver.results.cut_off import describe_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.percent import known_to
-from studyrunner.plan.places import describe_reach, show_count
+from studyrunner.plan.point_text import describe_reach, show_count
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import AUTO

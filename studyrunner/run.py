@@ -23,12 +23,12 @@ from studyrunner.mpi.crashes import (
     read_tally,
 )
 from studyrunner.mpi.ranks import Ranks, wait_for_message
-from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
+from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
+from studyrunner.netcdf.existing_result import Target, note_study
 from studyrunner.netcdf.output import parts_folder, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.software import describe_software
-from studyrunner.netcdf.standing import Target, note_study
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
     from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
-    from studyrunner.mpi.hand_out import HandOut
+    from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.gather import Gathered
 
 
@@ -89,7 +89,7 @@ class RunSummary:
 def serve_study(
     ranks: Ranks,
     study: Study,
-    hand_out: HandOut[ReducedModel],
+    broadcast: Broadcast[ReducedModel],
     target: Target,
     progress: ProgressDisplay,
     *,
@@ -106,7 +106,7 @@ def serve_study(
     ----------
     ranks, study
         The ranks, and what they are to compute.
-    hand_out
+    broadcast
         The reduced model of the study's scene, which every rank gets.
     target
         The result file, as `check_result` gives it; beside it is the folder of what an earlier run has left.
@@ -130,7 +130,7 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; what there is has been written.
     """
-    model = hand_out.value
+    model = broadcast.value
     facts = replace(describe_scene(model), static_response=static_response(model))
     plan = build_tasks(study, facts.n_displacements)
     # Before anything else is computed: what the scene cannot tell is bad input.
@@ -176,7 +176,7 @@ def serve_study(
             return _summarise(plan, n_found, gathered, target.finished)
 
         try:
-            hand_out.send()
+            broadcast.send()
             job = Job(study.friction_coefficient, study.wear_law, store.folder)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
@@ -336,5 +336,6 @@ def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, pro
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, tasks.begin(), evaluate, take, tasks.costs, tick, tasks.keep, take_back, is_sick)
+    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick)
+    serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
     completion.store.flush()

@@ -9,7 +9,7 @@ from dataclasses import replace
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mpi.crashes import MOST_DEATHS, Crash
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
 from studyrunner.system.progress import Standing
@@ -33,7 +33,7 @@ class TaskProgress:
     """
 
     def __init__(self, completion: CompletionIndex, n_crashes: Mapping[str, int] | None = None) -> None:
-        self.costs = LearnedCosts()
+        self.costs = CostModel()
         self.branches = completion.branches_left()
         self.n_points = completion.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.packing import Packed
 from studyrunner.checkpoint.records import pack
-from studyrunner.checkpoint.shelf import Place
+from studyrunner.checkpoint.segment_index import Place
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start

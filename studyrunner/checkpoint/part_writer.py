@@ -29,7 +29,7 @@ from studyrunner.checkpoint.packed_files import (
     unpacked_path,
 )
 from studyrunner.checkpoint.part_files import Rows, merge_bundles, merge_records, write_bundle, write_records
-from studyrunner.checkpoint.shelf import PartFile
+from studyrunner.checkpoint.segment_index import PartFile
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
+from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
 
 AHEAD_SECONDS = 0.2
 """A rank holds a second task behind one that takes less: behind a longer one it would wait for no gain."""
@@ -23,8 +23,8 @@ _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
 _WAITING = 1000
 _WAITING_A_RANK = 16
-_FEW_LESSONS = 16
-_LESSONS_SHARE = 8
+_FEW_MEASURED = 16
+_MEASURED_SHARE = 8
 
 
 class Work(Protocol):
@@ -38,8 +38,8 @@ class Work(Protocol):
         """Estimated seconds of its first result, or of one of the others."""
 
     @property
-    def kin(self) -> Kin:
-        """Which tasks it is like, see LearnedCosts."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks, see `CostModel`."""
 
     @property
     def n_results(self) -> int:
@@ -63,24 +63,25 @@ class Assignment(Generic[Task]):
 
 @dataclass
 class _Held(Generic[Task]):
-    """A task that a rank has. began: when its rank took it up, None as long as it waits there.
+    """A task that a rank has.
 
-    n_left: results that it has still to give. lesson: what its being overdue has taught.
+    n_left: number of results that are still to come. began: when the rank began the task, None where the task waits.
+    measurement: what the cost model has learnt from a task that takes longer than expected.
     """
 
     task: Task
     n_left: int
     began: float | None
-    lesson: Lesson | None = None
+    measurement: Measurement | None = None
 
 
 class WaitingTasks(Generic[Task]):
     """Tasks that wait; the one that is expected to take longest comes first, of equal ones the earliest."""
 
-    def __init__(self, costs: LearnedCosts) -> None:
+    def __init__(self, costs: CostModel) -> None:
         self._costs = costs
-        # with its kin, which takes a moment to tell
-        self._tasks: dict[int, tuple[Task, Kin]] = {}
+        # with the keys, which are not computed twice
+        self._tasks: dict[int, tuple[Task, CostKeys]] = {}
         self._order: list[tuple[float, int]] = []
 
     def __len__(self) -> int:
@@ -88,7 +89,7 @@ class WaitingTasks(Generic[Task]):
 
     def add(self, number: int, task: Task) -> None:
         """One more."""
-        self._tasks[number] = task, task.kin
+        self._tasks[number] = task, task.cost_keys
         heapq.heappush(self._order, (-self._expected(*self._tasks[number]), number))
 
     def pop(self) -> tuple[int, Task]:
@@ -98,11 +99,11 @@ class WaitingTasks(Generic[Task]):
 
     def reorder(self) -> None:
         """Puts all of them in the order of what is expected now."""
-        self._order = [(-self._expected(task, kin), number) for number, (task, kin) in self._tasks.items()]
+        self._order = [(-self._expected(task, cost_keys), number) for number, (task, cost_keys) in self._tasks.items()]
         heapq.heapify(self._order)
 
-    def _expected(self, task: Task, kin: Kin) -> float:
-        return task.cost * self._costs.correction(kin)
+    def _expected(self, task: Task, cost_keys: CostKeys) -> float:
+        return task.cost * self._costs.correction(cost_keys)
 
 
 class Dispatcher(Generic[Task]):
@@ -113,12 +114,12 @@ class Dispatcher(Generic[Task]):
     Tasks that may have ended a rank come first of all, but not on rank 0, which all need, while there is another.
     """
 
-    def __init__(self, n_ranks: int, costs: LearnedCosts, clock: Callable[[], float]) -> None:
+    def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
         self._n_ranks = n_ranks
         self._costs = costs
         self._clock = clock
         self._n_known = 0
-        self._n_lessons = 0
+        self._n_measured = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
         self._openers: WaitingTasks[Task] = WaitingTasks(costs)
@@ -155,8 +156,8 @@ class Dispatcher(Generic[Task]):
 
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
         """The ranks that get a task now, and the tasks."""
-        if self._n_lessons >= max(_FEW_LESSONS, len(self._others) // _LESSONS_SHARE):
-            self._n_lessons = 0
+        if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
+            self._n_measured = 0
             self._others.reorder()
         only_0 = self._n_ranks - len(self._shunned - {0}) == 1
         while self._suspects and (rank := next((rank for rank in self._free if rank or only_0), None)) is not None:
@@ -171,19 +172,19 @@ class Dispatcher(Generic[Task]):
             rank, _ = self._ahead.popitem()
             yield rank, self._hand_out(rank)
 
-    def deliver(self, rank: int, number: int, seconds: float, *, teaches: bool = True) -> Task:
+    def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
         """The task of which a rank has sent a result that took it so long.
 
-        teaches: whether others like it may take as long; not where it broke off.
+        typical: whether similar tasks may take as long; not where the task broke off.
         """
         held = self._held[number]
         task = held.task
-        if held.lesson is not None:
-            self._costs.forget(held.lesson)
-            held.lesson = None
-        if teaches:
-            self._costs.learn(task.kin, task.cost_of(first=held.n_left == task.n_results), seconds)
-            self._n_lessons += 1
+        if held.measurement is not None:
+            self._costs.forget(held.measurement)
+            held.measurement = None
+        if typical:
+            self._costs.learn(task.cost_keys, task.cost_of(first=held.n_left == task.n_results), seconds)
+            self._n_measured += 1
         held.n_left -= 1
         held.began = self._clock()
         if held.n_left == 0:
@@ -202,8 +203,8 @@ class Dispatcher(Generic[Task]):
         lost = []
         for number in self._held_by[rank]:
             held = self._held.pop(number)
-            if held.lesson is not None:
-                self._costs.forget(held.lesson)
+            if held.measurement is not None:
+                self._costs.forget(held.measurement)
             lost.append((held.task, held.n_left))
         self._held_by[rank] = []
         self._shunned.discard(rank)
@@ -236,7 +237,8 @@ class Dispatcher(Generic[Task]):
     def watch(self) -> None:
         """Called many times a second: now and then learns from tasks that take longer than expected.
 
-        A march that takes a hundred times as long as most teaches this long before it ends, in time for those like it.
+        A history that takes a hundred times as long as most corrects the cost model long before its end, in time for
+        the order of similar tasks.
         """
         now = self._clock()
         if now < self._next_watch or not self._n_waiting:
@@ -247,11 +249,11 @@ class Dispatcher(Generic[Task]):
             if held.began is None or task.opens_others:
                 continue
             at_least = _AS_LONG_AGAIN * (now - held.began)
-            if at_least > task.cost * self._costs.correction(task.kin):
-                if held.lesson is not None:
-                    self._costs.forget(held.lesson)
-                held.lesson = self._costs.learn(task.kin, task.cost, at_least)
-        self._n_lessons = 0
+            if at_least > task.cost * self._costs.correction(task.cost_keys):
+                if held.measurement is not None:
+                    self._costs.forget(held.measurement)
+                held.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
+        self._n_measured = 0
         self._others.reorder()
 
     @property
@@ -275,5 +277,5 @@ class Dispatcher(Generic[Task]):
         task = self._held[self._held_by[rank][0]].task
         if rank in self._shunned:
             return
-        if task.n_results == 1 and task.cost * self._costs.correction(task.kin) < AHEAD_SECONDS:
+        if task.n_results == 1 and task.cost * self._costs.correction(task.cost_keys) < AHEAD_SECONDS:
             self._ahead[rank] = None

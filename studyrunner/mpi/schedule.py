@@ -18,7 +18,7 @@ from typing import Generic, TypeVar
 
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.cost_model import CostModel
 from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
 from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 
@@ -164,118 +164,157 @@ def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
     return [task for task, _ in lost]
 
 
+@dataclass(frozen=True)
+class Handlers(Generic[Task, Result]):
+    """What rank 0 does with results and messages. All of them are called in the main thread.
+
+    take: called with a task and each of its results, in the order in which results arrive; returns the tasks that the
+        result makes possible.
+    tick: called many times a second with a function that returns the running tasks, as `Dispatcher.running`.
+    keep: called with a task and its progress, or words on its progress; never after the last result of the task.
+    take_back: called with a lost rank and the tasks that it had; returns the tasks to be done instead.
+    is_sick: whether a result of a rank shows that the rank should get no more tasks.
+    """
+
+    take: Callable[[Task, Result], Iterable[Task]]
+    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None
+    keep: Callable[[Task, object], None] = lambda *_: None
+    take_back: TakeBack[Task] = give_again
+    is_sick: Callable[[int, Result], bool] = lambda *_: False
+
+
 def serve_tasks(
     ranks: Ranks,
     tasks: Iterable[Task],
     run: Run[Task, Result],
-    take: Callable[[Task, Result], Iterable[Task]],
-    costs: LearnedCosts,
-    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None,
-    keep: Callable[[Task, object], None] = lambda *_: None,
-    take_back: TakeBack[Task] = give_again,
-    is_sick: Callable[[int, Result], bool] = lambda *_: False,
+    handlers: Handlers[Task, Result],
+    costs: CostModel,
 ) -> None:
-    """Rank 0: has all tasks done, its own ones by `run`, and hands every result to `take`.
+    """Rank 0: has all tasks done and computes some of them.
 
-    An exception on another rank ends that rank's process; one of a task on this rank is raised here.
+    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here.
 
     Parameters
     ----------
     ranks
-        All of them.
+        All ranks.
     tasks
-        Are taken one by one, as there is use for them.
+        Taken one by one, when ranks can use more.
     run
         Gives the results of a task one by one.
-    take
-        Called in the main thread, in the order in which results arrive; returns the tasks that a result makes possible.
+    handlers
+        What is done with results and messages.
     costs
-        Learns what tasks take.
-    tick
-        Called many times a second, with what tells the tasks that run, as `Dispatcher.running`.
-    keep
-        Called with how far a task is, or in words with what it is at; never after its last result.
-    take_back
-        Called with a rank that is lost and the tasks that it had.
-    is_sick
-        Whether a result of a rank tells that it should get no more tasks.
+        Learns the run times of tasks.
 
     Raises
     ------
     KeyboardInterrupt
         Where another rank was interrupted.
     """
-    dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
-    local = _LocalWorker(run, _seconds_to_progress(ranks))
-    known = iter(tasks)
-    lost: frozenset[int] = frozenset()
+    server = _Server(ranks, tasks, run, handlers, costs)
+    try:
+        with uninterrupted():
+            server.begin()
+        while not server.done:
+            with uninterrupted():
+                server.look()
+    except BaseException:
+        server.give_up()
+        raise
+    server.stop()
 
-    def hand_out() -> None:
-        while dispatcher.wants_more and (more := list(itertools.islice(known, _AT_ONCE))):
-            dispatcher.add(more)
-        for rank, assignment in dispatcher.assign():
+
+class _Server(Generic[Task, Result]):
+    """Rank 0: sends tasks, receives results."""
+
+    def __init__(
+        self,
+        ranks: Ranks,
+        tasks: Iterable[Task],
+        run: Run[Task, Result],
+        handlers: Handlers[Task, Result],
+        costs: CostModel,
+    ) -> None:
+        self._ranks = ranks
+        self._waiting = iter(tasks)
+        self._handlers = handlers
+        self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
+        self._local = _LocalWorker(run, _seconds_to_progress(ranks))
+        self._lost: frozenset[int] = frozenset()
+
+    @property
+    def done(self) -> bool:
+        """Whether all tasks are done."""
+        return self._dispatcher.done
+
+    def begin(self) -> None:
+        """Sends the first tasks."""
+        self._do_without_the_lost()
+        self._hand_out()
+
+    def look(self) -> None:
+        """Receives what there is; waits a moment where there is nothing."""
+        if self._ranks.lost != self._lost:
+            self.begin()
+        quiet = False
+        for _ in range(_LOOKS_A_TICK):
+            received, message = self._ranks.receive(), self._local.receive(0.0)
+            if received is not None:
+                self._accept(*received)
+            if message is not None:
+                self._accept(0, message)
+            quiet = received is None and message is None
+            if quiet:
+                break
+        self._dispatcher.watch()
+        self._handlers.tick(self._dispatcher.running)
+        wait = POLL_SECONDS if self._ranks.size > 1 else LONGEST_WAIT
+        if quiet and (message := self._local.receive(wait)) is not None:
+            self._accept(0, message)
+
+    def give_up(self) -> None:
+        """Ends the computing thread of rank 0 before its task is done."""
+        self._local.give_up()
+
+    def stop(self) -> None:
+        """Ends the computing thread of rank 0 and the work of the other ranks."""
+        self._local.stop()
+        for rank in range(1, self._ranks.size):
+            self._ranks.send(None, rank)
+
+    def _hand_out(self) -> None:
+        while self._dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
+            self._dispatcher.add(more)
+        for rank, assignment in self._dispatcher.assign():
             if rank == 0:
-                local.assign(assignment)
+                self._local.assign(assignment)
             else:
-                ranks.send(assignment, rank)
+                self._ranks.send(assignment, rank)
 
-    def do_without_the_lost() -> None:
-        nonlocal lost
-        new, lost = ranks.lost - lost, ranks.lost
+    def _do_without_the_lost(self) -> None:
+        new, self._lost = self._ranks.lost - self._lost, self._ranks.lost
         for rank in sorted(new):
-            dispatcher.add_lost(take_back(rank, dispatcher.lose(rank)))
+            self._dispatcher.add_lost(self._handlers.take_back(rank, self._dispatcher.lose(rank)))
 
-    def accept(rank: int, message: object) -> None:
-        if rank in lost:
-            # sent before it was lost; its task is done again
+    def _accept(self, rank: int, message: object) -> None:
+        if rank in self._lost:
+            # sent before the rank was lost; its task is done again
             return
         if isinstance(message, _Progress):
-            keep(dispatcher.task(message.number), message.progress)
+            self._handlers.keep(self._dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-        sick = is_sick(rank, message.result)
+        sick = self._handlers.is_sick(rank, message.result)
         if sick:
-            dispatcher.shun(rank)
-        task = dispatcher.deliver(rank, message.number, message.seconds, teaches=not sick)
-        dispatcher.add(take(task, message.result))
-        hand_out()
-
-    def look() -> None:
-        if ranks.lost != lost:
-            do_without_the_lost()
-            hand_out()
-        quiet = False
-        for _ in range(_LOOKS_A_TICK):
-            received, message = ranks.receive(), local.receive(0.0)
-            if received is not None:
-                accept(*received)
-            if message is not None:
-                accept(0, message)
-            quiet = received is None and message is None
-            if quiet:
-                break
-        dispatcher.watch()
-        tick(dispatcher.running)
-        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else LONGEST_WAIT)) is not None:
-            accept(0, message)
-
-    try:
-        with uninterrupted():
-            do_without_the_lost()
-            hand_out()
-        while not dispatcher.done:
-            with uninterrupted():
-                look()
-    except BaseException:
-        local.give_up()
-        raise
-    local.stop()
-    for rank in range(1, ranks.size):
-        ranks.send(None, rank)
+            self._dispatcher.shun(rank)
+        task = self._dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
+        self._dispatcher.add(self._handlers.take(task, message.result))
+        self._hand_out()
 
 
 def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:

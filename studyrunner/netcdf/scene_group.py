@@ -8,7 +8,7 @@ import netCDF4
 import numpy as np
 
 from studyrunner.scene.scene import KeptScene
-from studyrunner.study.archive import SCENE_GROUP
+from studyrunner.study.study_of_result import SCENE_GROUP
 
 _COMPLEX = np.dtype([("r", "f8"), ("i", "f8")])
 _SAID = {

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings, ToTheEnd, WearTarget
-from studyrunner.plan.costs import Kin
+from studyrunner.plan.cost_model import CostKeys
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
@@ -33,7 +33,7 @@ from studyrunner.study.study import AUTO, SOLVER_AXES, Study
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
-"""First keys of the kin of tasks, see LearnedCosts."""
+"""Most general keys of tasks in the cost model."""
 
 _NEIGHBOURS = 4  # frequencies whose marches take about as long
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
@@ -87,12 +87,12 @@ class BranchTask:
 
     @property
     def kind(self) -> str:
-        """First key of its kin."""
+        """Most general key in the cost model."""
         return BRANCHES
 
     @property
-    def kin(self) -> Kin:
-        """What its states cost, in general and on this branch."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks: all branches, this branch."""
         return ((self.kind, (self.kind, self.number)),)
 
 
@@ -170,12 +170,12 @@ class MarchTask:
 
     @property
     def kind(self) -> str:
-        """First key of its kin."""
+        """Most general key in the cost model."""
         return MARCHES if self.moves else RESTING
 
     @property
-    def kin(self) -> Kin:
-        """Marches from states that move or rest, with as many unknowns, near this state and from it; with such wear."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks: by motion, unknowns and start state, and by wear coefficient, step and scheme."""
         kind = self.kind
         near, here = (kind, self.branch, "near", self.position // _NEIGHBOURS), (kind, self.branch, self.position)
         wear = (kind, self.wear_coefficient, self.step, self.scheme)

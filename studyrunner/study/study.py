@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, WearTarget
 from studies.fe_models.model_files import ModelFiles
-from studyrunner.study.archive import Archived
+from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import (
     Axis,
     Cycles,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
 from studyrunner.advice import advise_steps
-from studyrunner.plan.places import settings_of
+from studyrunner.plan.point_text import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study

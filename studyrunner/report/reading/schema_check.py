@@ -1,7 +1,7 @@
-"""The door of the report: only what is known of a result file comes in, in the shape that it has to have.
+"""Schema check of the result file that the report reads: known variables of the right shape and type, nothing else.
 
-Names and sentences of the file are text: nothing in them is markup, moves a cursor or breaks a line, and none is longer
-than a label. What the report does not draw is left outside.
+Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
+at most the length of a label. Variables that the report does not draw are left out.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What earlier runs have left in a run's folder."""
+"""Reads what earlier runs have left in a run's folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from studyrunner.checkpoint.packed_files import PACKED, packed_kind, packed_path, unpacked_path
 from studyrunner.checkpoint.part_files import load_keys, load_record_keys
 from studyrunner.checkpoint.part_writer import PARTIAL, PROGRESS, RECORDS, STARTS, PartWriter
-from studyrunner.checkpoint.shelf import PartFile, Shelf
+from studyrunner.checkpoint.segment_index import PartFile, SegmentIndex
 from studyrunner.system import files
 
 _PART = re.compile(r"(\d{8})(-[0-9a-f]{12})?(\.npy|\.starts|\.progress)(\.z)?")
@@ -19,29 +19,31 @@ _OF_ANOTHER_VERSION = re.compile(r"\d{8}\.starts\.npz|[0-9a-f]{32}\.progress\.np
 
 
 @dataclass(frozen=True)
-class Stock:
-    """What is in a folder.
+class FolderContents:
+    """Contents of a run's folder.
 
-    shelves: of each sort of entry. others: records of studies with other variables or lengths. last_number: no file has
-    a larger one. damaged: names of files that do not hold what was written. left_over: files of no use to anybody.
+    indexes: one for each sort of entry. others: files with records of studies with other variables or lengths.
+    last_number: largest number of a file. damaged: names of files that do not hold what was written. left_over: files
+    that no run can use.
     """
 
-    shelves: dict[str, Shelf]
+    indexes: dict[str, SegmentIndex]
     others: list[PartFile]
     last_number: int
     damaged: list[str]
     left_over: list[Path]
 
 
-def take_stock(writer: PartWriter, kind: np.dtype[np.void], *, alone: bool) -> Stock:
-    """Looks through a folder and unpacks what this study can use.
+def read_folder(writer: PartWriter, kind: np.dtype[np.void], *, alone: bool) -> FolderContents:
+    """Reads a folder and unpacks the files that this study can use.
 
-    writer: into the folder. kind: of a record. alone: whether no other run is at work there.
+    writer: writes into the folder. kind: data type of a record. alone: whether no other run uses the folder.
 
-    What is damaged is no more than time lost. A file that cannot be read for another reason is not: raises OSError.
+    A damaged file is skipped: its entries are computed again. Raises OSError where a file cannot be read for another
+    reason, such as a fault of the disk.
     """
     known = sorted(writer.folder.iterdir())
-    shelves = {STARTS: Shelf(), RECORDS: Shelf(), PROGRESS: Shelf()}
+    indexes = {STARTS: SegmentIndex(), RECORDS: SegmentIndex(), PROGRESS: SegmentIndex()}
     others: list[PartFile] = []
     damaged: list[Path] = []
     unpacked: list[Path] = []
@@ -73,16 +75,16 @@ def take_stock(writer: PartWriter, kind: np.dtype[np.void], *, alone: bool) -> S
                 path.unlink(missing_ok=True)
         else:
             if of_this_kind:
-                shelves[match[3]].put(file)
+                indexes[match[3]].put(file)
             else:
                 others.append(file)
     if unpacked:
         # what was unpacked is on the disk before what it was packed in goes
         files.sync_folder(writer.folder)
     left_over = [*unpacked, *(path for path in known if _is_left_over(path))] if alone else []
-    for shelf in shelves.values():
-        left_over += [file.path for file in shelf.take_dead()]
-    return Stock(shelves, others, last, [path.name for path in damaged], left_over)
+    for index in indexes.values():
+        left_over += [file.path for file in index.take_dead()]
+    return FolderContents(indexes, others, last, [path.name for path in damaged], left_over)
 
 
 def _look_into(path: Path, sort: str, number: int, kind: np.dtype[np.void], alone: bool) -> tuple[PartFile, bool]:

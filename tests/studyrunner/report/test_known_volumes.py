@@ -10,12 +10,12 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from studyrunner.plan.places import settings_of as of_study
+from studyrunner.plan.point_text import settings_of as of_study
 from studyrunner.report.drawing import Table
 from studyrunner.report.figures.outcome import draw_outcomes
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.reliance import describe_ended, settings_of, tell_ends, tell_volumes
+from studyrunner.report.reading.known_volumes import describe_ended, settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.report.figure_cases import make_result, with_endings

@@ -1,4 +1,4 @@
-"""Everything on the page, in its order."""
+"""Figures and tables of the report, in the order of the page."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
-from studyrunner.report.reading.door import check_numbers
 from studyrunner.report.reading.result import open_for_report
+from studyrunner.report.reading.schema_check import check_numbers
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import ReadingProcess

@@ -45,7 +45,7 @@ class _Mapped:
     done: bool
 
 
-class HandOut(Generic[Thing]):
+class Broadcast(Generic[Thing]):
     """Rank 0: an object, shared with the ranks of its machine.
 
     value: what is handed out; where other ranks are on this machine, its arrays stand in the shared memory.

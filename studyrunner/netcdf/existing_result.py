@@ -13,7 +13,7 @@ from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
 from studyrunner.netcdf.output import parts_folder
 from studyrunner.netcdf.provenance import POINTS_LEFT
-from studyrunner.study.archive import SCENE_GROUP
+from studyrunner.study.study_of_result import SCENE_GROUP
 from studyrunner.study.toml_text import read_toml
 from studyrunner.system.files import NotPlainError, create, new_partial, open_plain
 from studyrunner.user_error import UserError
