@@ -19,7 +19,7 @@ from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.result import open_vetted
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
-from studyrunner.run import Interrupted, serve_study
+from studyrunner.run import Interrupted, RunOptions, serve_study
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -107,10 +107,7 @@ def run_study(
                 model,
                 target,
                 shown,
-                fresh=fresh,
-                retry_failed=retry_failed,
-                prune=prune,
-                date=checked,
+                RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked),
             )
     except Interrupted as ended:
         summary = ended.summary

@@ -210,7 +210,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, serve_study
+    from studyrunner.run import Interrupted, RunOptions, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
@@ -231,10 +231,9 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
                 model,
                 target,
                 progress,
-                fresh=options.fresh,
-                retry_failed=options.retry_failed,
-                prune=options.prune,
-                date=options.date,
+                RunOptions(
+                    fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date
+                ),
             )
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
