@@ -1,4 +1,4 @@
-"""What `--plan` prints: what would be computed, what is left out and why, how long it takes and how large it gets."""
+"""Text of `--plan`: tasks, shared histories with reasons, estimated time and memory."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from studyrunner.variables import ASKED, KEPT, SCENE
 
 
 def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float = 0.0) -> str:
-    """The plan of a study in lines for a reader. built_with: bytes of memory that building the scene takes.
+    """The plan of a study in lines.
 
-    prepared_in: CPU seconds from the start of the process until the scene is built, which a run takes, too.
+    built_with: memory for building the scene, bytes. prepared_in: CPU time from the start of the process until the
+    scene is built, s; a run needs this time, too.
     """
     marches = [task for line in plan.marches for task in line]
     n_tasks = len(plan.branches) + len(marches)
@@ -68,7 +69,7 @@ def _cycles(study: Study) -> str:
 
 
 def _assumed(study: Study, plan: TaskPlan) -> str:
-    """What the time is estimated from."""
+    """Assumptions of the estimated time."""
     milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
     if "final" in study.axes.scheme:
@@ -79,7 +80,7 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
 
 
 def _solver(study: Study, facts: SceneFacts) -> str:
-    """How finely and how exactly, and how far automatic harmonics can go in this scene."""
+    """Settings of the solver, and the largest number of automatic harmonics in this scene."""
     values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
     if AUTO in (*study.harmonics, *study.samples) or {"adaptive", "final"} & set(study.axes.scheme):
         values["rtol"] = study.rtol
@@ -98,7 +99,7 @@ def _if_automatic(study: Study) -> str:
 
 
 def _range(plan: TaskPlan) -> str:
-    """What is known only when it is computed: how many points wear, and how often the joint jumps."""
+    """What makes the time uncertain: how many points wear, and how often the joint jumps."""
     starts = format_seconds(sum(branch.cost for branch in plan.branches))
     return (
         f"{starts} of it for the start states; a history in which nothing slips takes none, one in which the joint"
@@ -107,7 +108,7 @@ def _range(plan: TaskPlan) -> str:
 
 
 def _about(plan: TaskPlan, prepared_in: float) -> str:
-    """Estimated time on one and on two ranks: the longest way through a branch and a march bounds it."""
+    """Estimated time on one rank and on two; a branch and a history from it cannot be computed at the same time."""
     longest = max(
         branch.cost + max((task.cost for task in line), default=0.0)
         for branch, line in zip(plan.branches, plan.marches, strict=True)
@@ -117,7 +118,7 @@ def _about(plan: TaskPlan, prepared_in: float) -> str:
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
-    """Numbers in the result but for its coordinates, natural frequencies and mesh; of loops only those asked for."""
+    """Number of values in the result, without coordinates, natural frequencies and mesh."""
     sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
     names = study.outputs.variables
     asked = [ASKED[name] for name in names if name in ASKED]
