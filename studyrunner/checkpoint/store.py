@@ -1,9 +1,9 @@
-"""The folder of a study: everything finished is on the disk a moment later, and a run goes on from it.
+"""The folder of a study: finished results are saved a moment later, and a later run continues from them.
 
-It stands beside the result file. Rank 0 writes all of it, as no other rank need see the folder, on a thread of its own:
-what comes meanwhile waits and goes into the same files, so that a slow disk makes them fewer and larger. Files of about
-one size are put together while the run goes on. Their names are those of no other run, so that two runs in one folder,
-where the file system has no locks, do no harm to each other.
+The folder stands beside the result file. Rank 0 writes all files, as other ranks may not see the folder. A thread
+writes; results that arrive meanwhile go into the next files together, so that a slow disk gets fewer and larger files.
+Files of about one size are merged during the run. File names differ from those of any other run: on a file system
+without locks two runs in one folder do not damage each other's files.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from studyrunner.system.folder_lock import FolderLock
 from studyrunner.user_error import StorageError
 
 SECONDS_A_FILE = 0.25
-"""Results wait at most so long for others that go into the same file, where the disk is not slower."""
+"""Longest time, s, that a result waits for others that go into the same file."""
 
 SECONDS_A_PROGRESS = 1.0
-"""The progress of tasks waits so long for that of others."""
+"""Longest time, s, that the progress of a task waits for the progress of other tasks."""
 
 MOST_BYTES_WAITING = 32e6
-"""What is handed over while more is waiting has to wait for the disk: results are not piled up in memory."""
+"""Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
 
 _BYTES_A_FILE = 8e6
 _SECONDS_TO_MORE_ROOM = 60.0

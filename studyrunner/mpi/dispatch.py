@@ -1,6 +1,7 @@
-"""Decides which rank gets which task; knows no messages and nothing of what a task is, and is given its clock.
+"""Decides which rank gets which task. This module sends no messages, does not know what a task is, and is given its
+clock.
 
-A server on real ranks and a simulation with thousands of them use the same decisions. No message makes it look at all
+The server on real ranks and a simulation with thousands of ranks make the same decisions. No decision looks at all
 ranks.
 """
 
@@ -14,10 +15,10 @@ from typing import Generic, Protocol, TypeVar
 from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
 
 AHEAD_SECONDS = 0.2
-"""A rank holds a second task behind one that takes less: behind a longer one it would wait for no gain."""
+"""A rank gets a second task in advance behind a task that takes less than this time, s."""
 
 WATCH_SECONDS = 1.0
-"""Between two looks at the tasks that run, at least."""
+"""Shortest time between two looks at the running tasks, s."""
 
 _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
@@ -28,14 +29,14 @@ _MEASURED_SHARE = 8
 
 
 class Work(Protocol):
-    """What has to be known of a task."""
+    """Properties of a task that the dispatcher needs."""
 
     @property
     def cost(self) -> float:
-        """Estimated seconds, positive."""
+        """Estimated time, s, positive."""
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated seconds of its first result, or of one of the others."""
+        """Estimated time, s, of the first result, or of one of the others."""
 
     @property
     def cost_keys(self) -> CostKeys:
@@ -43,11 +44,11 @@ class Work(Protocol):
 
     @property
     def n_results(self) -> int:
-        """Results that it gives, one after the other, at least 1."""
+        """Number of results that the task gives one after the other, at least 1."""
 
     @property
     def opens_others(self) -> bool:
-        """Whether its results make other tasks possible."""
+        """Whether results of the task make other tasks possible."""
 
 
 Task = TypeVar("Task", bound=Work)
@@ -76,7 +77,7 @@ class _Held(Generic[Task]):
 
 
 class WaitingTasks(Generic[Task]):
-    """Tasks that wait; the one that is expected to take longest comes first, of equal ones the earliest."""
+    """Waiting tasks; the one with the longest expected time comes first, of equal ones the earliest."""
 
     def __init__(self, costs: CostModel) -> None:
         self._costs = costs
@@ -88,17 +89,17 @@ class WaitingTasks(Generic[Task]):
         return len(self._tasks)
 
     def add(self, number: int, task: Task) -> None:
-        """One more."""
+        """Adds a task."""
         self._tasks[number] = task, task.cost_keys
         heapq.heappush(self._order, (-self._expected(*self._tasks[number]), number))
 
     def pop(self) -> tuple[int, Task]:
-        """The next one and its number. Raises IndexError where none waits."""
+        """Removes the next task; number and task. Raises IndexError where no task waits."""
         _, number = heapq.heappop(self._order)
         return number, self._tasks.pop(number)[0]
 
     def reorder(self) -> None:
-        """Puts all of them in the order of what is expected now."""
+        """Puts all tasks in the order of the times that are expected now."""
         self._order = [(-self._expected(task, cost_keys), number) for number, (task, cost_keys) in self._tasks.items()]
         heapq.heapify(self._order)
 
@@ -107,11 +108,13 @@ class WaitingTasks(Generic[Task]):
 
 
 class Dispatcher(Generic[Task]):
-    """Who computes what.
+    """Decides which rank gets which task.
 
-    Tasks that make others possible go first, unless so many wait already that all ranks have enough for long: what
-    waits, and what it holds, is then bounded. Of the others the longest go first, so that the ranks end together.
-    Tasks that may have ended a rank come first of all, but not on rank 0, which all need, while there is another.
+    - Tasks that make other tasks possible go first, unless enough tasks wait for all ranks: so the memory for waiting
+      tasks is bounded.
+    - Of the other tasks the longest go first, so that the ranks end together.
+    - Tasks that may have ended a rank come first of all, but not on rank 0, which all ranks need, while there is
+      another rank.
     """
 
     def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
@@ -134,28 +137,28 @@ class Dispatcher(Generic[Task]):
 
     @property
     def done(self) -> bool:
-        """Whether nothing waits and nothing is computed."""
+        """Whether no task waits and no task runs."""
         return not self._held and self._n_waiting == 0 and not self._suspects
 
     @property
     def wants_more(self) -> bool:
-        """Whether fewer tasks wait than all ranks have use for, for long."""
+        """Whether fewer tasks wait than all ranks can use for some time."""
         return not self._enough_waits
 
     def add(self, tasks: Iterable[Task]) -> None:
-        """Tasks that have become possible."""
+        """Adds tasks that have become possible."""
         for task in tasks:
             (self._openers if task.opens_others else self._others).add(self._n_known, task)
             self._n_known += 1
 
     def add_lost(self, tasks: Iterable[Task]) -> None:
-        """Tasks of a rank that is lost, maybe by one of them."""
+        """Adds tasks of a lost rank; one of them may have ended the rank."""
         for task in tasks:
             self._suspects.add(self._n_known, task)
             self._n_known += 1
 
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
-        """The ranks that get a task now, and the tasks."""
+        """Ranks that get a task now, and the tasks."""
         if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
             self._n_measured = 0
             self._others.reorder()
@@ -173,7 +176,7 @@ class Dispatcher(Generic[Task]):
             yield rank, self._hand_out(rank)
 
     def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
-        """The task of which a rank has sent a result that took it so long.
+        """Notes a result; returns its task. seconds: time that the result took.
 
         typical: whether similar tasks may take as long; not where the task broke off.
         """
@@ -199,7 +202,7 @@ class Dispatcher(Generic[Task]):
         return task
 
     def lose(self, rank: int) -> list[tuple[Task, int]]:
-        """A rank is there no more. The tasks that it had, and how many results each still had to give."""
+        """Removes a lost rank. Returns its tasks, and the number of results that each still had to give."""
         lost = []
         for number in self._held_by[rank]:
             held = self._held.pop(number)
@@ -218,18 +221,18 @@ class Dispatcher(Generic[Task]):
         return lost
 
     def shun(self, rank: int) -> None:
-        """A rank is sick: it gets no more tasks, as long as another one does."""
+        """Gives a faulty rank no more tasks, as long as there is another rank."""
         if len(self._shunned) + 1 < self._n_ranks:
             self._shunned.add(rank)
             self._free.pop(rank, None)
             self._ahead.pop(rank, None)
 
     def task(self, number: int) -> Task:
-        """A task that is computed."""
+        """A running task."""
         return self._held[number].task
 
     def running(self) -> list[tuple[Task, int, float]]:
-        """What is computed at the moment, longest first: the task, results still to come, seconds since the last."""
+        """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
         now = self._clock()
         busy = [(held.task, held.n_left, now - held.began) for held in self._held.values() if held.began is not None]
         return sorted(busy, key=lambda entry: -entry[2])
@@ -273,7 +276,7 @@ class Dispatcher(Generic[Task]):
         return Assignment(number, task)
 
     def _see_ahead(self, rank: int) -> None:
-        """Whether a rank that holds one task may get a second one."""
+        """Notes whether a rank with one task may get a second task."""
         task = self._held[self._held_by[rank][0]].task
         if rank in self._shunned:
             return

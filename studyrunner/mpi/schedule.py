@@ -1,8 +1,8 @@
-"""Sends tasks to ranks while they run, and receives the results; knows nothing of what a task is.
+"""Sends tasks to ranks and receives results. This module does not know what a task is.
 
-A task has one result or several; each is handed on at once, while its rank goes on with the task. A long one says now
-and then how far it is, so that another run can go on from there. Rank 0 computes as well: its main thread sends tasks
-and receives results, a second thread computes. Which rank gets which task is decided in `dispatch`.
+A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
+so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
+a second thread computes. `dispatch` decides which rank gets which task.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
 from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 
 SECONDS_TO_PROGRESS = 3.0
-"""A task says how far it is at most so often, with many ranks less often.
+"""Shortest time between two reports of progress of a task, s; longer with many ranks.
 
-With the second that this waits for that of others (`checkpoint.store`) a kill costs no step that was finished more than
-5 s before, where steps are short and the disk keeps up.
+Together with the second that a report waits for others (`checkpoint.store`) a kill loses no step that was finished more
+than 5 s before, where steps are short and the disk is fast enough.
 """
 
 SECONDS_TO_WORDS = 1.0
-"""A task says in words what it is at at most so often."""
+"""Shortest time between two reports in words, s."""
 
 _MANY_RANKS = 100
-"""More ranks say it less often, as rank 0 writes all of it to the disk."""
+"""With more ranks each rank reports less often, as rank 0 writes all reports to the disk."""
 
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
@@ -44,7 +44,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class _Delivery(Generic[Result]):
-    """A result on its way back, and the time that it took, s."""
+    """A result that is sent to rank 0, and the time that it took, s."""
 
     number: int
     result: Result
@@ -53,7 +53,7 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """How far a task is: something to go on from, or words."""
+    """Progress of a task: data to continue from, or words."""
 
     number: int
     progress: object
@@ -61,11 +61,11 @@ class _Progress:
 
 @dataclass(frozen=True)
 class RankInterrupted:
-    """A rank was told from outside to end: so are all."""
+    """Message of a rank that was ended from outside; all ranks end."""
 
 
 Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
-"""Does a task and gives its results one by one; it may hand its progress to the function that it is given."""
+"""Does a task: gives the results one by one and may hand the progress to the given function."""
 
 
 def _work(
@@ -74,7 +74,7 @@ def _work(
     send: Callable[[object], None],
     seconds_to_progress: float,
 ) -> None:
-    """Sends back what a task gives, as soon as it is there."""
+    """Sends the results of a task, each as soon as it is there."""
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
@@ -113,11 +113,11 @@ class _LocalWorker(Generic[Task, Result]):
         self._thread.start()
 
     def assign(self, assignment: Assignment[Task]) -> None:
-        """Puts a task behind those that it already has."""
+        """Puts a task behind those that wait."""
         self._waiting.put(assignment)
 
     def receive(self, seconds: float) -> object:
-        """What it sends next, None where nothing comes within `seconds`. Raises what a task raised."""
+        """The next message; None where none comes within `seconds`. Raises the exception of a task."""
         if seconds:
             self._sent.wait(seconds)
         message = self._sent.take()
@@ -126,16 +126,16 @@ class _LocalWorker(Generic[Task, Result]):
         return message
 
     def stop(self) -> None:
-        """Ends the thread; it has nothing left to do. Raises what its last task raised after the last result."""
+        """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
         self._waiting.put(None)
         with uninterrupted():
             self._thread.join()
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Nobody wants any more results: the thread ends as soon as what it calls returns.
+        """Ends the thread without its results, as soon as the running call of a library returns.
 
-        The main thread may have to wait for the interpreter as long as each of these calls takes, at each of its own.
+        Until then each call of the main thread may wait for the interpreter as long as such a call takes.
         """
         self._ended = True
         if self._thread.ident is not None:
@@ -156,11 +156,11 @@ class _LocalWorker(Generic[Task, Result]):
 
 
 TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
-"""What is to be done in place of the tasks of a rank that is lost; the number is that of results still to be given."""
+"""Tasks that are done in place of the tasks of a lost rank; the number is that of results still to come."""
 
 
 def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
-    """Tasks that begin anew on another rank."""
+    """The tasks of a lost rank, which begin anew."""
     return [task for task, _ in lost]
 
 
@@ -318,7 +318,7 @@ class _Server(Generic[Task, Result]):
 
 
 def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:
-    """Any other rank: computes what rank 0 sends, until it sends None."""
+    """Any other rank: does the tasks that rank 0 sends, until rank 0 sends None."""
 
     def send(reply: object) -> None:
         ranks.send(reply, 0)
