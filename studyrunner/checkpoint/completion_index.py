@@ -205,8 +205,9 @@ class CompletionIndex:
         self.store.remove_forgotten()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
-        """Removes results of other studies down to a size, bytes; with 0 also all other files that this study does not
-        need.
+        """Removes results of other studies until they take at most so many bytes.
+
+        With 0 bytes only results of this study stay.
         """
         self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
 

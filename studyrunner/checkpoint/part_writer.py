@@ -140,7 +140,10 @@ class PartWriter:
             self._remove([file.path])
 
     def unpack(self, sort: str, number: int, packed: Path) -> None:
-        """Writes a packed file as it was, beside it. Raises OSError; ValueError where it is damaged."""
+        """Writes an unpacked file beside a packed one.
+
+        Raises OSError, or ValueError where the packed file is damaged.
+        """
         put = unpack_records if sort == RECORDS else unpack_file
         self._write_as(unpacked_path(packed), sort, number, lambda file: put(file, packed))
 

@@ -1,7 +1,8 @@
-"""How an object gets to all ranks: once to each machine, whose ranks share its arrays.
+"""Sends an object to all ranks: once to each machine, whose ranks share the arrays of the object.
 
-Rank 0 sends it to one rank of every other machine; that one, and rank 0 on its own machine, puts it into shared memory
-and tells the others where. A rank that cannot map it says so, and gets a copy of its own.
+Rank 0 sends the object to one rank of every other machine. This rank, and rank 0 on its own machine, puts the object
+into shared memory and tells the other ranks of the machine the address. A rank that cannot map the memory gets a copy
+of its own.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ Thing = TypeVar("Thing")
 
 
 class LostError(Exception):
-    """The rank that this one waits for is lost."""
+    """The rank that this rank waits for is lost."""
 
 
 @dataclass(frozen=True)
 class _Whole:
-    """The object itself, and the ranks of this machine that wait for it."""
+    """The object, and the ranks of this machine that wait for it."""
 
     thing: object
     others: tuple[int, ...] = ()
@@ -40,15 +41,15 @@ class _From:
 
 @dataclass(frozen=True)
 class _Mapped:
-    """Whether a rank has got what it was told the address of."""
+    """Whether a rank has mapped the memory at the address."""
 
     done: bool
 
 
 class Broadcast(Generic[Thing]):
-    """Rank 0: an object, shared with the ranks of its machine.
+    """Rank 0: an object for all ranks.
 
-    value: what is handed out; where other ranks are on this machine, its arrays stand in the shared memory.
+    value: the object; where other ranks are on this machine, its arrays are in shared memory.
     """
 
     def __init__(self, ranks: Ranks, machines: Mapping[int, Machine], thing: Thing) -> None:
@@ -61,7 +62,7 @@ class Broadcast(Generic[Thing]):
         self.value = thing if self._shared is None else self._shared.value
 
     def send(self) -> None:
-        """Every other rank gets it. Raises KeyboardInterrupt where one of them was interrupted."""
+        """Sends the object to every other rank. Raises KeyboardInterrupt where a rank was interrupted."""
         left = [[rank for rank in group if rank not in self._ranks.lost] for group in self._groups]
         (_, *neighbours), *elsewhere = left
         for leader, *others in filter(None, elsewhere):
@@ -72,12 +73,12 @@ class Broadcast(Generic[Thing]):
 
 
 def take_over(ranks: Ranks) -> Any:  # a type that rank 0 knows
-    """Any other rank: what rank 0 hands out, or None where it sends that.
+    """Any other rank: the object that rank 0 sends; None where rank 0 sends None.
 
     Raises
     ------
     LostError
-        Where the rank of this machine that had it is lost.
+        Where the rank of this machine that had the object is lost.
     """
     message = _next_from(ranks, 0)
     leader = message.leader if isinstance(message, _From) else 0
@@ -110,7 +111,7 @@ def _share(thing: Thing) -> SharedObject[Thing] | None:
 
 
 def _tell(ranks: Ranks, shared: SharedObject[Thing] | None, thing: Thing, others: Sequence[int]) -> None:
-    """Tells the others of a machine where the object is, and waits until they have it."""
+    """Tells the other ranks of a machine the address of the object, and waits until they have mapped it."""
     for rank in others:
         ranks.send(_Whole(thing) if shared is None else shared.address, rank)
     if shared is None:

@@ -1,4 +1,4 @@
-"""Which study a result belongs to that stands already where one is to go: that of another one is left alone."""
+"""Protects results of other studies: finds out which study an existing result belongs to."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _LARGEST_NOTE = 2**16
 
 @dataclass(frozen=True)
 class Label:
-    """What tells studies apart: their name and the model of their scene, of a file its name without folders.
+    """Identity of a study: its name and the model of its scene; of a file the name without folders.
 
-    Other values of the same study, a finer axis for one, are no other study.
+    The same study with other values, such as a finer axis, has the same identity.
     """
 
     name: str
@@ -37,42 +37,44 @@ class Label:
 
     @classmethod
     def of(cls, study: Study) -> Label:
-        """That of a study."""
+        """Identity of a study."""
         return cls(study.study.name, os.path.basename(study.scene.model))  # noqa: PTH119 - of an empty text as well
 
     def __str__(self) -> str:
-        """In words."""
+        """Identity in words."""
         return f'study "{self.name}" (scene {self.model})'
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a result goes. finished: whether one without missing points stands there, replaced by another such only."""
+    """Path of a result. finished: whether a result without missing points exists, which only another such result
+    replaces.
+    """
 
     path: Path
     finished: bool = False
 
 
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
-    """Where a result goes, once nothing that stands there is in its way; nothing is changed.
+    """Path of a result, after a test that nothing forbids to replace what exists there; nothing is changed.
 
     Parameters
     ----------
     option
-        The one on the command line that gave the path.
+        The option of the command line that gave the path.
     path
-        As `check_output` gives it; the file need not be there.
+        As `check_output` gives it; the file need not exist.
     study
-        The one whose result it is to hold.
+        The study of the new result.
     overwrite
-        Whether that of another study may be replaced.
+        Whether a result of another study may be replaced.
     how
-        In which words the user asks for that.
+        How the user asks for that, in words.
 
     Raises
     ------
     UserError
-        Where the file is no result of run-study, or it or the folder beside it is that of another study.
+        Where the file is no result of run-study, or the file or the folder beside it belongs to another study.
     """
     standing, finished = _read_result(option, path)
     own = Label.of(study)
@@ -84,7 +86,7 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
 
 
 def check_scene_file(option: str, path: Path) -> None:
-    """Raises UserError where a file stands already that is no scene file, and is left as it is."""
+    """Raises UserError where a file exists that is no scene file."""
     from studies.guards.hdf5_guard import open_hdf5, read_attribute
 
     with contextlib.suppress(OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError):
@@ -99,7 +101,7 @@ def check_scene_file(option: str, path: Path) -> None:
 
 
 def note_study(target: Path, study: Study) -> None:
-    """Leaves word in the folder beside a result file, which is there, of whose it is."""
+    """Writes the identity of a study into the folder beside the result file."""
     label = Label.of(study)
     if _read_note(target) == label:
         return
@@ -116,7 +118,7 @@ def note_study(target: Path, study: Study) -> None:
 
 
 def _read_note(target: Path) -> Label | None:
-    """None where there is none that can be read, as in folders of earlier versions."""
+    """The identity in a folder; None where there is none, as in folders of earlier versions."""
     try:
         with open_plain(parts_folder(target) / _NOTE, _LARGEST_NOTE) as file:
             found = json.loads(file.read())
@@ -126,7 +128,7 @@ def _read_note(target: Path) -> Label | None:
 
 
 def _read_result(option: str, path: Path) -> tuple[Label | None, bool]:
-    """Whose result stands there, None for nobody's, and whether it is finished."""
+    """Identity of the study of an existing result, None without one, and whether the result is finished."""
     from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
 
     try:
@@ -146,7 +148,7 @@ def _read_result(option: str, path: Path) -> tuple[Label | None, bool]:
 
 
 def _label_in(text: str | bytes) -> Label:
-    """Raises UserError, TypeError and KeyError."""
+    """The identity in the attributes of a result. Raises UserError, TypeError and KeyError."""
     table = read_toml(text if isinstance(text, bytes) else text.encode(), "")
     study, scene = table["study"], table["scene"]
     if not isinstance(study, dict) or not isinstance(scene, dict):

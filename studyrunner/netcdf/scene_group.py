@@ -1,4 +1,4 @@
-"""The group of a result file that holds what a scene file holds, under the same names."""
+"""The group of a result file with the contents of a scene file, under the same names."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def write_scene_group(file: netCDF4.Dataset, scene: KeptScene) -> None:
 
 
 def _dimension(root: netCDF4.Group, length: int) -> str:
-    """Name of the dimension of a length: those of a scene file have none."""
+    """Name of the dimension of a length; a scene file has no names."""
     name = f"length_{length}"
     if name not in root.dimensions:
         root.createDimension(name, length)
