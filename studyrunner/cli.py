@@ -1,4 +1,4 @@
-"""The command `run-study`: an ending in good order from the first moment, before all that takes time is loaded."""
+"""The command `run-study`. Signals are handled from the first moment, before slow imports."""
 
 from __future__ import annotations
 

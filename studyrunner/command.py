@@ -1,4 +1,4 @@
-"""What the command `run-study` does on each rank."""
+"""The command `run-study` on each rank."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 _SECONDS_FOR_RANK_0 = 60.0
-"""Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
+"""Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
 
 _SECONDS_FOR_A_LINE = 2.0
 _SECONDS_WITHOUT_A_WORD = 3.0
 
 
 class _SlowSteps:
-    """Lines on stderr about a scene that takes long to build; none where it is built, or refused, at once."""
+    """Lines on stderr about a scene that takes long to build; no line for a fast one."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
@@ -47,7 +47,7 @@ class _SlowSteps:
 
 
 def run_command(arguments: Sequence[str] | None) -> int:
-    """As `studyrunner.cli.main`. Raises KeyboardInterrupt where it was ended before the ranks have found each other."""
+    """As `studyrunner.cli.main`. Raises KeyboardInterrupt where the run was ended before the ranks have started."""
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
@@ -113,7 +113,7 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
+    """Rank 0. The other ranks get the model and tasks, or None where nothing has to be computed."""
     try:
         from studyrunner.mpi.version_check import check_versions
 
@@ -148,7 +148,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 
 def _follow(ranks: Ranks) -> int:
-    """Any other rank; rank 0 alone has an exit status to give."""
+    """Any other rank. Only rank 0 has an exit status."""
     from studyrunner.mpi.broadcast import LostError, take_over
     from studyrunner.mpi.version_check import report_version
 

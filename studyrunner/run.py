@@ -1,4 +1,4 @@
-"""One run: hands out the tasks of a study that are left, gathers the results and writes the file."""
+"""One run of a study: does the tasks that are left, and writes the result file."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was ended from outside; the file holds what was computed until then. summary: how far it was."""
+    """A run was ended from outside; the result file holds the points computed so far. summary: state of the run."""
 
     def __init__(self, summary: RunSummary) -> None:
         super().__init__(summary)
@@ -62,7 +62,12 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for the tasks of a study beside its model. folder: of the run, which not all need see."""
+    """What every rank needs for its tasks beside the model.
+
+    friction_coefficient: of all pairs; None where each pair has its own.
+    law: wear law.
+    folder: of the run; not every rank needs to see it.
+    """
 
     friction_coefficient: float | None
     law: WearLaw
@@ -71,10 +76,15 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_complete: points computed to the end. n_left: those that are not computed yet.
+    """Summary of a run.
 
-    n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
-    certificates: the table that begins with the worn volume. written: whether the file holds this, or is as it was.
+    n_points: number of points of the study.
+    n_complete: number of points computed to the end.
+    n_left: number of points that are not computed yet.
+    n_found: number of points that an earlier run has left.
+    findings: lines on points that failed or are less exact than requested.
+    certificates: the table that begins with the worn volumes.
+    written: whether the file was written; else a finished result was kept.
     """
 
     n_points: int
@@ -106,8 +116,11 @@ class RunOptions:
 class _ResultWriter:
     """Writes the result file from the finished points.
 
-    study, plan, facts: the study, its tasks, and what its scene tells. of_scene, kept_scene: variables of the scene and
-    the model to be kept in the file. target: the file. software: attributes on the program. date: as in `RunOptions`.
+    study, plan, facts: the study, its tasks, and facts of its scene.
+    of_scene, kept_scene: variables of the scene, and the model that the file keeps.
+    target: the file.
+    software: attributes on the program.
+    date: as in `RunOptions`.
     said: doubts that the user has seen.
     """
 
@@ -205,7 +218,7 @@ def _prepare(
 ) -> tuple[Store, CompletionIndex, _ResultWriter]:
     """The open folder of the run, the index of finished points, and the writer of the result.
 
-    Raises UserError where the scene cannot tell what the study asks for, before anything is computed.
+    Raises UserError where the scene lacks what the study asks for, before anything is computed.
     """
     facts = replace(describe_scene(model), static_response=static_response(model))
     plan = build_tasks(study, facts.n_displacements)
@@ -232,7 +245,7 @@ def _prepare(
 
 
 def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, progress: ProgressDisplay) -> int:
-    """Applies the options to what earlier runs have left; number of points that are finished."""
+    """Applies the options to the results of earlier runs; returns the number of finished points."""
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
@@ -248,7 +261,7 @@ def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, prog
 
 
 def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
-    """Removes what a finished study needs no more, and packs the rest."""
+    """Removes what a finished study no longer needs, and packs the rest."""
     forget_crashes(completion.store.folder, None if prune else completion.keys - _tried_again(completion))
     completion.prune(0.0 if prune else MOST_OF_OTHERS)
     # the result stands: what an ending keeps from being packed is packed by the next run
@@ -259,19 +272,19 @@ def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
 
 
 def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Crash]:
-    """Points whose task has crashed two processes in earlier runs have failed.
+    """Marks the points of tasks as failed that have ended two processes in earlier runs.
 
     Parameters
     ----------
     completion
-        What is finished, in the folder of the run.
+        The finished tasks in the folder of the run.
     fresh
-        Whether crashes of this study's tasks in earlier runs do not count.
+        Whether earlier crashes of the tasks of this study do not count.
 
     Returns
     -------
     list of Crash
-        The new ones of tasks that have crashed once.
+        New crashes of tasks that have crashed once.
     """
     folder, own = completion.store.folder, completion.keys
     new = count_crashes(folder)
@@ -287,7 +300,7 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
 
 
 def _tried_again(completion: CompletionIndex) -> set[str]:
-    """Tasks that had crashed too often, were tried again and have crashed once more: that is counted on."""
+    """Tasks that had crashed too often, were tried again and have crashed once more."""
     tally = {key for key, crashes in read_tally(completion.store.folder).items() if len(crashes) < MOST_DEATHS}
     return tally & completion.tasks_with(Outcome.CRASHED) if tally else set()
 
@@ -314,7 +327,7 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
 
 
 def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
-    """Any other rank, once it has got the model: computes tasks until there are none."""
+    """Any other rank after it has received the model: does tasks until there are none."""
     job = wait_for_message(ranks)
     if not isinstance(job, Job):
         raise TypeError(f"rank 0 sent {job!r} instead of a job")
@@ -323,7 +336,7 @@ def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
 
 
 def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
-    """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
+    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
     compute = build_evaluator(model, job.friction_coefficient, job.law)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -351,7 +364,7 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
 
 
 def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, progress: ProgressDisplay) -> None:
-    """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
+    """Rank 0: has the remaining tasks done and their results saved."""
     tally = read_tally(completion.store.folder)
     tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
 

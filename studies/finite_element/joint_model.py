@@ -1,4 +1,4 @@
-"""A finite-element model of a joint, in arrays: what its files and a study say of it, in SI units."""
+"""A finite-element model of a joint, and what is done with it, as arrays in SI units."""
 
 from __future__ import annotations
 
@@ -18,11 +18,14 @@ from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
 class MeshModel:
     """A model whose matrices are assembled here.
 
-    rotation: None where it stands still. prestress: whether the stress and the displacements of the glued structure
-    under the centrifugal load, and spin softening, are part of its stiffness. preload (3 n_nodes,): constant forces
-    beside the centrifugal ones, N; they are no part of the prestress, as what presses on gaps and flanks does so
-    otherwise on a glued structure. layers (n_nodes, n_directions): place of each node in a structured grid, by which
-    the order of elimination is chosen; by the coordinates if None.
+    mesh: the mesh.
+    rotation: None for a model at rest.
+    prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
+        centrifugal load, and spin softening.
+    preload (3 n_nodes,): constant forces beside the centrifugal ones, N. They are no part of the prestress: forces that
+        press on gaps and flanks act otherwise on a glued structure.
+    layers (n_nodes, n_directions): place of each node in a structured grid, for the order of elimination; None to use
+        the coordinates.
     """
 
     mesh: SolidMesh
@@ -44,12 +47,14 @@ class MeshModel:
 
 @dataclass(frozen=True)
 class MatrixModel:
-    """A model whose matrices come from another program.
+    """A model with matrices of another program.
 
-    coordinates (n_nodes, 3): m, NaN for nodes that have no place (inner ones of an element). numbers (n_nodes,): of the
-    nodes in the file. stiffness, mass (3 n_nodes, 3 n_nodes): N/m, kg, symmetric and unconstrained, displacements node
-    by node in x, y, z; whatever the other program has put in of prestress and spin softening stays in. rotation: for
-    the centrifugal load, which is made of the mass; None where it stands still.
+    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element.
+    numbers (n_nodes,): of the nodes in the file.
+    stiffness, mass (3 n_nodes, 3 n_nodes): N/m and kg, symmetric, unconstrained, displacements node by node in x, y, z.
+        Prestress and spin softening of the other program stay in them.
+    rotation: for the centrifugal load, which follows from the mass; None for a model at rest.
+    preload (3 n_nodes,): constant forces beside the centrifugal ones, N.
     """
 
     coordinates: FloatArray
@@ -79,9 +84,12 @@ class SetMotion:
 
 @dataclass(frozen=True)
 class Retainer:
-    """A spring on the mean relative displacement of all pairs, weighted by area, along a direction (3,).
+    """A spring on the mean relative displacement of all pairs, weighted by area.
 
-    It keeps a joint that friction alone holds from walking; without it there may be no periodic state. stiffness: N/m.
+    stiffness: N/m.
+    direction (3,): of any length.
+
+    The spring keeps a joint from walking that friction alone holds; without it there may be no periodic state.
     """
 
     stiffness: float
@@ -92,10 +100,15 @@ class Retainer:
 class JointDefinition:
     """What is done with a model.
 
-    contacts: at least one. held (n_nodes, 3): displacements that are 0. load: of 1 N. responses: by name. cut: cut
-    faces, None where the structure is no cyclic sector. along (3,): direction near the first tangents; the axis of
-    rotation or of the cyclic structure if None, else z. retainer: None for none. ties: surfaces glued for good. pairs:
-    the pairs of the contacts in an order and with frames of one's own; as `build_contact_pairs` finds them if None.
+    contacts: pairs of surfaces, at least one.
+    held (n_nodes, 3): displacements that are 0.
+    load: harmonic load of 1 N.
+    responses: by name.
+    cut: cut faces; None where the structure is no cyclic sector.
+    along (3,): direction near the first tangents. None for the axis of rotation or of the cyclic structure, else z.
+    retainer: None for none.
+    ties: surfaces that are always glued.
+    pairs: pairs of the contacts in another order or with other frames than `build_contact_pairs` gives them.
     """
 
     contacts: tuple[ContactSurfaces, ...]
@@ -111,8 +124,11 @@ class JointDefinition:
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """nodal_diameter: of the travelling wave that excites. n_modes: stuck modes kept. loss_factor: exact at the first
-    glued frequency of that nodal diameter.
+    """Options of a reduction.
+
+    nodal_diameter: of the travelling wave that excites.
+    n_modes: number of stuck modes.
+    loss_factor: exact at the first glued frequency of this nodal diameter.
     """
 
     nodal_diameter: int = 0
@@ -122,7 +138,13 @@ class ReductionOptions:
 
 @dataclass(frozen=True)
 class ModelSummary:
-    """What a user checks. mass: kg. centre (3,), extent (3,): m. n_dofs: displacements that are not held."""
+    """Values for a user to check.
+
+    mass: kg.
+    centre (3,), extent (3,): m.
+    n_dofs: number of displacements that are not held.
+    glued_frequencies: of the glued structure, Hz, by nodal diameter.
+    """
 
     mass: float
     centre: FloatArray

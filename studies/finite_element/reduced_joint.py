@@ -48,14 +48,16 @@ from studies.scene_answers import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
-"""Takes a line on what is done next."""
+"""Takes a line on the next step."""
 
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model and what describes it.
+    """A reduced model and its description.
 
-    pairs: in the order of the model's. glued_frequencies: of the glued structure, Hz, by nodal diameter.
+    model: the reduced model.
+    pairs: in the order of the model.
+    summary: values for a user to check.
     """
 
     model: ReducedModel
@@ -65,11 +67,13 @@ class FeScene:
 
 @dataclass(frozen=True)
 class PreparedModel:
-    """A model, ready to be reduced at any nodal diameter.
+    """A model that can be reduced at any nodal diameter.
 
-    reduction: with the forms "stiffness", "mass", and "elastic" where prestress is no part of it. static_load
-    (3 n_nodes,): N. at_rest: the reduction without prestress, None where that is the same. rotation: None where the
-    model stands still.
+    reduction: with the forms "stiffness" and "mass", and "elastic" for the stiffness without prestress where that
+        differs.
+    static_load (3 n_nodes,): N.
+    at_rest: the reduction without prestress; None where that is the same.
+    rotation: None for a model at rest.
     """
 
     reduction: Reduction
@@ -84,7 +88,7 @@ class PreparedModel:
 
 
 def silent(_: str) -> None:
-    """Tells nobody."""
+    """Prints nothing."""
 
 
 def build_fe_scene(

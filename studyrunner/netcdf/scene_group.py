@@ -36,7 +36,7 @@ _SAID = {
 
 
 def write_scene_group(file: netCDF4.Dataset, scene: KeptScene) -> None:
-    """Writes the group. It reads like a scene file; complex numbers are compounds {r, i}."""
+    """Writes the group, which reads like a scene file; complex numbers are compounds {r, i}."""
     root = file.createGroup(SCENE_GROUP)
     root.setncattr("comment", "The reduced model that the study was computed with, in the layout of scene files.")
     root.setncatts({name: np.int64(value) for name, value in scene.attributes.items()})

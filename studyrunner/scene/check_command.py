@@ -1,4 +1,4 @@
-"""What `--check` prints of a study's finite-element model, and its picture."""
+"""The output of `--check`: lines on the finite-element model of a study, and a picture."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from studyrunner.user_error import UserError, show_text
 
 
 def check_study_model(study: Study, picture: Path, progress: Callable[[str], None]) -> str:
-    """Lines on the model of a study; the picture shows its contact pairs.
+    """Lines on the model of a study; the picture shows the contact pairs.
 
-    Raises UserError where the study has no finite-element model, something is wrong with it, or the picture cannot be
-    written.
+    Raises UserError where the study has no finite-element model, the model is wrong, or the picture cannot be written.
     """
     files = study.scene.files
     if files is None:

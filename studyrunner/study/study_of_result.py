@@ -1,4 +1,4 @@
-"""What a result file says of how it was made: enough to run its study again."""
+"""The study of a result file, with the information that a repeated run needs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import h5py
 
 SCENE_GROUP = "scene"
-"""Group of a result file that holds what a scene file holds, where the study was one of a scene file."""
+"""Group of a result file with the contents of a scene file."""
 
 _ATTRIBUTES = ("study", "scene_sha256", "solver_digest", "versions")
 
@@ -26,9 +26,10 @@ _ATTRIBUTES = ("study", "scene_sha256", "solver_digest", "versions")
 class Archived:
     """Attributes of a result file.
 
-    study: the whole effective study, TOML. scene_sha256, solver_digest: of the scene and the solver that computed it,
-    versions: of the packages; empty where the file does not say. holds_scene: whether its scene stands in SCENE_GROUP.
-    scene: the table [scene] of that study.
+    study: the effective study, TOML.
+    scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of packages; empty where unknown.
+    holds_scene: whether the scene is in the group SCENE_GROUP.
+    scene: the table [scene] of the study.
     """
 
     study: str
@@ -39,7 +40,7 @@ class Archived:
     scene: Mapping[str, object] = field(default_factory=dict)
 
     def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
-        """A line for each reason why a result that is computed now may have other numbers."""
+        """Reasons why a result that is computed now may have other numbers, as lines."""
         lines = []
         if self.scene_sha256 != scene_sha256:
             lines.append(
@@ -67,7 +68,7 @@ def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
 
 
 def read_archived(path: Path, name: str) -> Archived:
-    """Reads the attributes of a result file, called `name` by the user. Raises UserError."""
+    """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
     from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
 
     with _user_errors(name, "the attribute "):
@@ -82,7 +83,7 @@ def read_archived(path: Path, name: str) -> Archived:
 
 
 def check_result_file(path: Path, name: str) -> None:
-    """Raises UserError where a result file, called `name` by the user, is none or could do harm to who opens it."""
+    """Raises UserError where a file that the user calls `name` is no result file or could do harm."""
     with _user_errors(name):
         if not path.exists():
             raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")

@@ -1,7 +1,7 @@
-"""Nested dissection: in which order nodes are eliminated, and which blocks that makes.
+"""Nested dissection: the order of elimination of the nodes, and the blocks of this order.
 
-A region of the mesh is cut in two by a layer of nodes, which is eliminated after both halves, and so are the halves in
-turn (George 1973). Small regions are eliminated whole.
+A layer of nodes cuts a region of the mesh into two halves. The layer is eliminated after both halves; the halves are
+cut in the same way (George 1973). Small regions are eliminated as a whole.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ def dofs_of(places: IntArray) -> IntArray:
 class Front:
     """Nodes that are eliminated together, by their places in the order of elimination.
 
-    first, stop: the nodes are at the places first..stop - 1. boundary (n,): places of the later nodes that they are
-    coupled to by then, ascending. children: numbers of the fronts whose boundary is first touched here.
+    first, stop: the nodes are at the places first..stop - 1.
+    boundary (n,): places of the later nodes that are coupled to these nodes when they are eliminated, ascending.
+    children: numbers of the fronts whose boundary is first touched here.
     """
 
     first: int
@@ -46,10 +47,12 @@ class Front:
 
 @dataclass(frozen=True)
 class Dissection:
-    """Order of elimination of the nodes that take part.
+    """Order of elimination.
 
-    order (n,): node numbers, those that are never eliminated last. n_eliminated: how many are. fronts: each after its
-    children. roots: fronts that are nobody's children.
+    order (n,): node numbers; nodes that are never eliminated come last.
+    n_eliminated: number of eliminated nodes.
+    fronts: each after its children.
+    roots: fronts that are no front's children.
     """
 
     order: IntArray

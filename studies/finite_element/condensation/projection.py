@@ -1,9 +1,9 @@
 """Projection of forms on static shapes, which are never formed as a whole.
 
-The shapes follow from the displacements of the boundary, front by front from the last to the first. Two things keep
-that cheap. On a large boundary far from where the shapes are driven they are all combinations of a few: there the
-combinations go on alone. And to small boundaries forms are condensed, whatever the shapes: static condensation of a
-structure is the sum of that of its parts (Guyan 1965).
+The shapes follow from the displacements of the boundary, front by front from the last front to the first. Two measures
+make this fast. On a large boundary far from the driven nodes all shapes are combinations of a few shapes: only these go
+on. On small boundaries the forms themselves are condensed: static condensation of a structure is the sum of the
+condensations of its parts (Guyan 1965).
 """
 
 from __future__ import annotations

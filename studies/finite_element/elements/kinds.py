@@ -44,10 +44,12 @@ _HEX_FACES: tuple[Loop, ...] = (
 class ElementKind:
     """A kind of element.
 
-    reference: nodes and shape functions. rule: integration of stiffness and mass alike, as CalculiX does; so the mass
-    of an element is singular where there are fewer points than nodes, and that of a mesh may be. corner_faces: corners
-    of the faces S1, S2, ... of CalculiX and Abaqus, in either sense. incompatible_modes: whether the element has the
-    incompatible modes of `hex_element`. assembled: whether it has matrices here.
+    reference: nodes and shape functions.
+    rule: integration of stiffness and mass, as in CalculiX. The mass of an element is singular where there are fewer
+        points than nodes, and the mass of a mesh may be.
+    corner_faces: corners of the faces S1, S2, ... of CalculiX and Abaqus, in either sense.
+    incompatible_modes: whether the element has the incompatible modes of `hex_element`.
+    assembled: whether matrices can be assembled here.
     """
 
     reference: ReferenceElement

@@ -13,7 +13,12 @@ from solver.model import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic and linear elastic. young_modulus: Pa. poisson_ratio: -. density: kg/m3."""
+    """Isotropic linear elastic material.
+
+    young_modulus: Pa.
+    poisson_ratio: 1.
+    density: kg/m3.
+    """
 
     young_modulus: float
     poisson_ratio: float
@@ -24,8 +29,11 @@ class Material:
 class ElementGroup:
     """Elements of one kind and one material.
 
-    kind: a key of `kinds.ELEMENT_KINDS`. nodes (n_elements, n_local): rows of `SolidMesh.coordinates`, in the order of
-    CalculiX and Abaqus. numbers (n_elements,): those of the file, for messages and surfaces. part: label for pictures.
+    kind: a key of `kinds.ELEMENT_KINDS`.
+    nodes (n_elements, n_local): rows of `SolidMesh.coordinates`, in the order of CalculiX and Abaqus.
+    numbers (n_elements,): in the file, for messages and surfaces.
+    material: of all elements.
+    part: label for pictures.
     """
 
     kind: str
@@ -37,7 +45,12 @@ class ElementGroup:
 
 @dataclass(frozen=True)
 class SolidMesh:
-    """coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. groups: the elements."""
+    """A mesh.
+
+    coordinates (n_nodes, 3): m.
+    numbers (n_nodes,): of the nodes in the file, for messages.
+    groups: the elements.
+    """
 
     coordinates: FloatArray
     numbers: IntArray
@@ -66,7 +79,12 @@ def joined_bodies(n_nodes: int, first: IntArray, second: IntArray) -> IntArray:
 
 @dataclass(frozen=True)
 class Rotation:
-    """Rotation at a constant speed. omega_squared: rad2/s2. point (3,): on the axis, m. axis (3,): unit vector."""
+    """Rotation at constant speed.
+
+    omega_squared: square of the angular speed, rad2/s2.
+    point (3,): on the axis, m.
+    axis (3,): unit vector.
+    """
 
     omega_squared: float
     point: FloatArray

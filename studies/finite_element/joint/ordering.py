@@ -1,8 +1,7 @@
-"""Which nodes move freely, which follow others, and in which order they are eliminated.
+"""Which nodes move freely, which nodes follow others, and the order of elimination.
 
-Nodes of the right cut face follow those of the left one. The nodes of the contact pairs, moving ones and those that
-they lie opposite to, are never eliminated; among them moving nodes follow the points opposite, with the relative
-displacements added.
+Nodes of the right cut face follow those of the left one. Nodes of the contact pairs, on both sides, are never
+eliminated. A moving node follows the opposite point of its pair, plus the relative displacement.
 """
 
 from __future__ import annotations
@@ -29,11 +28,12 @@ _SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of 
 
 @dataclass(frozen=True)
 class Supports:
-    """What is held and tied.
+    """Held and tied displacements.
 
-    numbers (n_nodes,): of the nodes in the file, for messages. held (n_nodes, 3): displacements that are 0. cut: cut
-    faces, None where the structure is no cyclic sector. n_reductions: at how many nodal diameters the structure will be
-    reduced; more than that are possible and take longer.
+    numbers (n_nodes,): of the nodes in the file, for messages.
+    held (n_nodes, 3): displacements that are 0.
+    cut: cut faces; None where the structure is no cyclic sector.
+    n_reductions: number of nodal diameters at which the structure will be reduced. More are possible and take longer.
     """
 
     numbers: IntArray
@@ -43,7 +43,9 @@ class Supports:
 
     @property
     def keeps_cut(self) -> bool:
-        """Whether the nodes of the cut faces are kept to the last, so that elimination is real and the same for all."""
+        """Whether nodes of the cut faces are eliminated last: then elimination is real and the same for all nodal
+        diameters.
+        """
         if self.cut is None or self.n_reductions < _FEWEST_REUSES:
             return False
         return len(self.cut.left) <= _LARGEST_KEPT_CUT
@@ -73,7 +75,7 @@ class Supports:
 
     @property
     def master(self) -> IntArray:
-        """Node (n_nodes,) that each node is eliminated with: its image or itself; -1 where it is held."""
+        """Node (n_nodes,) that each node is eliminated with: its image or itself; -1 for held nodes."""
         master = np.arange(self.n_nodes)
         if self.cut is not None and not self.keeps_cut:
             master[self.cut.right] = self.cut.left
@@ -82,7 +84,7 @@ class Supports:
         return master
 
     def phase(self, nodal_diameter: int) -> complex | float:
-        """Phase that elimination sees: `exp(i phi)` of a nodal diameter, or 1.0."""
+        """Phase in the elimination: `exp(i phi)` of a nodal diameter, or 1.0."""
         return 1.0 if self.cut is None or self.keeps_cut else self.cut.phase(nodal_diameter)
 
 
@@ -176,10 +178,10 @@ def ties_of_structure(ties: ContactPairs, supports: Supports, pairs: ContactPair
 
 @dataclass(frozen=True)
 class KeptCoordinates:
-    """Displacements (3 n_kept,) of the nodes that are not eliminated = glued @ y + relative @ u_rel.
+    """Displacements (3 n_kept,) of the nodes that are not eliminated: glued @ y + relative @ u_rel.
 
-    glued (3 n_kept, n_glued): pairs glued; complex where a point opposite lies on the right cut face. relative (3
-    n_kept, n_relative): pair by pair normal, first, second tangent, of what there is of them.
+    glued (3 n_kept, n_glued): with the pairs glued; complex where an opposite point lies on the right cut face.
+    relative (3 n_kept, n_relative): pair by pair; normal, first, second tangent, without the held ones.
     """
 
     glued: sparse.csr_matrix
@@ -190,8 +192,10 @@ class KeptCoordinates:
 class OrderedStructure:
     """A structure with its nodes in an order of elimination, for any nodal diameter.
 
-    dissection: of the nodes that take part. place (n_nodes,): of each node, or its master, in the order; -1 where held.
-    free (n_free,): nodes that take part, by their place.
+    supports, pairs, ties: as in `order_structure`.
+    dissection: of the nodes that are not held.
+    place (n_nodes,): place of each node, or of its master, in the order; -1 for held nodes.
+    free (n_free,): nodes in the order of elimination.
     """
 
     supports: Supports

@@ -1,4 +1,4 @@
-"""Contact pairs of two surfaces whose nodes need not match: nodes of one, points of the facets of the other."""
+"""Contact pairs of two surfaces: nodes of one surface, and points of the other; the meshes need not match."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a 
 
 @dataclass(frozen=True)
 class ContactSurfaces:
-    """Two surfaces that touch.
+    """Two surfaces in contact.
 
-    first, second: the finer one moves, the first where they are alike, the other one where it alone is covered.
-    tolerance: largest distance of a node that is paired, m; a share of the size of a facet if None.
-    friction_coefficient: of these surfaces, None where one is given for all. with_gaps: distances in the mesh are gaps
-    of the joint; else they are the error of facets on curved surfaces, and the pairs touch. label: of the pairs; the
-    names of both surfaces if empty.
+    first, second: the nodes of the finer surface move, those of the first one where both are alike. Where one surface
+        alone is covered by the other, its nodes move.
+    tolerance: largest distance of a node that is paired, m; None for a share of the size of a facet.
+    friction_coefficient: of these surfaces; None where all pairs have the same.
+    with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
+        surfaces, and the pairs touch.
+    label: of the pairs; the names of both surfaces if empty.
     """
 
     first: Surface
@@ -44,13 +46,17 @@ class ContactSurfaces:
 class ContactPairs:
     """Contact pairs, `n_contact` of them.
 
-    moving (n_contact,): nodes; the relative displacement is that of the node minus that of the point opposite.
-    opposite (n_contact, n_nodes): interpolation weights of that point, rows sum to 1. frames (n_contact, 3, 3): rows
-    are the unit vectors normal (out of the moving body, so that motion along it closes the pair), first tangent, second
-    tangent. present (n_contact, 3): which of these relative displacements there are; the others are held. area
-    (n_contact,): m2. position (n_contact, 3): of the moving node, m. distance (n_contact,): along the
-    normal, positive where the pair is open, m. gap (n_contact,): what of it is a gap, m. surface (n_contact,): number
-    of the pair of surfaces. moving_name, opposite_name: of each pair of surfaces.
+    moving (n_contact,): nodes. The relative displacement is that of the node minus that of the opposite point.
+    opposite (n_contact, n_nodes): interpolation weights of the opposite points; rows sum to 1.
+    frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
+        pair), first tangent, second tangent.
+    present (n_contact, 3): whether a relative displacement exists; the others are held.
+    area (n_contact,): m2.
+    position (n_contact, 3): of the moving node, m.
+    distance (n_contact,): along the normal, positive where the pair is open, m.
+    gap (n_contact,): initial gap, m.
+    surface (n_contact,): number of the pair of surfaces.
+    moving_name, opposite_name: names of the surfaces, for each pair of surfaces.
     """
 
     moving: IntArray

@@ -1,8 +1,8 @@
-"""Craig-Bampton reduction of a structure to its relative displacements and stuck modes.
+"""Craig-Bampton reduction of a structure to relative displacements and stuck modes.
 
-Nodes are eliminated front by front, those of the contact pairs last. What is left of the stiffness is the reduced one;
-mass and other forms go along (`condensation`), so that the static shapes are never formed. Fronts that no cut face
-touches are real and the same for all nodal diameters: they are eliminated once. A mass is multiplied with only.
+Nodes are eliminated in blocks, the nodes of the contact pairs last. The rest of the stiffness is the reduced stiffness.
+Mass and other forms are condensed with the stiffness (`condensation`), so that static shapes are never formed. Blocks
+without nodes of a cut face are real and independent of the nodal diameter: they are eliminated once.
 """
 
 from __future__ import annotations
@@ -51,9 +51,10 @@ class GluedStructureError(ValueError):
 class ReducedStructure:
     """A structure in the coordinates [relative displacements | stuck modes], `n` of them, at one nodal diameter.
 
-    frequencies (n_modes,): natural frequencies of the glued structure, rad/s, ascending; its modes have unit modal
-    mass. forms: Hermitian matrices (n, n) by their names, "stiffness" and "mass" among them. vectors (n, n_vectors):
-    generalised forces.
+    frequencies (n_modes,): natural frequencies of the glued structure, rad/s, ascending; the modes have unit modal
+        mass.
+    forms: Hermitian matrices (n, n) by name, with "stiffness" and "mass".
+    vectors (n, n_vectors): generalised forces.
     """
 
     frequencies: FloatArray
@@ -63,11 +64,14 @@ class ReducedStructure:
 
 @dataclass(frozen=True)
 class GluedStructure:
-    """A structure whose stiffness is factorised with its pairs glued, at one nodal diameter.
+    """A structure at one nodal diameter, with glued pairs and factorised stiffness.
 
-    Displacements and forces (3 n_places, n_vectors) stand in the order of elimination, the nodes of the pairs last.
-    factor: of all other nodes. last: of the coordinates `kept.glued`. stiffness (n_relative, n_relative): what is
-    left for the relative displacements.
+    Displacements and forces (3 n_places, n_vectors) are in the order of elimination, nodes of the pairs last.
+
+    factor: factors of all other nodes.
+    last: factors of the coordinates `kept.glued`.
+    kept: coordinates of the nodes of the pairs.
+    stiffness (n_relative, n_relative): reduced stiffness of the relative displacements.
     """
 
     factor: Factor
@@ -101,10 +105,10 @@ class GluedStructure:
 
 @dataclass(frozen=True)
 class Reduction:
-    """Forms of a structure, to be reduced at any nodal diameter.
+    """Forms of a structure that can be reduced at any nodal diameter.
 
-    ordered: the structure. forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by their names;
-    "stiffness" and "mass" must be among them, the others go along.
+    ordered: the structure.
+    forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name, with "stiffness" and "mass".
     """
 
     ordered: OrderedStructure

@@ -1,6 +1,6 @@
-"""How far the worn volumes of a file are to be trusted, in sentences: known to rtol or less well, ended early, why.
+"""Accuracy of the worn volumes of a file in sentences: known to rtol or less well, ended early, and why.
 
-The words, the numbers and the advice are those of the last lines of a run.
+Words, numbers and advice are those of the summary of a run.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ def tell_volumes(result: Result) -> str:
 
 
 def show_error(result: Result, place: tuple[int, ...]) -> str:
-    """The error of the worn volume of a point: "2.6 %"."""
+    """Error of the worn volume of a point as text: "2.6 %"."""
     return show_percent(float(result.errors[place]), float(result.rtol[place]))
 
 
 def tell_ends(result: Result) -> str:
-    """How many points were computed to the end, how many ended early and how many have no state."""
+    """Numbers of points that were computed to the end, ended early, or have no state."""
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
     text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
@@ -64,7 +64,7 @@ def tell_ends(result: Result) -> str:
 
 
 def describe_ended(result: Result, number: int) -> list[str]:
-    """The first points that ended in this way, each with its cycle, its error and its message."""
+    """The first points that ended in this way, each with cycle, error and message."""
     found = np.argwhere(result.dataset["outcome"].values == number)
     messages = result.dataset["message"].values if result.has("message") else None
     lines = []
@@ -84,7 +84,7 @@ def describe_ended(result: Result, number: int) -> list[str]:
 
 
 def advise_ended(result: Result, number: int) -> list[str]:
-    """What may help the points that ended in this way: a sentence for each that was used otherwise."""
+    """Advice for the points that ended in this way: a sentence for each group of settings."""
     found = np.argwhere(result.dataset["outcome"].values == number)
     # advice depends on a few axes: one point for each of their values
     axes = [place for place, name in enumerate(result.axes) if name in _OF_ADVICE]
@@ -94,7 +94,7 @@ def advise_ended(result: Result, number: int) -> list[str]:
 
 
 def advise_point(result: Result, place: tuple[int, ...]) -> str:
-    """What may help a point that ended otherwise than `converged`; empty where there is nothing to say."""
+    """Advice for a point whose outcome is not `converged`; empty where there is none."""
     ending = result.endings[int(result.dataset["outcome"].values[place])]
     return advise(ending.word, settings_of(result, place))
 
@@ -108,7 +108,7 @@ def advise_volume(result: Result, place: tuple[int, ...]) -> str:
 
 
 def settings_of(result: Result, place: tuple[int, ...]) -> Used:
-    """What a point was computed with, as far as the file says."""
+    """Settings of a point, as far as the file tells."""
     dataset, point = result.dataset, _point(result, place)
     solver: Mapping[str, Any] = result.study.get("solver", {})
     slow_time: Mapping[str, Any] = result.study.get("slow_time", {})

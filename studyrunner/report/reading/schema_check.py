@@ -18,7 +18,7 @@ from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, COUNTS, KEPT, LOOPS, SCENE, Variable
 
 MOST_POINTS = 10**6
-"""As many as a study may have."""
+"""Largest number of points of a study."""
 
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
 _LARGEST_READ = 2**24  # bytes
@@ -39,19 +39,19 @@ _NEEDED = ("outcome", "cycle", "contact")
 
 
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
-    """What the report takes of a file; variables stay unread but for coordinates, texts and the mesh.
+    """Variables of a file that the report knows. Only coordinates, texts and the mesh are read.
 
     Parameters
     ----------
     dataset
-        The file as it was opened.
+        The opened file.
     source
-        What the user calls it.
+        Name of the file for the user.
 
     Raises
     ------
     UserError
-        Where something that is needed is missing, or is not what it has to be.
+        Where a needed variable is missing or has a wrong shape or type.
     """
     lacking = [name for name in _NEEDED if name not in dataset.variables]
     if lacking:
@@ -83,14 +83,14 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
 
 
 def check_numbers(dataset: xr.Dataset, source: str) -> None:
-    """Look for numbers that are none of a joint that vibrates, and could not be drawn. NaN is no number.
+    """Looks for numbers that are too large to be drawn. NaN is allowed.
 
-    Of what is too large to be read as a whole, nothing is looked at.
+    Variables that are too large to be read as a whole are not tested.
 
     Raises
     ------
     UserError
-        Where there is one.
+        Where there is such a number.
     """
     # a final state that was found without slow time comes after any number of cycles
     infinite = (*_INFINITE, "last_cycle") if "cycle_count" in dataset.variables else _INFINITE
@@ -104,9 +104,9 @@ def check_numbers(dataset: xr.Dataset, source: str) -> None:
 
 @contextmanager
 def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
-    """Makes a UserError of what the libraries say of a file that is damaged. source: the file as the user named it.
+    """Turns errors of the libraries about a damaged file into UserError. source: name of the file for the user.
 
-    every: of anything they raise, as there is no list of it, where nothing but reading is done.
+    every: whether all errors are turned; for blocks that only read.
     """
     try:
         yield
@@ -119,14 +119,14 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study that a file carries, by table; empty where it is no TOML.
+    """The effective study of a file, by table; empty where it is no TOML.
 
-    Numbers are such that they can be counted with, texts are cleaned, and what is nested deeply is left out.
+    Numbers are limited, texts are cleaned, and deeply nested values are left out.
 
     Raises
     ------
     UserError
-        Where reading it would do harm.
+        Where reading the study would do harm.
     """
     text = str(attributes.get("study", ""))
     try:
@@ -140,7 +140,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
 
 
 class _WrongError(Exception):
-    """Something in a file is not what it has to be. name: of the variable. found: what it is."""
+    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
 
     def __init__(self, name: str, found: str) -> None:
         super().__init__(name, found)
@@ -149,7 +149,7 @@ class _WrongError(Exception):
 
 
 def _coordinates(dataset: xr.Dataset, axes: Sequence[str]) -> list[str]:
-    """Names of the values along the dimensions."""
+    """Names of the coordinates of the dimensions."""
     others = (name for name, entry in COORDINATES.items() if not entry.dimensions and name not in axes)
     return [*axes, *(name for name in others if name in dataset.variables and name in dataset.dims)]
 
@@ -212,7 +212,7 @@ def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions:
 
 
 def _check_values(kept: Mapping[str, xr.Variable]) -> None:
-    """What is used to find other values has to lead to some."""
+    """Tests the values that lead to other values: cycles, pairs, flags and mesh."""
     cycles = kept["cycle"].values
     if cycles.dtype.kind not in "iuf" or cycles[0] < 0 or (np.diff(cycles) <= 0).any():
         raise _WrongError("cycle", "no counts in ascending order")
@@ -240,7 +240,7 @@ def _texts(variable: xr.Variable, name: str) -> xr.Variable:
 
 
 def _attributes(variable: xr.Variable) -> dict[str, object]:
-    """Those that the report reads."""
+    """Attributes that the report reads."""
     kept: dict[str, object] = {}
     for name, longest in _ATTRIBUTES.items():
         if name in variable.attrs:
@@ -254,12 +254,12 @@ def _attributes(variable: xr.Variable) -> dict[str, object]:
 
 
 def _limit(name: str) -> int | None:
-    """Most characters of an attribute of the file; None where it has lines."""
+    """Largest number of characters of an attribute; None where the attribute has several lines."""
     return None if name in ("study", "certificate_summary") else _LONGEST_SENTENCE
 
 
 def _clean(value: object, longest: int | None) -> str:
-    """Text that shows itself and nothing else. longest: characters, None for a text of many lines."""
+    """Text without markup and control characters. longest: number of characters; None for a text of many lines."""
     text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
     if longest is None:
         return show_text(text)
@@ -268,7 +268,7 @@ def _clean(value: object, longest: int | None) -> str:
 
 
 def _plain(value: object, deepest: int) -> object:
-    """A value of a study that can be shown and counted with; None for what is nested too deeply."""
+    """A value of a study for text and arithmetic; None where it is nested too deeply."""
     if isinstance(value, bool | float):
         return value
     if isinstance(value, int):
