@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
-from solver.wear import bdf2
+from solver.wear import control
 from tests.solver.models import branch_states, march_wear, scene
 from tests.solver.test_march import AREA, COARSE, CYCLES, END, FRICTION, OMEGA, WEAR, march, slider_start
 
@@ -60,8 +60,8 @@ def test_steps_are_of_second_order() -> None:
 
 def test_a_step_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None:
     # no error is refused, so that the steps are known: the first one Euler's, the second one by the formula with w
-    options = replace(bdf2.WEAR, step_error_fraction=1e9, first_step=1e-2, first_depth=1e9)
-    monkeypatch.setattr(bdf2, "WEAR", options)
+    options = replace(control.WEAR, step_error_fraction=1e9, first_step=1e-2, first_depth=1e9)
+    monkeypatch.setattr(control, "WEAR", options)
     first = 1e-2 * adaptive_march(1.0).step_limit
     w = options.largest_step_ratio
     history = adaptive_march(1.0, cycles=np.array([0.0, first, (1 + w) * first, END]))

@@ -48,7 +48,7 @@ def march(
     largest_depth: float | None = None,
 ) -> WearHistory:
     model, start = slider_start(settings)
-    return march_wear(model, FRICTION, start, wear, step, scheme, cycles, settings, largest_depth)
+    return march_wear(model, FRICTION, start, wear, step, scheme, cycles, settings, largest_depth=largest_depth)
 
 
 @lru_cache
