@@ -120,7 +120,9 @@ def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monk
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
-def test_a_history_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_history_goes_on_before_and_behind_a_jump(
+    scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=30))
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, step, scheme, 1000.0, settings)

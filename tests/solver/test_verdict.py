@@ -29,7 +29,11 @@ def test_a_history_that_is_known_says_nothing() -> None:
 @pytest.mark.parametrize(
     ("other", "error", "said"),
     [
-        (1e-9, 0.6, "worn volume 2 mm3, but 1 mm3 with steps twice as long, fewer harmonics and a coarser sweep: known"),
+        (
+            1e-9,
+            0.6,
+            "worn volume 2 mm3, but 1 mm3 with steps twice as long, fewer harmonics and a coarser sweep: known",
+        ),
         (1.8e-9, 3.0, "worn volume 2 mm3, not known: 1.8 mm3 with steps twice as long, fewer harmonics and a coarser"),
         (np.nan, 0.6, "worn volume 2 mm3, known to 60 % only: with steps twice as long, fewer harmonics and a coarser"),
         (np.nan, np.inf, "worn volume 2 mm3, not known: with steps twice as long"),
