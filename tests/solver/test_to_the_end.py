@@ -19,7 +19,6 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.wear.final_state.find import find_final_state
 from solver.wear.options import WEAR
-from solver.wear.output import DenseOutput
 from solver.wear.solutions import SlowTime
 from studies import build_scene
 from tests.solver.models import march_wear
@@ -90,27 +89,6 @@ def test_a_smaller_share_goes_nearer_to_the_end() -> None:
     left = [np.abs(each.wear_depth[-1] - limit).max() / limit.max() for each in found]
     assert all(later < 0.5 * earlier for earlier, later in pairwise(left))
     assert left[0] < 0.1
-
-
-def test_what_is_left_out_of_many_steps_changes_little(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = worn(ToTheEnd(9))
-    monkeypatch.setattr("solver.wear.output.WEAR", replace(WEAR, kept_steps=24))
-    lengths: list[int] = []
-    add = DenseOutput.add
-
-    def count(output: DenseOutput, *given: Any) -> None:
-        add(output, *given)
-        if output.counts is None:
-            lengths.append(len(output.taken.nodes))
-
-    monkeypatch.setattr(DenseOutput, "add", count)
-    thinned = worn(ToTheEnd(9))
-    assert len(lengths) > 24
-    assert max(lengths) <= 24
-    assert thinned.cycles[-1] == whole.cycles[-1]
-    assert thinned.cycles[1:] == pytest.approx(whole.cycles[1:], rel=1e-2)
-    assert thinned.wear_depth == pytest.approx(whole.wear_depth, abs=2e-3 * whole.wear_depth.max())
-    assert thinned.worn_volume_error == pytest.approx(whole.worn_volume_error, rel=0.5, abs=2e-3)
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
