@@ -9,8 +9,8 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
+from solver.loading_history.sweep_start import Sweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory

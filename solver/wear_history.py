@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word
-from solver.loading_history.origin import Sweep
 from solver.loading_history.start_states import follow_branch
+from solver.loading_history.sweep_start import Sweep
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import TARGETS, Scheme, SolverSettings, ToTheEnd, WearTarget

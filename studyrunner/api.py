@@ -10,16 +10,16 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
-from studyrunner.mpi.hand_out import HandOut
+from studyrunner.mpi.broadcast import Broadcast
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
 from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
+from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
-from studyrunner.netcdf.standing import Target, check_result
-from studyrunner.report.reading.door import check_dataset, reading_errors
 from studyrunner.report.reading.result import open_vetted
-from studyrunner.run import Interrupted, serve_study
+from studyrunner.report.reading.schema_check import check_dataset, reading_errors
+from studyrunner.run import Interrupted, RunOptions, serve_study
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -100,17 +100,14 @@ def run_study(
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
         with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
             alone = Alone()
-            model = HandOut(alone, {0: describe_machine()}, build_study_scene(study))
+            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study))
             serve_study(
                 alone,
                 study,
                 model,
                 target,
                 shown,
-                fresh=fresh,
-                retry_failed=retry_failed,
-                prune=prune,
-                date=checked,
+                RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked),
             )
     except Interrupted as ended:
         summary = ended.summary

@@ -1,8 +1,8 @@
-"""The command `run-study`: an ending in good order from the first moment, before all that takes time is loaded."""
+"""The command `run-study`. Signals are handled from the first moment, before slow imports."""
 
 from __future__ import annotations
 
-import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.own_modules_only  # noqa: F401 - where all others are looked for
 
 # isort: split
 import sys

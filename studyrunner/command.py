@@ -1,4 +1,4 @@
-"""What the command `run-study` does on each rank."""
+"""The command `run-study` on each rank."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 _SECONDS_FOR_RANK_0 = 60.0
-"""Rank 0 has so long to write what there is, before a rank that was interrupted ends the run without it."""
+"""Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
 
 _SECONDS_FOR_A_LINE = 2.0
 _SECONDS_WITHOUT_A_WORD = 3.0
 
 
 class _SlowSteps:
-    """Lines on stderr about a scene that takes long to build; none where it is built, or refused, at once."""
+    """Lines on stderr about a scene that takes long to build; no line for a fast one."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
@@ -47,7 +47,7 @@ class _SlowSteps:
 
 
 def run_command(arguments: Sequence[str] | None) -> int:
-    """As `studyrunner.cli.main`. Raises KeyboardInterrupt where it was ended before the ranks have found each other."""
+    """As `studyrunner.cli.main`. Raises KeyboardInterrupt where the run was ended before the ranks have started."""
     keep_talking()
     # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
     os.environ.update(dict.fromkeys(_THREADS, "1"))
@@ -95,9 +95,9 @@ def run_command(arguments: Sequence[str] | None) -> int:
 
 
 def _leave_to_rank_0(ranks: Ranks) -> bool:
-    """Waits for rank 0 to write what there is and to end all ranks; it is told, if the launcher has not told all.
+    """Waits for rank 0 to write the result and to end all ranks, after telling rank 0 of the end.
 
-    Whether it had come to its end already, with nothing left to do here.
+    Returns whether rank 0 had already finished.
     """
     from studyrunner.mpi.schedule import RankInterrupted
 
@@ -113,7 +113,7 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0. The other ranks get the model and tasks, or None where there is nothing to compute."""
+    """Rank 0. The other ranks get the model and tasks, or None where nothing has to be computed."""
     try:
         from studyrunner.mpi.version_check import check_versions
 
@@ -148,8 +148,8 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
 
 def _follow(ranks: Ranks) -> int:
-    """Any other rank; rank 0 alone has an exit status to give."""
-    from studyrunner.mpi.hand_out import LostError, take_over
+    """Any other rank. Only rank 0 has an exit status."""
+    from studyrunner.mpi.broadcast import LostError, take_over
     from studyrunner.mpi.version_check import report_version
 
     report_version(ranks)
@@ -167,7 +167,7 @@ def _follow(ranks: Ranks) -> int:
 
 def _show_plan(study: Study) -> int:
     from studyrunner.plan.estimate import largest_memory
-    from studyrunner.plan.printed import format_plan
+    from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.tasks import build_tasks
     from studyrunner.scene.scene import build_study_scene, describe_scene
 
@@ -184,7 +184,7 @@ def _show_plan(study: Study) -> int:
 
 def _check(study: Study) -> int:
     from studyrunner.netcdf.output import check_output
-    from studyrunner.scene.model_check import check_study_model
+    from studyrunner.scene.check_command import check_study_model
 
     picture = Path(f"{study.study.name}.check.png")
     target = check_output("--check", picture, study.files)
@@ -194,8 +194,8 @@ def _check(study: Study) -> int:
 
 
 def _write_scene(study: Study, path: Path) -> int:
+    from studyrunner.netcdf.existing_result import check_scene_file
     from studyrunner.netcdf.output import check_output
-    from studyrunner.netcdf.standing import check_scene_file
     from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
@@ -206,11 +206,11 @@ def _write_scene(study: Study, path: Path) -> int:
 
 
 def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
-    from studyrunner.mpi.hand_out import HandOut
+    from studyrunner.mpi.broadcast import Broadcast
+    from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.netcdf.standing import check_result
-    from studyrunner.run import Interrupted, serve_study
+    from studyrunner.run import Interrupted, RunOptions, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
@@ -218,7 +218,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = HandOut(ranks, machines, build_study_scene(study, _SlowSteps().say))
+    model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say))
     for line in compare_with_archived(study, model.value):
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:
@@ -231,10 +231,9 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
                 model,
                 target,
                 progress,
-                fresh=options.fresh,
-                retry_failed=options.retry_failed,
-                prune=options.prune,
-                date=options.date,
+                RunOptions(
+                    fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date
+                ),
             )
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"

@@ -12,7 +12,7 @@ from solver.outcome import Outcome
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
 from solver.results.verdict import judge
-from studyrunner.plan.places import describe_reach, show_count
+from studyrunner.plan.point_text import describe_reach, show_count
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import MarchTask
 from studyrunner.variables import KEPT

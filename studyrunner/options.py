@@ -38,7 +38,11 @@ is in the folder OUT.nc.parts; with it a study that is changed computes only wha
 
 @dataclass(frozen=True)
 class Options:
-    """The command line. output: None for `<study name>.nc` in the current folder. date: checked, None for none."""
+    """Options of the command line.
+
+    output: path of the result; None for `<study name>.nc` in the current folder.
+    date: checked date; None for none.
+    """
 
     study: str
     output: Path | None
@@ -61,7 +65,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _SceneHelp(argparse.Action):
-    """Prints what a bundled scene is and ends, as --help does."""
+    """Prints the description of a bundled scene and ends, as --help does."""
 
     def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
         from studies.scene_help import scene_help
@@ -74,7 +78,7 @@ class _SceneHelp(argparse.Action):
 
 
 def parse_options(arguments: Sequence[str]) -> Options:
-    """The command line. Raises UserError; SystemExit after --help and --scene-help."""
+    """Options from the command line. Raises UserError; SystemExit after --help and --scene-help."""
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,

@@ -1,9 +1,9 @@
-"""One run: hands out the tasks of a study that are left, gathers the results and writes the file."""
+"""One run of a study: does the tasks that are left, and writes the result file."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,18 +23,18 @@ from studyrunner.mpi.crashes import (
     read_tally,
 )
 from studyrunner.mpi.ranks import Ranks, wait_for_message
-from studyrunner.mpi.schedule import serve_tasks, work_on_tasks
+from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
+from studyrunner.netcdf.existing_result import Target, note_study
 from studyrunner.netcdf.output import parts_folder, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.software import describe_software
-from studyrunner.netcdf.standing import Target, note_study
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
-from studyrunner.scene.scene import describe_scene, scene_to_keep
+from studyrunner.scene.scene import KeptScene, SceneFacts, describe_scene, scene_to_keep
 from studyrunner.scene.static_response import static_response
-from studyrunner.scene.variables import build_scene_variables
+from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending
@@ -48,12 +48,12 @@ if TYPE_CHECKING:
 
     from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
-    from studyrunner.mpi.hand_out import HandOut
+    from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.gather import Gathered
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was ended from outside; the file holds what was computed until then. summary: how far it was."""
+    """A run was ended from outside; the result file holds the points computed so far. summary: state of the run."""
 
     def __init__(self, summary: RunSummary) -> None:
         super().__init__(summary)
@@ -62,7 +62,12 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for the tasks of a study beside its model. folder: of the run, which not all need see."""
+    """What every rank needs for its tasks beside the model.
+
+    friction_coefficient: of all pairs; None where each pair has its own.
+    law: wear law.
+    folder: of the run; not every rank needs to see it.
+    """
 
     friction_coefficient: float | None
     law: WearLaw
@@ -71,10 +76,15 @@ class Job:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """How a run ended. n_complete: points computed to the end. n_left: those that are not computed yet.
+    """Summary of a run.
 
-    n_found: points that an earlier run has left. findings: lines that name what failed or is less exact than asked for.
-    certificates: the table that begins with the worn volume. written: whether the file holds this, or is as it was.
+    n_points: number of points of the study.
+    n_complete: number of points computed to the end.
+    n_left: number of points that are not computed yet.
+    n_found: number of points that an earlier run has left.
+    findings: lines on points that failed or are less exact than requested.
+    certificates: the table that begins with the worn volumes.
+    written: whether the file was written; else a finished result was kept.
     """
 
     n_points: int
@@ -86,134 +96,195 @@ class RunSummary:
     written: bool
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """What a run does with earlier results, and the date in the file.
+
+    fresh: whether the run begins anew. Else the run continues what is in the folder.
+    retry_failed: whether failed points in the folder are computed again.
+    prune: whether results of other studies in the folder are removed at the end.
+    date: date of creation, as `check_date` gives it; None for no date in the file.
+    """
+
+    fresh: bool = False
+    retry_failed: bool = False
+    prune: bool = False
+    date: str | None = None
+
+
+@dataclass(frozen=True)
+class _ResultWriter:
+    """Writes the result file from the finished points.
+
+    study, plan, facts: the study, its tasks, and facts of its scene.
+    of_scene, kept_scene: variables of the scene, and the model that the file keeps.
+    target: the file.
+    software: attributes on the program.
+    date: as in `RunOptions`.
+    said: doubts that the user has seen.
+    """
+
+    study: Study
+    plan: TaskPlan
+    facts: SceneFacts
+    of_scene: Sequence[SceneVariable]
+    kept_scene: KeptScene | None
+    target: Target
+    software: Mapping[str, str]
+    date: str | None
+    said: Sequence[str]
+
+    def write(self, completion: CompletionIndex, n_found: int, progress: ProgressDisplay) -> RunSummary:
+        """Writes the file. n_found: number of points that an earlier run has left."""
+        # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
+        from studyrunner.netcdf.gather import gather
+
+        completion.store.flush()
+        target = self.target
+        gathered = gather(
+            self.study,
+            self.facts,
+            completion,
+            target.path,
+            self.of_scene,
+            self.kept_scene,
+            target.finished,
+            {**self.software, **describe_date(self.date)},
+        )
+        for doubt in gathered.doubts:
+            if doubt not in self.said:
+                progress.note(doubt)
+        return _summarise(self.plan, n_found, gathered, target.finished)
+
+
 def serve_study(
     ranks: Ranks,
     study: Study,
-    hand_out: HandOut[ReducedModel],
+    broadcast: Broadcast[ReducedModel],
     target: Target,
     progress: ProgressDisplay,
-    *,
-    fresh: bool = False,
-    retry_failed: bool = False,
-    prune: bool = False,
-    date: str | None = None,
+    options: RunOptions,
 ) -> RunSummary:
-    """Rank 0: computes the study of this model together with the other ranks and writes the file `target.path`.
+    """Rank 0: computes a study together with the other ranks and writes the file `target.path`.
 
-    A finished result that stands there already is replaced by one without missing points only.
+    A finished result at this path is replaced by a result without missing points only.
 
     Parameters
     ----------
     ranks, study
-        The ranks, and what they are to compute.
-    hand_out
-        The reduced model of the study's scene, which every rank gets.
+        The ranks, and the study that they compute.
+    broadcast
+        The reduced model of the scene, which every rank gets.
     target
-        The result file, as `check_result` gives it; beside it is the folder of what an earlier run has left.
+        The result file, as `check_result` gives it. The folder of an earlier run lies beside the file.
     progress
-        What the user sees on the way.
-    fresh
-        Whether to begin anew. Else the run goes on from what is in the folder.
-    retry_failed
-        Whether points that failed there are computed again.
-    prune
-        Whether what other studies have left there is removed at the end.
-    date
-        Of creation, as `check_date` gives it; None for none in the file.
+        What the user sees during the run.
+    options
+        What is done with earlier results.
 
     Raises
     ------
     UserError
-        Where another run is at work there.
+        Where another run uses the folder.
     StorageError
         Where something cannot be written.
     Interrupted
-        Where the run is ended from outside; what there is has been written.
+        Where the run is ended from outside; finished points have been written.
     """
-    model = hand_out.value
-    facts = replace(describe_scene(model), static_response=static_response(model))
-    plan = build_tasks(study, facts.n_displacements)
-    # Before anything else is computed: what the scene cannot tell is bad input.
-    if "natural_frequency" in study.outputs.variables:
-        progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model)
-    kept_scene = scene_to_keep(study, model)
-    path = target.path
-    # as it is when the run begins: a checkout may be another one at its end
-    software = describe_software(PACKAGES[0])
-    kind = record_type(study, facts)
-    store = _open_store(parts_folder(path), kind)
+    store, completion, writer = _prepare(study, broadcast.value, target, progress, options)
     with contextlib.closing(store):
-        note_study(path, study)
-        said = doubts_of_study(study)
-        for note in (*store.notes, *said):
-            progress.note(note)
-        remove_leftovers(path, alone=store.locked)
-        completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
-        if fresh:
-            completion.forget_all()
-        if retry_failed:
-            # before crashes are looked at: what has ended two processes since it was tried again has failed again
-            completion.forget_failed(COMPLETE)
-        crashes = take_crashes(completion, fresh=fresh)
-        for crash in crashes:
-            if completion.is_left(crash.key):
-                progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
-        n_found = completion.n_points_finished
-        if n_found:
-            progress.say(f"{n_found} of {count(plan.n_points, 'point')} are there from an earlier run")
-
-        def write() -> RunSummary:
-            # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-            from studyrunner.netcdf.gather import gather
-
-            store.flush()
-            origin = {**software, **describe_date(date)}
-            gathered = gather(study, facts, completion, path, of_scene, kept_scene, target.finished, origin)
-            for doubt in gathered.doubts:
-                if doubt not in said:
-                    progress.note(doubt)
-            return _summarise(plan, n_found, gathered, target.finished)
-
+        n_found = _begin(completion, writer.plan.n_points, options, progress)
         try:
-            hand_out.send()
+            broadcast.send()
             job = Job(study.friction_coefficient, study.wear_law, store.folder)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
-            with _evaluator(model, job, rank=0) as evaluate:
+            with _evaluator(broadcast.value, job, rank=0) as evaluate:
                 run_tasks(ranks, completion, evaluate, progress)
             progress.say("writing the result")
-            summary = write()
+            summary = writer.write(completion, n_found, progress)
         except BaseException as error:
             if not is_ending(error):
                 raise
             begin_ending()
-            raise Interrupted(write()) from None
+            raise Interrupted(writer.write(completion, n_found, progress)) from None
         if summary.n_left == 0:
-            forget_crashes(store.folder, None if prune else completion.keys - _tried_again(completion))
-            completion.prune(0.0 if prune else MOST_OF_OTHERS)
-            # the result stands: what an ending keeps from being packed is packed by the next run
-            try:
-                completion.pack()
-            except KeyboardInterrupt:
-                begin_ending()
+            _tidy(completion, prune=options.prune)
     return summary
 
 
+def _prepare(
+    study: Study, model: ReducedModel, target: Target, progress: ProgressDisplay, options: RunOptions
+) -> tuple[Store, CompletionIndex, _ResultWriter]:
+    """The open folder of the run, the index of finished points, and the writer of the result.
+
+    Raises UserError where the scene lacks what the study asks for, before anything is computed.
+    """
+    facts = replace(describe_scene(model), static_response=static_response(model))
+    plan = build_tasks(study, facts.n_displacements)
+    if "natural_frequency" in study.outputs.variables:
+        progress.say("finding the natural frequencies of the scene")
+    of_scene = build_scene_variables(study, model)
+    kept_scene = scene_to_keep(study, model)
+    # The software is described when the run begins: a checkout may have changed at the end of the run.
+    software = describe_software(PACKAGES[0])
+    kind = record_type(study, facts)
+    store = _open_store(parts_folder(target.path), kind)
+    try:
+        note_study(target.path, study)
+        said = doubts_of_study(study)
+        for note in (*store.notes, *said):
+            progress.note(note)
+        remove_leftovers(target.path, alone=store.locked)
+        completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
+    except BaseException:
+        store.close()
+        raise
+    writer = _ResultWriter(study, plan, facts, of_scene, kept_scene, target, software, options.date, said)
+    return store, completion, writer
+
+
+def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, progress: ProgressDisplay) -> int:
+    """Applies the options to the results of earlier runs; returns the number of finished points."""
+    if options.fresh:
+        completion.forget_all()
+    if options.retry_failed:
+        # before crashes are looked at: what has ended two processes since it was tried again has failed again
+        completion.forget_failed(COMPLETE)
+    for crash in take_crashes(completion, fresh=options.fresh):
+        if completion.is_left(crash.key):
+            progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
+    n_found = completion.n_points_finished
+    if n_found:
+        progress.say(f"{n_found} of {count(n_points, 'point')} are there from an earlier run")
+    return n_found
+
+
+def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
+    """Removes what a finished study no longer needs, and packs the rest."""
+    forget_crashes(completion.store.folder, None if prune else completion.keys - _tried_again(completion))
+    completion.prune(0.0 if prune else MOST_OF_OTHERS)
+    # the result stands: what an ending keeps from being packed is packed by the next run
+    try:
+        completion.pack()
+    except KeyboardInterrupt:
+        begin_ending()
+
+
 def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Crash]:
-    """Points whose task has crashed two processes in earlier runs have failed.
+    """Marks the points of tasks as failed that have ended two processes in earlier runs.
 
     Parameters
     ----------
     completion
-        What is finished, in the folder of the run.
+        The finished tasks in the folder of the run.
     fresh
-        Whether crashes of this study's tasks in earlier runs do not count.
+        Whether earlier crashes of the tasks of this study do not count.
 
     Returns
     -------
     list of Crash
-        The new ones of tasks that have crashed once.
+        New crashes of tasks that have crashed once.
     """
     folder, own = completion.store.folder, completion.keys
     new = count_crashes(folder)
@@ -229,7 +300,7 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
 
 
 def _tried_again(completion: CompletionIndex) -> set[str]:
-    """Tasks that had crashed too often, were tried again and have crashed once more: that is counted on."""
+    """Tasks that had crashed too often, were tried again and have crashed once more."""
     tally = {key for key, crashes in read_tally(completion.store.folder).items() if len(crashes) < MOST_DEATHS}
     return tally & completion.tasks_with(Outcome.CRASHED) if tally else set()
 
@@ -256,7 +327,7 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
 
 
 def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
-    """Any other rank, once it has got the model: computes tasks until there are none."""
+    """Any other rank after it has received the model: does tasks until there are none."""
     job = wait_for_message(ranks)
     if not isinstance(job, Job):
         raise TypeError(f"rank 0 sent {job!r} instead of a job")
@@ -265,7 +336,7 @@ def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
 
 
 def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
-    """The function that does tasks on a rank. One that breaks off gives results that say so; others go on."""
+    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
     compute = build_evaluator(model, job.friction_coefficient, job.law)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -293,7 +364,7 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
 
 
 def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, progress: ProgressDisplay) -> None:
-    """Rank 0: has all tasks that are left done and their results written. The others work on tasks."""
+    """Rank 0: has the remaining tasks done and their results saved."""
     tally = read_tally(completion.store.folder)
     tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
 
@@ -336,5 +407,6 @@ def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, pro
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    serve_tasks(ranks, tasks.begin(), evaluate, take, tasks.costs, tick, tasks.keep, take_back, is_sick)
+    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick)
+    serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
     completion.store.flush()

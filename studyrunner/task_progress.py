@@ -1,4 +1,4 @@
-"""How far the tasks of a study are, and what their results make possible."""
+"""State of the tasks of a study, and the tasks that results make possible."""
 
 from __future__ import annotations
 
@@ -9,31 +9,32 @@ from dataclasses import replace
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mpi.crashes import MOST_DEATHS, Crash
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
 from studyrunner.system.progress import Standing
 
 _TRIES_AGAIN = 1
-"""So often a task that a fault of the machine has ended is done again by itself."""
+"""Number of tries again of a task that a fault of the machine has ended."""
 
 _COST_AT_REST = 0.01
-"""Estimated time of a march where nothing wears, over that of one that takes its steps."""
+"""Estimated time of a history in which nothing wears, over the time of a history with steps."""
 
 _LATE = 0.3
-"""A task that takes longer than expected goes on for such a fraction of the time that it has taken: what is known to a
-factor of two and is late by that factor has, on the mean, so much of it before it."""
+"""Expected further time of a task that takes longer than estimated, over the time so far. For an estimate with an
+uncertainty factor of two the mean further time is this fraction.
+"""
 
 
 class TaskProgress:
-    """How far the tasks of a study are, and what their results make possible.
+    """State of the tasks of a study, and the tasks that results make possible.
 
-    A march becomes available with its start state, while its branch goes on. What a task computes never depends on the
-    order. n_crashes: by the key of a task, how many processes it has ended in earlier runs.
+    A wear history becomes possible with its start state, while the branch goes on. Results of a task do not depend on
+    the order. n_crashes: number of processes that each task has ended in earlier runs, by hash.
     """
 
     def __init__(self, completion: CompletionIndex, n_crashes: Mapping[str, int] | None = None) -> None:
-        self.costs = LearnedCosts()
+        self.costs = CostModel()
         self.branches = completion.branches_left()
         self.n_points = completion.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
@@ -48,14 +49,14 @@ class TaskProgress:
         self._left[MARCHES] = sum(march.cost for line in lines for march in line if not completion.is_finished(march))
 
     def begin(self) -> Iterator[BranchTask | MarchTask]:
-        """The tasks that are possible from the start."""
+        """Tasks that are possible at the beginning."""
         yield from self.branches
         for branch in self._completion.plan.branches:
             for result in self._completion.known_starts(branch):
                 yield from self._start(branch, result)
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
-        """Takes a result; returns the tasks that it makes possible, or that are to be done again."""
+        """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
         self._left[task.kind] -= task.cost_of(first=_is_first(task, result))
         self._words.pop(task.key, None)
         self.n_starts_left -= isinstance(task, BranchTask)
@@ -73,14 +74,14 @@ class TaskProgress:
         return ()
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
-        """Takes how far a task is, to go on from there, or what it is at, in words."""
+        """Takes the progress of a task: data to continue from, or words."""
         if isinstance(progress, str):
             self._words[task.key] = progress
         else:
             self._completion.keep(task, progress)
 
     def _try_again(self, task: BranchTask | MarchTask) -> Sequence[BranchTask | MarchTask]:
-        """A task that a fault of the machine has ended, for once; then its points are left to another run."""
+        """The task that a fault of the machine has ended, once; later its points are left to another run."""
         self._n_faults[task.key] += 1
         if self._n_faults[task.key] > _TRIES_AGAIN:
             return ()
@@ -97,11 +98,11 @@ class TaskProgress:
     def take_back(
         self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
     ) -> list[BranchTask | MarchTask]:
-        """What is to be done in place of the tasks of a lost rank, each with the number of results still to be given.
+        """Tasks in place of the tasks of a lost rank, each with the number of results still to come.
 
-        The rank was at the first of them, or at the one that it has left word of. crashes: those words, by the key of
-        the task. A task is tried once more; one with which two ranks were lost is not, be it that it crashes or that it
-        needs more memory than there is.
+        The rank was doing the first task, or the task that it has noted. crashes: these notes, by hash of the task. A
+        task is tried once more. A task with which two ranks were lost is not tried again, as it crashes or needs too
+        much memory.
         """
         left: list[BranchTask | MarchTask] = []
         keys = [task.key for task, _ in lost]
@@ -145,7 +146,7 @@ class TaskProgress:
         return new
 
     def look(self, running: Sequence[tuple[BranchTask | MarchTask, int, float]]) -> Standing:
-        """How far the tasks are. running: as `Dispatcher.running`."""
+        """State of the tasks. running: as `Dispatcher.running`."""
         factors = {kind: self.costs.correction(((kind,),)) for kind in self._left}
         left = sum(max(0.0, seconds) * factors[kind] for kind, seconds in self._left.items())
         longest = 0.0
@@ -163,7 +164,7 @@ class TaskProgress:
         )
 
     def _describe(self, task: BranchTask | MarchTask, n_left: int) -> str:
-        """What a task is at."""
+        """A running task in words."""
         if isinstance(task, BranchTask):
             place = task.order_left[task.n_results - n_left]
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
@@ -173,28 +174,28 @@ class TaskProgress:
 
 
 def _is_first(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> bool:
-    """Whether a result is the first one of its task."""
+    """Whether a result is the first of its task."""
     if isinstance(task, BranchTask) and isinstance(result, StartResult):
         return result.position == next(place for place in task.order if place not in task.known)
     return isinstance(result, MarchResult) and result.place == 0
 
 
 def _cost_left(task: BranchTask | MarchTask, n_left: int) -> float:
-    """Estimated seconds of the last results of a task."""
+    """Estimated time of the remaining results of a task, s."""
     return task.cost if n_left == task.n_results else n_left * task.cost_of(first=False)
 
 
 def fault_of(result: StartResult | MarchResult) -> str:
-    """The fault of the machine that a rank sends in place of a result; nothing where it is one."""
+    """Fault of the machine that a rank sends in place of a result; empty for a result."""
     if isinstance(result, StartResult):
         return result.lost
     return result.message if result.outcome == Outcome.NOT_COMPUTED else ""
 
 
 def start_marches(planned: Sequence[MarchTask], started: StartResult) -> tuple[MarchTask, ...]:
-    """The marches from a start state. Where something moves they take about the same time, be it little or much.
+    """Wear histories from a start state. Where something moves they take about the same time, whatever the motion.
 
-    The time grows with the unknowns of the state itself, not with a power: marches seldom factorise anew.
+    The time grows in proportion to the number of unknowns, as a history seldom factorises anew.
     """
     tasks = []
     for task in planned:

@@ -79,8 +79,8 @@ def history_error(
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
     difference = safety * np.abs(depth - reference["wear_depth"])
     error = np.fmax(difference @ area, safety * met.largest_before(counts))
-    # the error of the start state grows while the joint wears
-    error = np.fmax(error, ACCURACY.start_safety * _start_error(fine, reference, area) * volume)
+    # a later state that happens to be the same does not make the start better known
+    error = np.fmax(error, _start_error(fine, reference, area) * volume)
     # in the first steps both histories have the same error, which only the wear rates at their ends show
     error = np.fmax(error, fine["local"])
     reached = np.isfinite(volume)

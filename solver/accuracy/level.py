@@ -102,9 +102,7 @@ class Level:
         excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        cheap = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
-        small = ACCURACY.small_slip_work if cheap else ACCURACY.dear_small_slip_work
-        return max(small * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, effort: Effort) -> Level | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
@@ -173,8 +171,7 @@ class Level:
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        few = self.joint.component_index.size <= ACCURACY.few_displacements
-        most = ACCURACY.few_far_unknowns if few else ACCURACY.far_unknowns
+        most = ACCURACY.far_unknowns
         if self.may_solve(shifted(self.case.resolution, 2), most):
             reaching = levels_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2

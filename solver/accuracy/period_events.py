@@ -63,3 +63,15 @@ def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float
             lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
             shortest = min(shortest, int(lasted.min()))
     return float(shortest / n_samples)
+
+
+def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:
+    """Part of the vibrating contact force, over its size, that lies in harmonics which are left out.
+
+    The samples of the force hold harmonics up to half their number. The series of the state holds the harmonics
+    `orders` alone. What lies beyond grows and falls with the error of the state.
+    """
+    force_h = np.fft.rfft(evaluation.force_t, axis=2)[:, :, 1:]
+    size = np.linalg.norm(force_h)
+    beyond = np.delete(force_h, np.array(orders, int) - 1, axis=2)
+    return float(np.linalg.norm(beyond) / size) if size > 0.0 else 0.0

@@ -2,7 +2,8 @@
 
 The difference of a computation to its reference solution, pair by pair, is taken for its error. Coarser are
 
-- the sweep to the start state: half the nodes, between those of the sweep (`solver.loading_history`);
+- the sweep to the start state: half the nodes, between those of the sweep (`solver.loading_history`). The tangential
+  history that both sweeps leave is extrapolated: the reference solution starts from twice the difference;
 - the harmonics: one level less, and the samples that go with them;
 - the steps on the slow time: one where the history takes two.
 
@@ -16,21 +17,15 @@ same direction. Their reference solution takes implicit steps, whose error has t
 from __future__ import annotations
 
 from solver.accuracy.harmonic_levels import fewer, shifted
-from solver.settings import RESOLUTION, Resolution, SolverSettings
+from solver.settings import Resolution, SolverSettings
 
 AUTOMATIC = SolverSettings()
 """With these settings harmonics and samples may be left out."""
 
 
 def coarser(resolution: Resolution) -> Resolution:
-    """Harmonics and samples of the reference solution.
-
-    One harmonic cannot be left out, and with one harmonic alone a joint that slips is another joint: with few harmonics
-    the reference solution has more.
-    """
-    if resolution.highest <= RESOLUTION.first_harmonics:
-        return shifted(resolution, 1)
-    return fewer(resolution, AUTOMATIC)
+    """Harmonics and samples of the reference solution: one level less, or one level more than one harmonic alone."""
+    return shifted(resolution, 1) if resolution.highest <= 1 else fewer(resolution, AUTOMATIC)
 
 
 def every_second(ends: tuple[float, ...]) -> tuple[float, ...]:

@@ -20,9 +20,8 @@ from solver.accuracy.level import Level
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.harmonic_balance.converged import PathPoint
-from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Effort
-from solver.settings import Resolution
+from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
 
 
@@ -77,95 +76,130 @@ def refine(
     OutOfTimeError
         Behind the deadline of the effort.
     """
-    settings = case.settings
-    here = Level(case, case.joint(omega, excitation_amplitude), point, usual_work)
-    here = here.at_rest(effort)
-    begun = effort.iterations
-    faint = False
-    richer: Level | None = None
-    while True:
-        if nothing_happens(here.point.evaluation):
-            if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
-                first = here.solve_at(Resolution((1,), here.case.resolution.samples), effort)
-                here = first or here
-            missed = here.missed_event(effort)
-            if missed is None:
-                return Refined(here.case, here.point, NOTHING, True)
-            if settings.samples != "auto":
-                missing = here.difference(missed).times(ACCURACY.double_samples_safety)
-                accurate = not settings.automatic or missing.largest <= settings.rtol
-                return Refined(here.case, here.point, missing, accurate)
-            here, faint = missed, True
-            continue
-        if settings.harmonics == "auto":
-            here = here.without_even(effort) or here.with_even(effort) or here
-        resolution = here.case.resolution
-        by_samples, finer = here.samples_error(effort)
-        by_harmonics, richer = here.harmonics_error(effort, richer)
-        above = shifted(resolution, 1)
-        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and _allowed(here, above, most)
-        if richer is None and settings.harmonics == "auto" and cheap:
+    search = _Search(case.settings, effort, effort.iterations, most)
+    return search.refined(Level(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(effort))
+
+
+@dataclass
+class _Search:
+    """The search for the harmonics and samples that a state needs.
+
+    settings: what is automatic, and rtol.
+    effort, begun: Newton iterations are counted here, and how many there were before.
+    most: as in `refine`.
+    faint: whether slip shows with more samples only than those of the state that was given.
+    """
+
+    settings: SolverSettings
+    effort: Effort
+    begun: int
+    most: float
+    faint: bool = False
+
+    def refined(self, here: Level) -> Refined:
+        """The state of the level that suffices, or of the last one found."""
+        richer: Level | None = None
+        while True:
+            if nothing_happens(here.point.evaluation):
+                linear = self._linear(here)
+                if isinstance(linear, Refined):
+                    return linear
+                here, self.faint = linear, True
+                continue
+            if self.settings.harmonics == "auto":
+                here = here.without_even(self.effort) or here.with_even(self.effort) or here
+            by_samples, finer = here.samples_error(self.effort)
+            by_harmonics, richer = self._harmonics_error(here, richer)
+            estimate = by_samples + by_harmonics
+            if not self.settings.automatic:
+                known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
+                return Refined(here.case, here.point, known, True)
+            holds = here.holds()
+            if holds and estimate.largest <= self.settings.rtol:
+                here, estimate = here.relaxed(estimate, self.effort)
+                return Refined(here.case, here.point, estimate, True)
+            wanted = self._wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
+            following = self._next(here, wanted, finer, richer)
+            if following is None:
+                # slip that few samples see is no reason to give up a motion that is known
+                judged = estimate.response if self.faint else estimate.largest
+                return Refined(here.case, here.point, estimate, judged <= self.settings.rtol)
+            here = following
+
+    def _linear(self, here: Level) -> Refined | Level:
+        """Of a state in which nothing slips or opens: the result, or the state with samples that see something slip."""
+        if self.settings.harmonics == "auto" and here.case.resolution.orders != (1,):
+            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.effort) or here
+        missed = here.missed_event(self.effort)
+        if missed is None:
+            return Refined(here.case, here.point, NOTHING, True)
+        if self.settings.samples == "auto":
+            return missed
+        missing = here.difference(missed).times(ACCURACY.double_samples_safety)
+        accurate = not self.settings.automatic or missing.largest <= self.settings.rtol
+        return Refined(here.case, here.point, missing, accurate)
+
+    def _harmonics_error(self, here: Level, known: Level | None) -> tuple[Estimate, Level | None]:
+        """Error for want of harmonics, and the state with more of them that it comes from."""
+        error, richer = here.harmonics_error(self.effort, known)
+        above = shifted(here.case.resolution, 1)
+        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and self._allowed(here, above)
+        if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
-            richer = here.by_homotopy(above, effort)
-            by_harmonics = by_harmonics if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
-        estimate = by_samples + by_harmonics
-        if not settings.automatic:
-            known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
-            return Refined(here.case, here.point, known, True)
-        holds = here.holds()
-        if estimate.largest <= ACCURACY.aim * settings.rtol and holds:
-            here, estimate = here.relaxed(estimate, effort)
-            return Refined(here.case, here.point, estimate, True)
-        more_samples = settings.samples == "auto" and by_samples.largest > by_harmonics.largest / ACCURACY.error_ratio
-        lacks_harmonics = not holds or by_harmonics.largest > by_samples.largest / ACCURACY.error_ratio
-        more_harmonics = settings.harmonics == "auto" and lacks_harmonics
+            richer = here.by_homotopy(above, self.effort)
+            error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
+        return error, richer
+
+    def _wanted(self, here: Level, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
+        """Harmonics and samples to go on with, by the errors for want of each."""
+        resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
         wanted = resolution
-        if more_harmonics:
-            wanted = above if settings.samples == "auto" else Resolution(above.orders, resolution.samples)
-        if more_samples:
+        if self.settings.harmonics == "auto" and (not holds or by_harmonics > by_samples / ACCURACY.error_ratio):
+            wanted = above if self.settings.samples == "auto" else Resolution(above.orders, resolution.samples)
+        if self.settings.samples == "auto" and by_samples > by_harmonics / ACCURACY.error_ratio:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
-        next_level = None
-        few = here.unknowns(shifted(resolution, 2)) <= ACCURACY.cheap_unknowns
-        limit = begun + (ACCURACY.cheap_refinement_iterations if few else ACCURACY.refinement_iterations)
-        if wanted != resolution and _allowed(here, wanted, most) and effort.iterations < limit:
-            if finer is not None and finer.case.resolution == wanted:
-                next_level = finer
-            elif richer is not None and richer.case.resolution == wanted:
-                next_level = richer
-            else:
-                next_level = here.solve_at(wanted, effort)
-            if next_level is None and richer is not None and richer.case.resolution.highest > wanted.highest:
-                # what is not found from below may be found from above
-                next_level = richer.solve_at(wanted, effort)
-            if next_level is None and settings.harmonics == settings.samples and richer is not None:
-                next_level = richer if _allowed(here, richer.case.resolution, most) else None
-        if next_level is None:
-            # slip that few samples see is no reason to give up a motion that is known
-            judged = estimate.response if faint else estimate.largest
-            return Refined(here.case, here.point, estimate, judged <= settings.rtol)
-        here = next_level
+        return wanted
+
+    def _next(self, here: Level, wanted: Resolution, finer: Level | None, richer: Level | None) -> Level | None:
+        """The state with the harmonics and samples wanted, or with more that are known; None where it is not found.
+
+        finer, richer: states with more samples and with more harmonics that are known.
+        """
+        limit = self.begun + ACCURACY.refinement_work / here.unknowns(shifted(here.case.resolution, 2))
+        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.effort.iterations >= limit:
+            return None
+        for known in (finer, richer):
+            if known is not None and known.case.resolution == wanted:
+                return known
+        found = here.solve_at(wanted, self.effort)
+        if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
+            # what is not found from below may be found from above
+            found = richer.solve_at(wanted, self.effort)
+        if found is None and richer is not None and self.settings.harmonics == self.settings.samples == "auto":
+            found = richer if self._allowed(here, richer.case.resolution) else None
+        return found
+
+    def _allowed(self, here: Level, resolution: Resolution) -> bool:
+        """Whether "auto" may go on with these harmonics and samples."""
+        if not here.case.model.holds(resolution.highest):
+            return False
+        n_rel = here.joint.component_index.size
+        # what the pairs take at all samples, in all harmonics
+        room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
+        if here.unknowns(resolution) * resolution.samples > room:
+            return False
+        small = n_rel <= ACCURACY.small_joint_displacements
+        most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
+        if resolution.highest > ACCURACY.most_mixed_harmonics:
+            # friction alone: motions that hit something take more in vain
+            if not all(order % 2 for order in resolution.orders):
+                return False
+            most = min(most, ACCURACY.dear_unknowns)
+        # two levels more are left to compare with
+        in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
+        return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most
 
 
 def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
     """Relative differences of response and wear rate of two states of one joint, judged like any error."""
     return Level(case, joint, one).difference(Level(case, joint, other))
-
-
-def _allowed(here: Level, resolution: Resolution, most_unknowns: float) -> bool:
-    """Whether "auto" may go on with these harmonics and samples."""
-    if not here.case.model.holds(resolution.highest):
-        return False
-    n_rel = here.joint.component_index.size
-    # what the pairs take at all samples, in all harmonics
-    if here.unknowns(resolution) * resolution.samples > ACCURACY.samples_of_unknowns * room_for(most_unknowns, n_rel):
-        return False
-    small = n_rel <= NEWTON.small_joint_displacements
-    most = room_for(min(most_unknowns, ACCURACY.few_pairs_unknowns) if small else most_unknowns, n_rel)
-    if resolution.highest > ACCURACY.most_mixed_harmonics:
-        # friction alone: motions that hit something take more in vain
-        if not all(order % 2 for order in resolution.orders):
-            return False
-        most = min(most, ACCURACY.dear_unknowns)
-    # two levels more are left to compare with
-    in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
-    return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most

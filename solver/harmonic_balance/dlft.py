@@ -21,14 +21,16 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.harmonic_balance.options import BALANCE
-from solver.model import ComplexArray, FloatArray, IntArray, Matrix
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from solver.packing import packable
 from solver.structure.joint import Joint
+from solver.structure.rough_forms import SingleArray
 
 
 @dataclass(frozen=True)
@@ -162,8 +164,11 @@ class Linearisation:
 
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        change = np.abs(np.eye(self.force_tangent.shape[1]) - self.force_tangent).max(axis=(1, 2))
-        return np.flatnonzero(change > BALANCE.passive)
+        return self._active
+
+    @cached_property
+    def _active(self) -> IntArray:
+        return np.flatnonzero(differs_from_identity(self.force_tangent, BALANCE.passive))
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
@@ -176,23 +181,33 @@ class Linearisation:
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """The same to three digits at least, in less time: for directions of Newton's method."""
-        joint, (pairs, held_back) = self.joint, self._held_back
-        spread = joint.to_pairs(step)
-        moving = spread[pairs].reshape(pairs.size, 3 * step.shape[1])
-        # only what the pairs do not transmit moves them
-        kept = np.matmul(held_back, moving.astype(held_back.dtype)[:, :, None])[:, :, 0]
-        part = np.zeros_like(spread)
-        part[pairs] = kept.reshape(-1, *spread.shape[1:])
-        motion = joint.motion(part)
-        motion[pairs, 0, 0] += (self.growth_tangent[pairs] * moving).sum(axis=1)
-        return joint.structure.apply_roughly(joint.to_relative(motion)) + step - joint.to_relative(part)
+        joint = self.joint
+        pairs, held_back = self._held_back
+        held, motion = hold_back(step, self._rows_of_pairs, pairs, held_back, *self._compliance, self.growth_tangent)
+        if joint.penalty.inertial.any():
+            # masses on sliders move by Newton's law
+            motion_h = joint.motion(joint.to_pairs(held))
+            motion_h[:, 0, 0] += (self.growth_tangent * joint.to_pairs(step).reshape(len(motion_h), -1)).sum(axis=1)
+            motion = joint.to_relative(motion_h)
+        return joint.structure.apply_roughly(motion) + step - held
 
     @cached_property
-    def _held_back(self) -> tuple[IntArray, FloatArray | NDArray[np.float32]]:
-        """Pairs that move with their predicted force, and what they do not transmit of it; large ones rounded."""
+    def _held_back(self) -> tuple[IntArray, SingleArray]:
+        """Pairs that move with their predicted force, and what they do not transmit of it, in single precision."""
         pairs = self.active()
-        held_back = np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]
-        return pairs, held_back if held_back.nbytes <= BALANCE.exact_bytes else held_back.astype(np.float32)
+        return pairs, identity_less(self.force_tangent, pairs)
+
+    @cached_property
+    def _rows_of_pairs(self) -> IntArray:
+        """Row of each component of a pair (n_contact, 3), -1 where there is none."""
+        rows = np.full(3 * self.joint.contact.n_contact, -1)
+        rows[self.joint.component_index] = np.arange(self.joint.component_index.size)
+        return rows.reshape(-1, 3)
+
+    @property
+    def _compliance(self) -> tuple[FloatArray, FloatArray]:
+        """Motion over force (n_contact,), m/N, of pairs at displacement level: normal and tangential."""
+        return 1.0 / self.joint.penalty.normal, 1.0 / self.joint.penalty.tangential
 
     def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
         """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic).
@@ -260,3 +275,72 @@ def _complex_part(tangent: FloatArray) -> ComplexArray:
     """Complex-linear part (..., 3, 3) of a real map (..., 3, 2, 3, 2) between amplitudes `cosine - i sine`."""
     cc, cs, sc, ss = tangent[:, :, 0, :, 0], tangent[:, :, 0, :, 1], tangent[:, :, 1, :, 0], tangent[:, :, 1, :, 1]
     return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))
+
+
+@njit(cache=True)
+def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
+    """Which of the matrices (n, k, k) differ from the identity by more than `by` in an entry."""
+    n, k, _ = matrices.shape
+    differs = np.zeros(n, np.bool_)
+    for place in range(n):
+        for row in range(k):
+            for column in range(k):
+                # the negation finds what is not a number as well
+                if not abs(matrices[place, row, column] - (row == column)) <= by:
+                    differs[place] = True
+                    break
+            if differs[place]:
+                break
+    return differs
+
+
+@njit(cache=True)
+def identity_less(matrices: FloatArray, chosen: IntArray) -> SingleArray:
+    """`1 - A` (k, n, n) of some of the matrices A (..., n, n), in single precision."""
+    n = matrices.shape[1]
+    less = np.empty((chosen.size, n, n), np.float32)
+    for place in range(chosen.size):
+        matrix = matrices[chosen[place]]
+        for row in range(n):
+            for column in range(n):
+                less[place, row, column] = (row == column) - matrix[row, column]
+    return less
+
+
+@njit(cache=True)
+def hold_back(
+    step: FloatArray,
+    rows: IntArray,
+    pairs: IntArray,
+    held_back: SingleArray,
+    normal: FloatArray,
+    tangential: FloatArray,
+    growth: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """What the pairs do not transmit of a predicted force (n_rel, m), N, and how it moves them (n_rel, m), m.
+
+    rows (n_contact, 3): of each component, -1 for none. pairs (n,), held_back (n, 3m, 3m): `1 - d lambda/dp` of pairs
+    that move. normal, tangential (n_contact,): m/N. growth (n_contact, 3m): of the wear depth, m/N.
+    """
+    m = step.shape[1]
+    held, motion = np.zeros_like(step), np.zeros_like(step)
+    own, single = np.zeros(3 * m), np.zeros(3 * m, np.float32)
+    for place, pair in enumerate(pairs):
+        own[:] = 0.0
+        for i in range(3):
+            if rows[pair, i] >= 0:
+                own[i * m : (i + 1) * m] = step[rows[pair, i]]
+        for k in range(3 * m):
+            single[k] = own[k]
+        kept = np.dot(held_back[place], single)
+        for i in range(3):
+            row = rows[pair, i]
+            if row < 0:
+                continue
+            compliance = normal[pair] if i == 0 else tangential[pair]
+            for k in range(m):
+                held[row, k] = kept[i * m + k]
+                motion[row, k] = compliance * kept[i * m + k]
+            if i == 0:
+                motion[row, 0] += np.dot(growth[pair], own)
+    return held, motion

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TypedDict
 
 import numpy as np
@@ -20,10 +21,9 @@ from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.converged import PathPoint
 from solver.loading_history.options import LOADING
-from solver.loading_history.origin import Origin, find_origin
-from solver.loading_history.origin import Sweep as Direction
-from solver.loading_history.route import Step
-from solver.loading_history.sweep import Sweep, SweepState
+from solver.loading_history.path_step import Step
+from solver.loading_history.sweep import NodeSweep, SweepState
+from solver.loading_history.sweep_start import Origin, Sweep, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, OutOfTimeError, move_point
@@ -41,7 +41,7 @@ def follow_branch(
     friction_coefficient: float | FloatArray | None,
     excitation_amplitude: float,
     frequencies: FloatArray,
-    sweep: Direction,
+    sweep: Sweep,
     settings: SolverSettings,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
@@ -160,7 +160,7 @@ class FrequencySweep:
         model: ReducedModel,
         friction_coefficient: float | FloatArray | None,
         excitation_amplitude: float,
-        sweep: Direction,
+        sweep: Sweep,
         settings: SolverSettings,
     ) -> None:
         self.model = model
@@ -170,7 +170,7 @@ class FrequencySweep:
         self.settings = settings
         self.effort = Effort()
         self.origin: Origin | None = None
-        self.walk: Sweep | None = None
+        self.walk: NodeSweep | None = None
         self._walked = 0
 
     @property
@@ -201,7 +201,7 @@ class FrequencySweep:
         assert self.origin is not None
         return {
             "origin": self.origin,
-            "omega": self.walk.omega,
+            "omega": self.walk.path.omega,
             "own_iterations": self.effort.iterations,
             "walked_iterations": max(self.walk.effort.iterations, self._walked),
             "walk": self.walk.saved,
@@ -215,9 +215,9 @@ class FrequencySweep:
         self.walk = self._new_walk(self.origin, state["omega"])
         self.walk.load_state(state["walk"])
 
-    def _new_walk(self, origin: Origin, omega: float | None) -> Sweep:
+    def _new_walk(self, origin: Origin, omega: float | None) -> NodeSweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
-        walk = Sweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
+        walk = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
         walk.effort.deadline, walk.effort.tell = self.effort.deadline, self.effort.tell
         return walk
 
@@ -252,9 +252,9 @@ class FrequencySweep:
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)
         # those of a ramp are no frequencies
-        fold = float("nan") if self.sweep == "ramp" else (walk.fold, *reached.folds)[-1]
-        found = _Found(Outcome.CONVERGED, walk.branch + len(reached.folds), fold)
-        return self._judge(refined, omega, found, walk.coarse_route.case, coarse)
+        fold = float("nan") if self.sweep == "ramp" else (walk.state.fold, *reached.folds)[-1]
+        found = _Found(Outcome.CONVERGED, walk.state.branch + len(reached.folds), fold)
+        return self._judge(refined, omega, found, walk.reference_path.case, coarse)
 
     def _judge(
         self, refined: Refined, omega: float, found: _Found, coarse_case: Case, coarse: PathPoint | None
@@ -277,7 +277,7 @@ class FrequencySweep:
             found.outcome = Outcome.INACCURATE
         return found
 
-    def _begin(self, walk: Sweep, origin: Origin) -> None:
+    def _begin(self, walk: NodeSweep, origin: Origin) -> None:
         """A state where the walk begins; none where there is none, or where the structure is singular there."""
         self.effort.limit = self.effort.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
@@ -285,8 +285,8 @@ class FrequencySweep:
             if self._begin_at(walk, place):
                 return
 
-    def _begin_at(self, walk: Sweep, place: float) -> bool:
-        omega, load_factor = (place, 1.0) if walk.omega is None else (walk.omega, place)
+    def _begin_at(self, walk: NodeSweep, place: float) -> bool:
+        omega, load_factor = (place, 1.0) if walk.path.omega is None else (walk.path.omega, place)
         self.effort.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
         try:
             case, point = self._first(omega, load_factor)
@@ -296,37 +296,36 @@ class FrequencySweep:
             return False
         return walk.begin(case, PathPoint(place, point.evaluation, point.history))
 
-    def _walk_to(self, walk: Sweep, target: float) -> None:
+    def _walk_to(self, walk: NodeSweep, target: float) -> None:
         """As far as the target; where the walk ends before, it is begun anew a little behind its end."""
         # all attempts together: where a joint has no grip none of them leads on
         self.effort.limit = self.effort.iterations + LOADING.first_iterations
         for _ in range(LOADING.most_restarts):
             try:
-                walk.walk_to(target)
+                walk.advance_to(target)
             except np.linalg.LinAlgError:
-                walk.lost_at = walk.here.parameter if walk.here is not None else walk.lost_at
-                walk.here = walk.coarse = walk.ahead = None
-            if walk.here is not None or walk.omega is not None or np.isnan(walk.lost_at):
+                walk.lose()
+            if walk.here is not None or walk.path.omega is not None or np.isnan(walk.state.lost_at):
                 return
-            behind = walk.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
+            behind = walk.state.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
             if (behind - target) * walk.direction >= 0.0:
                 return
             if self.effort.exhausted:
                 return
             if not self._begin_at(walk, behind):
-                walk.lost_at = behind
+                walk.state = replace(walk.state, lost_at=behind)
 
-    def _why_lost(self, walk: Sweep) -> Outcome:
-        never = np.isnan(walk.lost_at)
-        return walk.failure if never or walk.failure in _REASONS else Outcome.BRANCH_LOST
+    def _why_lost(self, walk: NodeSweep) -> Outcome:
+        never = np.isnan(walk.state.lost_at)
+        return walk.state.failure if never or walk.state.failure in _REASONS else Outcome.BRANCH_LOST
 
-    def _where_lost(self, walk: Sweep) -> str:
+    def _where_lost(self, walk: NodeSweep) -> str:
         """How far a walk came that has lost its branch; empty for one that never began, and for a ramp."""
-        if np.isnan(walk.lost_at):
+        if np.isnan(walk.state.lost_at):
             return ""
-        if walk.omega is not None:
-            return f"the vibration repeats up to {100.0 * walk.lost_at:.3g} % of the excitation"
-        return f"the sweep goes on in stable states as far as {walk.lost_at / (2.0 * np.pi):.6g} Hz"
+        if walk.path.omega is not None:
+            return f"the vibration repeats up to {100.0 * walk.state.lost_at:.3g} % of the excitation"
+        return f"the sweep goes on in stable states as far as {walk.state.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics, where those of the branch lead to none."""
@@ -354,7 +353,7 @@ class FrequencySweep:
                 why = outcome
             if outcome is Outcome.STATIC_FAILED or self.effort.exhausted:
                 break
-        self.walk.failure = why
+        self.walk.state = replace(self.walk.state, failure=why)
         return self.walk.case, None
 
     def _first_at(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numba import njit
 
 from solver.model import ComplexArray, FloatArray
 from solver.newton.options import NEWTON
@@ -56,20 +57,11 @@ def solve_gmres(
         projected[0] = norms[-1]
         n_columns, lost = 0, False
         while n_columns < restart and not lost:
-            column, lost = _extend(basis, n_columns, product(basis[n_columns]))
-            if not np.all(np.isfinite(column)):
+            column, lost = extend_basis(basis, n_columns, product(basis[n_columns]), NEWTON.round_off)
+            if not np.all(np.isfinite(column)) or not rotate_column(column, rotations, n_columns):
                 break
-            for place, (cosine, sine) in enumerate(rotations[:n_columns]):
-                above, below = column[place : place + 2]
-                column[place : place + 2] = cosine * above + sine * below, cosine * below - sine * above
-            above, below = column[n_columns : n_columns + 2]
-            length = float(np.hypot(above, below))
-            if length == 0.0:
-                break
-            cosine, sine = above / length, below / length
-            rotations[n_columns] = cosine, sine
             triangle[: n_columns + 1, n_columns] = column[: n_columns + 1]
-            triangle[n_columns, n_columns] = length
+            cosine, sine = rotations[n_columns]
             projected[n_columns : n_columns + 2] = cosine * projected[n_columns], -sine * projected[n_columns]
             n_columns += 1
             norms.append(abs(float(projected[n_columns])))
@@ -119,7 +111,7 @@ def ritz_values(
     basis[0] = start / np.linalg.norm(start)
     values, residuals = np.empty(0, complex), np.empty(0)
     for k in range(1, size + 1):
-        projected[: k + 1, k - 1], lost = _extend(basis, k - 1, product(basis[k - 1]))
+        projected[: k + 1, k - 1], lost = extend_basis(basis, k - 1, product(basis[k - 1]), NEWTON.round_off)
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)
         look = enough is not None and k >= NEWTON.sign_products and k % NEWTON.sign_check == 0
@@ -132,22 +124,44 @@ def ritz_values(
     return values, residuals
 
 
-def _extend(basis: FloatArray, k: int, image: FloatArray) -> tuple[FloatArray, bool]:
-    """Next vector k + 1 of an orthonormal basis from the image of vector k, in place.
+@njit(cache=True)
+def extend_basis(basis: FloatArray, k: int, image: FloatArray, round_off: float) -> tuple[FloatArray, bool]:
+    """Next vector k + 1 of an orthonormal basis (most + 1, n) from the image (n,) of vector k, in place.
 
-    Returns the components (k + 2,) of the image on the new basis, and whether nothing new was in it.
+    Returns the components (k + 2,) of the image on the new basis, and whether nothing new was in it: less than
+    `round_off` of its length.
     """
     column = np.zeros(k + 2)
-    length = float(np.linalg.norm(image))
+    length = np.linalg.norm(image)
+    there = basis[: k + 1]
+    left = image
     for _ in range(2):
-        components = basis[: k + 1] @ image
+        components = np.dot(there, left)
         column[: k + 1] += components
-        image = image - components @ basis[: k + 1]
-    column[k + 1] = np.linalg.norm(image)
-    if not column[k + 1] > NEWTON.round_off * length:
+        left = left - np.dot(components, there)
+    column[k + 1] = np.linalg.norm(left)
+    if not column[k + 1] > round_off * length:
         return column, True
-    basis[k + 1] = image / column[k + 1]
+    basis[k + 1] = left / column[k + 1]
     return column, False
+
+
+@njit(cache=True)
+def rotate_column(column: FloatArray, rotations: FloatArray, k: int) -> bool:
+    """Column k (k + 2,) of a Hessenberg matrix to that of a triangle, in place, by Givens rotations (most, 2).
+
+    The last of them is made here. False where the column is zero.
+    """
+    for place in range(k):
+        above, below = column[place], column[place + 1]
+        cosine, sine = rotations[place]
+        column[place], column[place + 1] = cosine * above + sine * below, cosine * below - sine * above
+    length = np.hypot(column[k], column[k + 1])
+    if length == 0.0:
+        return False
+    rotations[k, 0], rotations[k, 1] = column[k] / length, column[k + 1] / length
+    column[k], column[k + 1] = length, 0.0
+    return True
 
 
 def _stagnates(norms: list[float]) -> bool:

@@ -39,6 +39,7 @@ from solver.structure.condensation import CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.identity import Identity
 from solver.structure.joint import Joint
+from solver.structure.options import STRUCTURE
 from solver.structure.rough_forms import SingleArray
 
 
@@ -199,8 +200,8 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
     return _stiffness_of_most(Identity(joint.structure))
 
 
-# a march asks for those of one structure again and again
-@lru_cache(maxsize=2)
+# a march asks for those of the same structures again and again
+@lru_cache(maxsize=STRUCTURE.kept_structures)
 def _stiffness_of_most(of: Identity) -> FloatArray:
     structure = cast("CondensedStructure", of.objects[0])
     moving = (structure.moving.matrix(place).real for place in range(structure.n_harmonics))
@@ -208,7 +209,7 @@ def _stiffness_of_most(of: Identity) -> FloatArray:
     return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=STRUCTURE.kept_structures)
 def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tuple[FloatArray, FloatArray]:
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1

@@ -29,6 +29,9 @@ from solver.model import BoolArray, FloatArray, IntArray
 from solver.newton.options import NEWTON
 from solver.structure.joint import Joint
 
+# without the wrappers of scipy, which take as long as the factorisation of one pair
+_PIVOTED_QR, _ORTHOGONAL = scipy.linalg.get_lapack_funcs(("geqp3", "orgqr"), dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class SlipSpace:
@@ -75,18 +78,31 @@ def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: 
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
     rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
     pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NEWTON.round_off)
-    found = [
-        scipy.linalg.qr(rows[pair].T, mode="economic", pivoting=True, check_finite=False)[:2]
-        if np.all(np.isfinite(rows[pair]))
-        else (np.empty((3 * m, 0)), np.empty((0, 3 * m)))
-        for pair in pairs
-    ]
     for least, limit in ((NEWTON.round_off, most_exact), (cutoff, most)):
-        ranks = [int(np.count_nonzero(np.abs(np.diag(right)) > least)) for _, right in found]
-        if sum(ranks) <= limit:
-            bases = tuple(np.ascontiguousarray(q[:, :rank]) for (q, _), rank in zip(found, ranks, strict=True))
+        bases = _bases(rows[pairs], least, limit) if limit else None
+        if bases is not None:
             return SlipSpace(pairs, bases, least == NEWTON.round_off)
     return None
+
+
+def _bases(rows: FloatArray, least: float, limit: int) -> tuple[FloatArray, ...] | None:
+    """Orthonormal bases (3m, r) of the rows of each pair, by pivoted QR factorisations down to `least`.
+
+    None as soon as the ranks r add up to more than `limit`. Rows that are not finite have rank 0.
+    """
+    bases: list[FloatArray] = []
+    total, width = 0, rows.shape[2]
+    for own in rows:
+        if not np.all(np.isfinite(own)):
+            bases.append(np.empty((width, 0)))
+            continue
+        factor, _, scales, _, _ = _PIVOTED_QR(own.T)
+        rank = int(np.count_nonzero(np.abs(np.diag(factor)) > least))
+        total += rank
+        if total > limit:
+            return None
+        bases.append(np.ascontiguousarray(_ORTHOGONAL(factor[:, :width], scales)[0][:, :rank]))
+    return tuple(bases)
 
 
 @dataclass(frozen=True)

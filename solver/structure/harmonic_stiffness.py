@@ -7,12 +7,10 @@ from functools import cached_property
 from typing import Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import to_complex
-from solver.structure.options import STRUCTURE
-from solver.structure.rough_forms import RoughForms, SingleArray, rough_forms
+from solver.structure.rough_forms import RoughStiffness, rough_of_each, rough_of_shared
 
 
 class HarmonicStiffness(Protocol):
@@ -28,8 +26,9 @@ class HarmonicStiffness(Protocol):
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
 
-    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
-        """The same to three digits at least, in less time: for directions of Newton's method, not for its residual."""
+    @property
+    def rough(self) -> RoughStiffness:
+        """The same in single precision: for directions of Newton's method, not for its residual."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +46,10 @@ class DenseStiffness:
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
-    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness: in single precision where the matrices do not stay in the cache."""
-        if self.dense.nbytes <= STRUCTURE.dense_bytes:
-            return self.apply(displacement_h)
-        moving = np.ascontiguousarray(to_complex(displacement_h).T, np.complex64)[:, :, None]
-        return cast("ComplexArray", np.matmul(self._single, moving)[:, :, 0].T.astype(complex))
-
     @cached_property
-    def _single(self) -> NDArray[np.complex64]:
-        return self.dense.astype(np.complex64)
+    def rough(self) -> RoughStiffness:
+        """As in HarmonicStiffness."""
+        return rough_of_each(self.dense)
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,8 @@ class SharedStiffness:
     A product takes three real ones for all harmonics at once and is bound by reading 3 n_rel^2 numbers, whatever H.
 
     n_rel: of the joint. rates (H,): n w, rad/s. columns (3, n, n_rel): columns r of K, M, C, rows r before rows i.
-    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. rough: of the same structure.
+    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. few: rough form of few motions,
+    None where that leaves too much out.
     """
 
     n_rel: int
@@ -78,7 +72,7 @@ class SharedStiffness:
     columns: FloatArray
     back: FloatArray
     held_compliance: ComplexArray
-    rough: RoughForms
+    few: RoughStiffness | None
 
     @property
     def dense(self) -> ComplexArray:
@@ -99,17 +93,10 @@ class SharedStiffness:
         forces = self._combine(*_products(self.columns, displacement_h[:, 1:]))
         return forces[: self.n_rel] - self._combine(*_products(self.back, self._behind(forces[self.n_rel :])))
 
-    def apply_roughly(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness, by `RoughForms`."""
-        # displacements of the order of 1e-6 m and stiffnesses of 1e9 N/m are far within the range
-        moving = displacement_h[:, 1:].astype(np.float32)
-        forces = self._combine(*self.rough.apply(moving, self.rates))
-        behind = self._behind(self._combine(*_products(self._single[0], moving)))
-        return forces - self._combine(*_products(self._single[1], behind.astype(np.float32)))
-
     @cached_property
-    def _single(self) -> tuple[SingleArray, SingleArray]:
-        return self.columns[:, self.n_rel :].astype(np.float32), self.back.astype(np.float32)
+    def rough(self) -> RoughStiffness:
+        """As in HarmonicStiffness."""
+        return rough_of_each(self.dense) if self.few is None else self.few
 
     def _behind(self, forces: ComplexArray) -> FloatArray:
         """Harmonics cosine, sine, ... (n_i, 2H) of `A_ii^-1 f` from f (n_i, H)."""
@@ -118,29 +105,19 @@ class SharedStiffness:
         parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
         return parts
 
-    def _combine(
-        self,
-        by_stiffness: FloatArray | SingleArray,
-        by_mass: FloatArray | SingleArray,
-        by_damping: FloatArray | SingleArray,
-    ) -> ComplexArray:
+    def _combine(self, by_stiffness: FloatArray, by_mass: FloatArray, by_damping: FloatArray) -> ComplexArray:
         """`(K + i n w C - (n w)^2 M) u` (rows, H) from `K u`, `M u`, `C u`, harmonics cosine, sine, ... (rows, 2H)."""
-        spring, inertia, drag = (
-            part.astype(np.float64, copy=False).reshape(part.shape[0], -1, 2)
-            for part in (by_stiffness, by_mass, by_damping)
-        )
+        spring, inertia, drag = (part.reshape(part.shape[0], -1, 2) for part in (by_stiffness, by_mass, by_damping))
         spring = spring - self.rates[:, None] ** 2 * inertia
         drag = self.rates[:, None] * drag
         # i (cosine - i sine) = sine + i cosine
         return cast("ComplexArray", spring[..., 0] + drag[..., 1] - 1j * (spring[..., 1] - drag[..., 0]))
 
 
-def _products(forms: FloatArray | SingleArray, moving: FloatArray | SingleArray) -> FloatArray | SingleArray:
-    """`K u`, `M u`, `C u` (3, rows, k) of one type, in one product."""
+def _products(forms: FloatArray, moving: FloatArray) -> FloatArray:
+    """`K u`, `M u`, `C u` (3, rows, k) in one product."""
     _, n_rows, n_columns = forms.shape
-    return cast(
-        "FloatArray | SingleArray", (forms.reshape(3 * n_rows, n_columns) @ moving).reshape(3, n_rows, moving.shape[1])
-    )
+    return (forms.reshape(3 * n_rows, n_columns) @ moving).reshape(3, n_rows, moving.shape[1])
 
 
 def share_matrices(
@@ -155,5 +132,5 @@ def share_matrices(
         np.stack([part[every[:, None], relative] for part in parts]),
         np.stack([part[relative[:, None], internal] for part in parts]),
         held_compliance,
-        rough_forms(linear, relative),
+        rough_of_shared(linear, relative, internal, rates, held_compliance),
     )

@@ -19,9 +19,9 @@ class StructureOptions:
     """Motions of the joint that carry its mass, and damping that is no multiple of stiffness, in rough products."""
     rough: float = 1e-3
     """Of the stiffness: what may be left out of a rough product. Does not change results."""
-    kept_structures: int = 4
-    """Condensed structures that are kept for the next one who asks: harmonics of a march, of its companion and of the
-    errors of pairs. Does not change results."""
+    kept_structures: int = 8
+    """Condensed structures of a case, and low-rank differences of their harmonics, that are kept for the next one who
+    asks: a wear history with its errors uses six. Does not change results."""
     inertial_ratio: float = 2.0
     """Stiffness at twice the rate over that at the rate, above which a pair is inertial: 1 for a spring, 4 for a mass.
     With 4 no pair is, and the two masses move by 20 % otherwise with five harmonics."""

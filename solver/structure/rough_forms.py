@@ -1,99 +1,181 @@
-"""K, M and C among the displacements of the pairs for products of three digits, in less time than exact ones.
+"""The condensed dynamic stiffness Z_r in single precision, for products of three digits in less time than exact ones.
 
-K has full rank, but few motions of the joint carry much of the mass, and damping is often a multiple of the stiffness:
+Directions of Newton's method need no more. A product is bound by reading the matrices from memory. In a real structure
+all harmonics share the stiffness K of the displacements of the pairs; few motions of the joint carry the mass M and the
+part of the damping C that is no multiple `s K` of the stiffness. The structure behind the joint acts through as many
+motions as it has displacements. With a basis B of all these motions
 
-    M = V E V^T,      C = s K + V E V^T      (each with its own V and E)
+    Z_n = (1 + i n w s) K + B G_n B^T,      G_n small and complex,
 
-leaves one large product of three. Where a remainder is too large for that (damping of another kind), the matrix itself
-is kept. All of it in single precision: such products are bound by reading memory.
+and one product with K serves all harmonics. Any other structure keeps a matrix for each harmonic.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from solver.model import FloatArray, IntArray, LinearModel
+from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.identity import Identity
 from solver.structure.options import STRUCTURE
 
 SingleArray = NDArray[np.float32]
+SingleComplex = NDArray[np.complex64]
 
 
-@dataclass(frozen=True)
-class LowRank:
-    """A symmetric matrix `V E V^T`, or itself.
+class RoughStiffness(NamedTuple):
+    """Z_r at H harmonics above the static one, in single precision.
 
-    vectors (n, k), values (k,): V, E. remainder: Frobenius norm of what is left out. whole (n, n): the matrix.
+    - each (H, n_rel, n_rel): a matrix for each harmonic, N/m; or (0, 0, 0), and then the others hold:
+    - shared (n_rel, n_rel): K, N/m.
+    - drag (H,): `n w s`, dimensionless.
+    - basis (n_rel, k), basis_t (k, n_rel): B and its transpose, orthonormal.
+    - core (H, k, k): G_n, N/m.
     """
 
-    vectors: SingleArray
-    values: SingleArray
-    remainder: float
-    whole: SingleArray
-
-    def apply(self, motion: SingleArray, most: float) -> SingleArray:
-        """Product with (n, k); most: remainder that does not matter, in the unit of the matrix."""
-        if self.remainder > most:
-            return self.whole @ motion
-        return self.vectors @ (self.values[:, None] * (self.vectors.T @ motion))
+    each: SingleComplex
+    shared: SingleArray
+    drag: SingleArray
+    basis: SingleArray
+    basis_t: SingleArray
+    core: SingleComplex
 
 
-@dataclass(frozen=True)
-class RoughForms:
-    """stiffness (n_rel, n_rel): K. slope: s. mass: M. drag: `C - s K`. size: root mean square of K's eigenvalues."""
+def rough_of_each(dense: ComplexArray) -> RoughStiffness:
+    """Form with a matrix for each harmonic, from these (H, n_rel, n_rel), N/m."""
+    none = np.empty((0, 0), np.float32)
+    return RoughStiffness(
+        dense.astype(np.complex64), none, np.empty(0, np.float32), none, none, np.empty((0, 0, 0), np.complex64)
+    )
+
+
+def rough_of_shared(
+    linear: LinearModel, relative: IntArray, internal: IntArray, rates: FloatArray, held_compliance: ComplexArray
+) -> RoughStiffness | None:
+    """Form of a real structure at the rates n w (H,), rad/s; None where too much would be left out of it.
+
+    held_compliance (H, n_i, n_i): m/N, of the displacements `internal` (n_i,) with those of the pairs held.
+    """
+    common = _common_form(Identity(linear), tuple(relative.tolist()))
+    highest = float(rates.max(initial=0.0))
+    left_out = highest**2 * common.mass_left_out + highest * common.drag_left_out
+    if left_out > STRUCTURE.rough * common.size:
+        return None
+    rate = rates[:, None, None]
+    behind = [
+        common.basis.T @ np.real(part)[relative[:, None], internal]
+        for part in (linear.stiffness, linear.mass, linear.damping)
+    ]
+    coupling = behind[0] - rate**2 * behind[1] + 1j * rate * behind[2]
+    core = 1j * rate * common.drag - rate**2 * common.mass
+    core = core - coupling @ held_compliance @ coupling.transpose(0, 2, 1)
+    basis = common.basis.astype(np.float32)
+    return RoughStiffness(
+        np.empty((0, 0, 0), np.complex64),
+        common.stiffness,
+        (rates * common.slope).astype(np.float32),
+        basis,
+        np.ascontiguousarray(basis.T),
+        core.astype(np.complex64),
+    )
+
+
+class _CommonForm(NamedTuple):
+    """What the rough forms of a structure at all frequencies share.
+
+    - stiffness (n_rel, n_rel), slope: K, N/m, and s, s.
+    - basis (n_rel, k): B.
+    - mass, drag (k, k): M and `C - s K` in the basis.
+    - mass_left_out, drag_left_out: Frobenius norms of what the basis leaves out of these.
+    - size: root mean square of the eigenvalues of K, N/m.
+    """
 
     stiffness: SingleArray
     slope: float
-    mass: LowRank
-    drag: LowRank
+    basis: FloatArray
+    mass: FloatArray
+    drag: FloatArray
+    mass_left_out: float
+    drag_left_out: float
     size: float
-
-    def apply(self, motion: SingleArray, rates: FloatArray) -> tuple[SingleArray, SingleArray, SingleArray]:
-        """`K u`, `M u` and `C u` (n_rel, k) for the harmonics at these rates n w, rad/s."""
-        highest = float(rates.max(initial=0.0))
-        most = STRUCTURE.rough * self.size
-        spring = self.stiffness @ motion
-        inertia = self.mass.apply(motion, most / highest**2 if highest > 0.0 else np.inf)
-        drag = self.drag.apply(motion, most / highest if highest > 0.0 else np.inf)
-        return spring, inertia, np.float32(self.slope) * spring + drag
-
-
-def rough_forms(linear: LinearModel, relative: IntArray) -> RoughForms:
-    """Forms of a real structure among the displacements `relative` (n_rel,); made once for each structure."""
-    return _forms(Identity(linear), tuple(relative.tolist()))
 
 
 @lru_cache(maxsize=2)
-def _forms(structure: Identity, relative: tuple[int, ...]) -> RoughForms:
-    rows, linear = np.array(relative), cast("LinearModel", structure.objects[0])
-    stiffness, mass, damping = (
-        np.asarray(np.real(part)[rows[:, None], rows], np.float64)
-        for part in (linear.stiffness, linear.mass, linear.damping)
-    )
+def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
+    rows, linear = np.array(relative, np.intp), cast("LinearModel", structure.objects[0])
+    internal = np.setdiff1d(np.arange(len(linear.mass)), rows)
+    parts = [np.asarray(np.real(part), np.float64) for part in (linear.stiffness, linear.mass, linear.damping)]
+    stiffness, mass, damping = (part[rows[:, None], rows] for part in parts)
     norm = float(np.linalg.norm(stiffness))
     slope = float(np.vdot(stiffness, damping)) / norm**2 if norm > 0.0 else 0.0
-    return RoughForms(
+    drag = damping - slope * stiffness
+    few = STRUCTURE.rough_directions
+    directions = [
+        _leading(mass, few),
+        _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0],
+    ]
+    directions += [_leading(part[rows[:, None], internal], internal.size) for part in parts]
+    left, sizes, _ = np.linalg.svd(np.hstack(directions), full_matrices=False)
+    basis = left[:, sizes > 1e-6]
+    small_mass, small_drag = basis.T @ mass @ basis, basis.T @ drag @ basis
+    return _CommonForm(
         stiffness.astype(np.float32),
         slope,
-        _low_rank(mass),
-        _low_rank(damping - slope * stiffness),
+        basis,
+        small_mass,
+        small_drag,
+        float(np.linalg.norm(mass - basis @ small_mass @ basis.T)),
+        float(np.linalg.norm(drag - basis @ small_drag @ basis.T)),
         norm / np.sqrt(max(rows.size, 1)),
     )
 
 
-def _low_rank(matrix: FloatArray) -> LowRank:
-    """The largest part of a matrix, found by a few powers on fixed vectors."""
-    n = matrix.shape[0]
-    image: FloatArray = matrix @ np.random.default_rng(0).normal(size=(n, min(STRUCTURE.rough_directions, n)))
-    for _ in range(2):
-        image = matrix @ np.linalg.qr(image)[0]
-    basis = np.linalg.qr(image)[0]
-    values, turned = np.linalg.eigh(basis.T @ matrix @ basis)
-    vectors = basis @ turned
-    remainder = float(np.linalg.norm(matrix - (vectors * values) @ vectors.T))
-    return LowRank(vectors.astype(np.float32), values.astype(np.float32), remainder, matrix.astype(np.float32))
+def _leading(matrix: FloatArray, most: int) -> FloatArray:
+    """Orthonormal columns that span the largest part of the range of a matrix; none where the matrix is zero."""
+    left, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
+    return left[:, :most][:, sizes[:most] > 1e-12 * sizes.max(initial=0.0)]
+
+
+@njit(cache=True)
+def multiply_roughly(static: FloatArray, rough: RoughStiffness, motion: FloatArray) -> FloatArray:
+    """Forces `Z_r u` (n_rel, 2H+1), N, to three digits at least, of a motion u (n_rel, 2H+1), m.
+
+    static (n_rel, n_rel): stiffness at rest, N/m, in double precision: a joint that slides as a whole moves far.
+    """
+    n_rel, m = motion.shape
+    n_harmonics = (m - 1) // 2
+    force = np.empty((n_rel, m))
+    force[:, 0] = np.dot(static, np.ascontiguousarray(motion[:, 0]))
+    if len(rough.each) == n_harmonics:
+        amplitude = np.empty(n_rel, np.complex64)
+        for n in range(n_harmonics):
+            for row in range(n_rel):
+                amplitude[row] = complex(motion[row, 2 * n + 1], -motion[row, 2 * n + 2])
+            pushed = np.dot(rough.each[n], amplitude)
+            for row in range(n_rel):
+                force[row, 2 * n + 1] = pushed[row].real
+                force[row, 2 * n + 2] = -pushed[row].imag
+        return force
+    # motions of 1e-6 m and stiffnesses of 1e9 N/m are far within the range of single precision
+    moving = motion[:, 1:].astype(np.float32)
+    spring, seen = np.dot(rough.shared, moving), np.dot(rough.basis_t, moving)
+    bent = np.empty_like(seen)
+    amplitude = np.empty(len(seen), np.complex64)
+    for n in range(n_harmonics):
+        for row in range(len(seen)):
+            amplitude[row] = complex(seen[row, 2 * n], -seen[row, 2 * n + 1])
+        pushed = np.dot(rough.core[n], amplitude)
+        for row in range(len(seen)):
+            bent[row, 2 * n], bent[row, 2 * n + 1] = pushed[row].real, -pushed[row].imag
+    back = np.dot(rough.basis, bent)
+    for row in range(n_rel):
+        for n in range(n_harmonics):
+            # (1 + i d) (cosine - i sine) = cosine + d sine - i (sine - d cosine)
+            cosine, sine, drag = spring[row, 2 * n], spring[row, 2 * n + 1], rough.drag[n]
+            force[row, 2 * n + 1] = cosine + drag * sine + back[row, 2 * n]
+            force[row, 2 * n + 2] = sine - drag * cosine + back[row, 2 * n + 1]
+    return force

@@ -9,7 +9,7 @@ import numpy as np
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
 from solver.accuracy.options import ACCURACY
-from solver.accuracy.period_events import lacks_even
+from solver.accuracy.period_events import lacks_even, left_out
 from solver.accuracy.refinement import refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.newton.solve_balance import move_point
@@ -59,8 +59,10 @@ class FullCheck:
         joint, at = work.at(state), state.point.evaluation
         if state.hold is not None and creeps(joint, state.hold, at):
             return Failure(Outcome.ADRIFT)
-        if anew and (unstable := _multipliers(work, state, every=False)) is not None:
-            return unstable
+        if _vibrates_otherwise(state):
+            if (unstable := _multipliers(work, state, every=False)) is not None:
+                return unstable
+            state = replace(state, judged_h=at.predicted_h)
         return replace(checked, state=state)
 
     def _report(self, work: WearingJoint, state: WearState) -> Checked | Failure:
@@ -106,19 +108,31 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
     """Whether harmonics and samples were chosen for a state so different that they are to be chosen again.
 
-    So is a state that vibrates otherwise, that has become asymmetric, or that wears at another rate although it
-    vibrates alike.
+    What of the contact force is left out grows with the error of the state. So harmonics are chosen again where this
+    part has grown so much that the error may be above rtol, and where it has become so small that fewer may do.
     """
-    choice, at = state.choice, state.point.evaluation
-    if work.case.settings.harmonics == "auto" and lacks_even(state.resolution.orders, at):
+    choice, at, settings = state.choice, state.point.evaluation, work.case.settings
+    if not settings.automatic:
+        return False
+    if settings.harmonics == "auto" and lacks_even(state.resolution.orders, at):
         return True
-    before = choice.predicted_h[:, 1:]
-    changed = float(np.linalg.norm(at.predicted_h[:, 1:] - before))
-    if changed > ACCURACY.vibration_recheck * float(np.linalg.norm(before)):
+    now, error = left_out(state.resolution.orders, at), choice.estimate.largest
+    if not np.isfinite(error):
+        return _vibrates_otherwise(state)
+    if error == 0.0:
+        # chosen for a joint in which nothing slips or opens
+        return now > ACCURACY.asymmetric_force
+    if now > WEAR.left_out_grown * choice.left_out:
+        return error * now > settings.rtol * choice.left_out
+    return now < WEAR.left_out_fallen * choice.left_out
+
+
+def _vibrates_otherwise(state: WearState) -> bool:
+    """Whether the vibration is another one than that whose stability was judged last."""
+    if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
         return True
-    rate, volume = float(state.rates.value[-1]), float(state.depth @ work.area)
-    other_rate = abs(rate - choice.wear_rate) > WEAR.rate_recheck * max(rate, choice.wear_rate)
-    return other_rate and volume - choice.worn_volume > WEAR.rate_recheck * volume
+    before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
+    return float(np.linalg.norm(now - before)) > ACCURACY.vibration_recheck * float(np.linalg.norm(before))
 
 
 def choose_anew(work: WearingJoint, state: WearState) -> WearState:
@@ -127,10 +141,8 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState:
     refined = refine(
         work.case, work.omega, work.excitation_amplitude, state.point, work.effort, usual_work=work.usual_work
     )
-    at = refined.point.evaluation
-    rate, volume = float(work.rate(at) @ work.area), float(at.wear_depth @ work.area)
-    choice = Choice(at.predicted_h, rate, volume, refined.estimate, refined.accurate)
     resolution = refined.case.resolution
+    choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
     change = state.change if resolution == state.resolution else None
     return replace(state, point=refined.point, resolution=resolution, choice=choice, change=change)
 

@@ -75,7 +75,7 @@ class Integration:
     output: DenseOutput
     save: Callable[[Progress], None]
     bounded: bool = True
-    most_iterations: float = WEAR.march_iterations
+    most_iterations: float = WEAR.history_iterations
 
     def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
         """Check and keep the first state."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import brentq
 
 from solver.model import FloatArray
-from solver.wear.options import WEAR
 
 
 def depth_within(
@@ -58,10 +58,8 @@ def bent_within(grown: FloatArray, length: float, first: FloatArray, last: Float
 def fraction_where(value: float, volume: Callable[[float], float]) -> float:
     """Fraction of a step at which a function of the fraction that never falls comes to a value.
 
-    volume: the function.
+    volume: the function, at 1 at least the value.
     """
-    low, high = 0.0, 1.0
-    while high - low > WEAR.target_resolution:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if volume(middle) >= value else (middle, high)
-    return high
+    if volume(0.0) >= value or volume(1.0) <= value:
+        return 0.0 if volume(0.0) >= value else 1.0
+    return float(brentq(lambda fraction: volume(fraction) - value, 0.0, 1.0, xtol=1e-12))

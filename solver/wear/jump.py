@@ -27,8 +27,6 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     bounded: whether a jump that moves many times the normal forces is refused.
     """
     state = step.state
-    if state.n_jumps >= WEAR.most_jumps:
-        return Failure(Outcome.MARCH_FAILED)
     joint, at = work.at(state), state.point.evaluation
     beyond = min(2.0 * step.end_known_to, step.length)
     worn = state.depth + beyond * work.rate(at)
@@ -62,4 +60,4 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
         # a corner at which the branch folds back a little is no jump, and there may be many corners
         return replace(state, point=landed)
     first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
-    return replace(state, point=landed, n_jumps=state.n_jumps + 1, jump_cycle=first)
+    return replace(state, point=landed, jump_cycle=first)

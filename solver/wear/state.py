@@ -19,16 +19,12 @@ from solver.wear.rates import WearRates
 class Choice:
     """The state for which harmonics and samples were chosen last.
 
-    predicted_h (n_rel, 2H+1): its predicted force, N.
-    wear_rate: of the joint, m3 per cycle.
-    worn_volume: m3.
+    left_out: part of its contact force that lies in harmonics which are left out (`period_events.left_out`).
     estimate: errors of response and wear rate with these harmonics and samples.
     accurate: whether these errors are below rtol; always true where harmonics and samples are given.
     """
 
-    predicted_h: FloatArray
-    wear_rate: float
-    worn_volume: float
+    left_out: float
     estimate: Estimate
     accurate: bool
 
@@ -53,9 +49,10 @@ class WearState:
     previous: length, cycles, of the last step and depth (n_contact,), m, at its start, for BDF2; None behind a jump.
     length: cycles, of the next step; the control of the steps plans this length.
     first_length: cycles, of the first step.
+    judged_h (n_rel, 2H+1): predicted force, N, of the state whose stability was judged last; None before.
     hold: soft hold of the mean position of a joint that slides all over; None for none.
     held_from: count from which on the joint is held, NaN if never.
-    n_jumps, jump_cycle: jumps to another branch so far, and the count of the first, NaN if none.
+    jump_cycle: count of the first jump to another branch, NaN if none.
     inaccurate_from: count from which on harmonics and samples no longer bring the errors below rtol, inf if never.
     worst: the largest errors from there on.
     """
@@ -71,9 +68,9 @@ class WearState:
     previous: tuple[float, FloatArray] | None = None
     length: float = 0.0
     first_length: float = 0.0
+    judged_h: FloatArray | None = None
     hold: Hold | None = None
     held_from: float = float("nan")
-    n_jumps: int = 0
     jump_cycle: float = float("nan")
     inaccurate_from: float = float("inf")
     worst: Estimate = NOTHING

@@ -49,8 +49,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     whole = balance_at(1.0, base.history)
     start = work.predicted(state, whole, length)
     if start is not base.evaluation.predicted_h:
-        most = WEAR.extrapolated_iterations
-        found = solve_balance(whole, start, work.solver, tolerance, work.effort, most)
+        found = solve_balance(whole, start, work.solver, tolerance, work.effort, WEAR.step_iterations)
         if found.converged:
             point = PathPoint(0.0, found.evaluation, final_history(whole, found.evaluation))
             return _euler(work, state, point, length)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
+from solver.accuracy.period_events import left_out
 from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -108,10 +109,12 @@ class WearingJoint:
         balance = Balance.frozen(joint, start.start_history, start.wear_depth)
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
         n_rates = self.area.size + 1
-        rate, volume = float(self.rate(at) @ self.area), float(at.wear_depth @ self.area)
-        choice = Choice(at.predicted_h, rate, volume, estimate, accurate)
+        choice = Choice(left_out(resolution.orders, at), estimate, accurate)
         point = PathPoint(0.0, at, final_history(balance, at))
-        return self.noted(WearState(0.0, point, resolution, choice, WearRates.none(n_rates), step_limit=step_limit))
+        rates = WearRates.none(n_rates)
+        # the stability of a start state has been judged
+        begun = WearState(0.0, point, resolution, choice, rates, step_limit=step_limit, judged_h=at.predicted_h)
+        return self.noted(begun)
 
     def accepted(self, state: WearState, point: PathPoint, length: float) -> WearState:
         """The state behind a step of so many cycles that has come to `point`."""

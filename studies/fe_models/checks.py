@@ -13,9 +13,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
-from studies.fe_models.elements.solid_mesh import Rotation
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.units import Units
+from studies.finite_element.elements.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
 _EXPORT_FREE = {

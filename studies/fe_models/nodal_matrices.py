@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.elements.solid_mesh import Rotation
-from studies.fe_models.fe_model import MatrixModel
+from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint_model import MatrixModel
 from studies.scene_error import SceneError
 
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from solver.model import FloatArray, IntArray
 from studies.scenes.dovetail_parameters import Parameters
-from studies.scenes.finite_element.assembly import HexMesh
-from studies.scenes.finite_element.structured import find_stations, graded, join_blocks
+from studies.scenes.structured_mesh import HexMesh, find_stations, graded, join_blocks
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""The folder of a run, OUT.nc.parts: everything finished is on the disk a moment later, and a run goes on from it."""
+"""The folder of a run, OUT.nc.parts. Finished results are saved at once, so that a later run can continue."""

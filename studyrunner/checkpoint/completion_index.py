@@ -1,4 +1,4 @@
-"""What of a plan is finished, and what an earlier run of it has left: the link between tasks and the store."""
+"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the folder of a run."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 
 from solver.packing import Packed
 from studyrunner.checkpoint.records import pack
-from studyrunner.checkpoint.shelf import Place
+from studyrunner.checkpoint.segment_index import Place
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 
 MOST_OF_OTHERS = 2.0**30
-"""Bytes: what other studies have left under the same name is kept up to this size."""
+"""Largest size, bytes, of results of other studies that are kept under the same name."""
 
 
 class CompletionIndex:
-    """Every finished history and start state of a plan, in a store that may hold them from earlier runs.
+    """Finished wear histories and start states of a plan, in a folder that may contain results of earlier runs.
 
-    What a task computes does not depend on what was there before: a run that goes on ends with the same numbers.
+    The results of a task do not depend on earlier results: a continued run ends with the same numbers.
     """
 
     def __init__(self, plan: TaskPlan, identities: Identities, store: Store) -> None:
@@ -39,16 +39,16 @@ class CompletionIndex:
                 self._marches[march.number] = identities.of_march(self._histories[march.number])
 
     def histories(self, march: MarchTask) -> tuple[str, ...]:
-        """What the histories of a march are known by."""
+        """Hashes of the histories of a task."""
         return self._histories[march.number]
 
     @property
     def keys(self) -> frozenset[str]:
-        """What all tasks are known by."""
+        """Hashes of all tasks."""
         return frozenset((*self._branches, *self._marches.values()))
 
     def is_left(self, key: str) -> bool:
-        """Whether the task of this key is one of this plan from which a history is missing."""
+        """Whether a task of this plan has this hash and is not finished."""
         return any(
             not self.is_finished(march)
             for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
@@ -57,24 +57,24 @@ class CompletionIndex:
         )
 
     def places(self, march: MarchTask) -> tuple[Place | None, ...]:
-        """Where the histories of a march are; None for those that are not finished."""
+        """Places of the histories of a task in the folder; None for unfinished histories."""
         return tuple(self.store.histories.get(key) for key in self._histories[march.number])
 
     def is_finished(self, march: MarchTask) -> bool:
-        """Whether all histories of a march are on the disk."""
+        """Whether all histories of a task are on the disk."""
         return all(key in self.store.histories for key in self._histories[march.number])
 
     @property
     def n_points_finished(self) -> int:
-        """Points whose history is on the disk."""
+        """Number of points whose history is on the disk."""
         return sum(len(march.points) for line in self.plan.marches for march in line if self.is_finished(march))
 
     def key(self, task: BranchTask | MarchTask) -> str:
-        """What a task and its progress are known by."""
+        """Hash of a task and of its progress."""
         return self._branches[task.number] if isinstance(task, BranchTask) else self._marches[task.number]
 
     def branches_left(self) -> list[BranchTask]:
-        """Branches on whose way are start states that are not known and from which there is something to march."""
+        """Branches with start states that are needed and not known."""
         left = []
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             needed = self._needed(branch)
@@ -87,7 +87,7 @@ class CompletionIndex:
         return left
 
     def known_starts(self, branch: BranchTask) -> list[StartResult]:
-        """Start states of a branch that are known and from which there is something to march."""
+        """Known start states of a branch from which a history is still to be computed."""
         keys, needed = self._starts[branch.number], self._needed(branch)
         return [
             unpack_start(place, self.store.read_start(key))
@@ -96,7 +96,7 @@ class CompletionIndex:
         ]
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
-        """The marches from one start state that are not finished, each with its progress."""
+        """Unfinished tasks of wear histories from one start state, each with its progress."""
         keys = {march.number: self.key(march) for march in self.plan.marches_from(branch, position)}
         return tuple(
             replace(march, resume=self.store.read_progress(keys[march.number]), key=keys[march.number])
@@ -105,7 +105,7 @@ class CompletionIndex:
         )
 
     def renew(self, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
-        """A task of this run that is to be done again, with what has come of it."""
+        """A task that has to be done again, with the results that it has given so far."""
         self.store.flush()
         resume = self.store.read_progress(self.key(task))
         if isinstance(task, MarchTask):
@@ -114,11 +114,11 @@ class CompletionIndex:
         return replace(task, resume=resume, known=task.known | given)
 
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
-        """A start state has come."""
+        """Adds a start state."""
         self.store.add_start(self._starts[branch.number][result.position], result.pack())
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
-        """A history has come."""
+        """Adds a history."""
         key = self._histories[march.number][result.place]
         ended = result.place == march.n_results - 1 and result.progress is None
         self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
@@ -126,13 +126,13 @@ class CompletionIndex:
             self.store.keep_progress(self.key(march), result.progress)
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
-        """A task says how far it is."""
+        """Adds the progress of a task."""
         if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
         self.store.keep_progress(self.key(task), progress)
 
     def forget_failed(self, complete: Collection[int]) -> None:
-        """Points that failed are to be computed again. complete: outcomes of those that did not."""
+        """Marks failed points as not computed. complete: outcomes of points that did not fail."""
         failed = self.store.select(lambda records: ~np.isin(records["outcome"], list(complete)))
         for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
             without_state = {
@@ -150,7 +150,7 @@ class CompletionIndex:
                         self.store.forget_history(key)
 
     def tasks_with(self, outcome: int) -> set[str]:
-        """What the marches are known by a point of which has this outcome, and the branches that they start from."""
+        """Hashes of the wear histories with a point of this outcome, and of their branches."""
         found = self.store.select(lambda records: records["outcome"] == outcome)
         return {
             key
@@ -161,21 +161,22 @@ class CompletionIndex:
         }
 
     def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
-        """The task of this key ends its processes: no other run tries it again.
+        """Marks a task as failed that has ended its process too often: no other run tries this task.
 
         Parameters
         ----------
         key
-            Of the task.
+            Hash of the task.
         position
-            Place on a branch that it was on the way to, before which the branch ends; None for a march.
+            Index of the frequency at which a branch ended its process; the branch ends before it. None for a wear
+            history.
         outcome, message
-            Of the points that are lost with it.
+            Outcome and message of the lost points.
 
         Returns
         -------
         int
-            Number of these points.
+            Number of the lost points.
         """
         n_points = 0
         for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
@@ -194,7 +195,7 @@ class CompletionIndex:
         return n_points
 
     def forget_all(self) -> None:
-        """Nothing that an earlier run has left of this study counts any more; what it holds of others stays."""
+        """Marks all points of this study as not computed. Results of other studies stay."""
         for key in self._all_histories():
             self.store.forget_history(key)
         for key in itertools.chain.from_iterable(self._starts):
@@ -204,11 +205,14 @@ class CompletionIndex:
         self.store.remove_forgotten()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
-        """Leaves at most so many bytes in the store that are not of this study; for 0 bytes nothing else."""
+        """Removes results of other studies until they take at most so many bytes.
+
+        With 0 bytes only results of this study stay.
+        """
         self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
 
     def pack(self) -> None:
-        """All is finished, and the store takes as little room as it can; the last call before it is closed."""
+        """Packs the folder of a finished study; the last call before the folder is closed."""
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             # nothing is left to be followed; that of a march which was given up for its time is what it goes on from
             if all(self.store.has_start(key) for key in keys):
@@ -219,6 +223,6 @@ class CompletionIndex:
         return set(itertools.chain.from_iterable(self._histories.values()))
 
     def _needed(self, branch: BranchTask) -> frozenset[int]:
-        """Places on a branch from which there is something to march."""
+        """Indices of the frequencies of a branch from which a history is still to be computed."""
         line = self.plan.marches[branch.number]
         return frozenset(march.position for march in line if not self.is_finished(march))

@@ -1,9 +1,10 @@
-"""Files of a run's folder while no run is at work there: packed, so that they take no more room than the result.
+"""Packed files: the folder of a finished run takes about as much room as the result.
 
-A run unpacks them when it begins and packs them when it is finished; in between records are read from anywhere in a
-file. A packed file holds blocks of zlib, each behind its length, and a check sum at its end. Records are sorted first:
-the values of a field together, those of a history as differences from the output before, of all the first bytes, then
-the second ones; what changes slowly is then mostly zeros. Differences are those of the 64 bits and lose nothing.
+A run unpacks the files at the beginning and packs them at the end. Unpacked, records can be read from any place of a
+file. A packed file has blocks of zlib, each with its length, and a check sum at the end. Before compression the bytes
+of records are sorted: all values of a field together; the values of a history as differences from the output before;
+all first bytes, then all second bytes. Slowly changing values become zeros. Differences are taken of the 64-bit
+integers, without loss.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from studyrunner.checkpoint.part_files import (
 from studyrunner.system.files import open_plain
 
 PACKED = ".z"
-"""How the name of a packed file ends, after that of its sort."""
+"""Ending of the name of a packed file."""
 
 _LEVEL = 6
 _LENGTH_BYTES = 8
@@ -40,17 +41,17 @@ _BYTES_A_BLOCK = 2**20
 
 
 def packed_path(path: Path) -> Path:
-    """Where a file stands once it is packed."""
+    """Path of a file after packing."""
     return path.with_name(path.name + PACKED)
 
 
 def unpacked_path(packed: Path) -> Path:
-    """Where a packed file stood before."""
+    """Path of a file before packing."""
     return packed.with_name(packed.name.removesuffix(PACKED))
 
 
 def pack_records(file: IO[bytes], path: Path) -> None:
-    """Writes the records of a file into a packed one. Raises ValueError where they are damaged."""
+    """Packs a file of records. Raises ValueError where the records are damaged."""
     with open_plain(path, LARGEST_PART) as source:
         check_sum(source)
     records = load_records(path)
@@ -60,21 +61,21 @@ def pack_records(file: IO[bytes], path: Path) -> None:
 
 
 def pack_file(file: IO[bytes], path: Path) -> None:
-    """Writes a file as it is into a packed one."""
+    """Packs a file without sorting bytes."""
     with open_plain(path, LARGEST_PART) as source:
         check_sum(source)
         _write_blocks(Summed(file), iter(lambda: source.read(_BYTES_A_BLOCK), b""))
 
 
 def packed_kind(path: Path) -> np.dtype[Any]:
-    """Type of the records in a packed file. Raises ValueError where it is damaged, OSError where it cannot be read."""
+    """Type of the records in a packed file. Raises ValueError where damaged, OSError where unreadable."""
     with open_plain(path, LARGEST_PART) as source:
         check_sum(source)
         return read_header(source, LARGEST_PART)[0]
 
 
 def unpack_records(file: IO[bytes], path: Path) -> None:
-    """Writes the records of a packed file as they were. Raises ValueError where it is damaged."""
+    """Unpacks a file of records. Raises ValueError where the file is damaged."""
     with open_plain(path, LARGEST_PART) as source:
         check_sum(source)
         kind, n_records = read_header(source, LARGEST_PART)
@@ -85,7 +86,7 @@ def unpack_records(file: IO[bytes], path: Path) -> None:
 
 
 def unpack_file(file: IO[bytes], path: Path) -> None:
-    """Writes what was packed by `pack_file` as it was. Raises ValueError where it is damaged."""
+    """Unpacks a file of `pack_file`. Raises ValueError where the file is damaged."""
     with open_plain(path, LARGEST_PART) as source:
         check_sum(source)
         for block in _read_blocks(source, _BYTES_A_BLOCK):
@@ -102,7 +103,7 @@ def _write_blocks(summed: Summed, blocks: Iterable[bytes]) -> None:
 
 
 def _read_blocks(source: IO[bytes], largest: int) -> Iterator[bytes]:
-    """Blocks as they were. Raises ValueError where one is damaged or has more than `largest` bytes."""
+    """Decompressed blocks. Raises ValueError where a block is damaged or has more than `largest` bytes."""
     end = os.fstat(source.fileno()).st_size - _CHECK_SUM_BYTES
     while source.tell() < end:
         length = int.from_bytes(source.read(_LENGTH_BYTES), "little")
@@ -119,7 +120,7 @@ def _read_blocks(source: IO[bytes], largest: int) -> Iterator[bytes]:
 
 
 def _sort_bytes(records: NDArray[np.void]) -> bytes:
-    """Fields of records (n,), one after the other, each by places of its bytes."""
+    """Bytes of records (n,), field by field and byte place by byte place."""
     parts = []
     for name in records.dtype.names or ():
         values = np.ascontiguousarray(records[name])
@@ -132,7 +133,7 @@ def _sort_bytes(records: NDArray[np.void]) -> bytes:
 
 
 def _join_bytes(content: bytes, kind: np.dtype[np.void], n_records: int) -> NDArray[np.void]:
-    """Records (n,) of sorted bytes. Raises ValueError where these are too few or too many."""
+    """Records (n,) from sorted bytes. Raises ValueError where the number of bytes is wrong."""
     if len(content) != n_records * kind.itemsize:
         raise ValueError("a block has another length than it says")
     records, first = np.zeros(n_records, kind), 0
@@ -148,10 +149,10 @@ def _join_bytes(content: bytes, kind: np.dtype[np.void], n_records: int) -> NDAr
 
 
 def _has_differences(field: np.dtype[Any]) -> bool:
-    """Whether a field is a series of floating numbers."""
+    """Whether a field is a series of floating-point numbers."""
     return field.base.kind == "f" and field.base.itemsize == 8 and len(field.shape) > 0
 
 
 def _width(base: np.dtype[Any]) -> int:
-    """Bytes of a number; texts are sorted as they are."""
+    """Number of bytes of a number; 1 for texts, which are not sorted."""
     return base.itemsize if base.kind in "fiu" else 1

@@ -1,8 +1,8 @@
-"""The files of a run's folder: records of histories, and bundles of start states or of the progress of tasks.
+"""Formats of the files in the folder of a run: records of histories, and bundles of start states or of progress.
 
-Records are one array of numpy, an element a history. A bundle is three parts: the keys of its entries, where each of
-them ends, and the entries, each a few arrays of numpy of which the first is a text. No file holds a pickle. A check sum
-at the end tells whether a file is what was written.
+Records are one array of numpy with an element for each history. A bundle has three parts: the keys of its entries, the
+end of each entry, and the entries. An entry is some arrays of numpy; the first array is a text. No file contains a
+pickle. A check sum at the end shows whether a file is undamaged.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from solver.packing import Packed
 from studyrunner.system.files import open_plain
 
 KEY = "key"
-"""Name of the field of a record that holds its hash."""
+"""Name of the field of a record with the hash of the history."""
 
 KEY_TYPE = "S32"
 
 LARGEST_PART = 2**32
-"""Bytes: no file of a run's folder is larger."""
+"""Largest size of a file in the folder, bytes."""
 
 _CHECK_SUM_BYTES = 4
 _BYTES_AT_ONCE = 2**20
 
 Rows = Sequence[int]
-"""Places of entries in a file."""
+"""Rows of entries in a file."""
 
 
 class Summed:
-    """A file that is being written, with the sum of what was written so far."""
+    """An open file with the check sum of what was written so far."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
         self._sum = 0
 
     def write(self, content: bytes | memoryview) -> int:
-        """Writes so much more."""
+        """Writes bytes."""
         self._sum = zlib.crc32(content, self._sum)
         return self._file.write(content)
 
@@ -55,19 +55,19 @@ class Summed:
 
 
 def write_records(file: IO[bytes], pieces: Sequence[NDArray[np.void]]) -> None:
-    """Records (n,) of one type, piece by piece."""
+    """Writes records (n,) of one type, piece by piece."""
     write_pieces(file, pieces[0].dtype, sum(map(len, pieces)), pieces)
 
 
 def load_records(path: Path) -> NDArray[np.void]:
-    """Records that stay on the disk until they are used; whether they are what was written is not looked at.
+    """Records that stay on the disk until they are used; the check sum is not tested.
 
     Raises
     ------
     ValueError
-        Where they are no records.
+        Where the file contains no records.
     OSError
-        Where they cannot be read.
+        Where the file cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
         kind, n_records = _read_record_header(file)
@@ -75,14 +75,14 @@ def load_records(path: Path) -> NDArray[np.void]:
 
 
 def load_record_keys(path: Path) -> tuple[np.dtype[np.void], list[str]]:
-    """Type of the records of a file, and their hashes; no more of it than a piece is in memory at once.
+    """Type of the records of a file, and their hashes. Reads the file in pieces and tests the check sum.
 
     Raises
     ------
     ValueError
-        Where any of it is damaged.
+        Where the file is damaged.
     OSError
-        Where it cannot be read.
+        Where the file cannot be read.
     """
     with open_plain(path, LARGEST_PART) as file:
         check_sum(file)
@@ -95,7 +95,7 @@ def load_record_keys(path: Path) -> tuple[np.dtype[np.void], list[str]]:
 
 
 def merge_records(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None:
-    """Writes records of some files, of one type, into a new one."""
+    """Writes records of several files of one type into a new file."""
     for path, _ in sources:
         with open_plain(path, LARGEST_PART) as source:
             check_sum(source)
@@ -104,7 +104,7 @@ def merge_records(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None
 
 
 def records_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[NDArray[np.void]]:
-    """Records of some files, piece by piece."""
+    """Records of several files, piece by piece."""
     for path, rows in sources:
         # each piece from the file anew: what was used of it once does not stay in memory
         for first, n_rows in portions(len(rows), load_records(path).dtype):
@@ -112,26 +112,26 @@ def records_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[NDArray[np.void
 
 
 def write_bundle(file: IO[bytes], entries: Mapping[str, Packed]) -> None:
-    """Entries by their key."""
+    """Writes entries with their keys."""
     contents = [_as_bytes(entry) for entry in entries.values()]
     _write_entries(file, list(entries), list(map(len, contents)), contents)
 
 
 def load_keys(path: Path) -> list[str]:
-    """Keys of a bundle. Raises ValueError where any of it is damaged and OSError where it cannot be read."""
+    """Keys of a bundle. Raises ValueError where the bundle is damaged, OSError where it cannot be read."""
     with open_plain(path, LARGEST_PART) as file:
         check_sum(file)
         return list(_Contents.of(file).keys)
 
 
 def read_entry(path: Path, place: int) -> Packed:
-    """An entry of a bundle. Raises ValueError where it is damaged and OSError where it cannot be read."""
+    """An entry of a bundle. Raises ValueError where the entry is damaged, OSError where it cannot be read."""
     with open_plain(path, LARGEST_PART) as file:
         return _from_bytes(_Contents.of(file).read(file, place))
 
 
 def merge_bundles(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None:
-    """Writes entries of some bundles into a new one."""
+    """Writes entries of several bundles into a new bundle."""
     keys: list[str] = []
     lengths: list[int] = []
     for path, rows in sources:
@@ -144,7 +144,7 @@ def merge_bundles(file: IO[bytes], sources: Sequence[tuple[Path, Rows]]) -> None
 
 
 def _entries_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[bytes]:
-    """Entries of some bundles, one in memory at a time."""
+    """Entries of several bundles, one in memory at a time."""
     for path, rows in sources:
         with open_plain(path, LARGEST_PART) as source:
             contents = _Contents.of(source)
@@ -153,7 +153,7 @@ def _entries_of(sources: Sequence[tuple[Path, Rows]]) -> Iterator[bytes]:
 
 @dataclass(frozen=True)
 class _Contents:
-    """What the beginning of a bundle says: keys, and where each entry begins and ends in the file."""
+    """Head of a bundle: keys, and begin and end of each entry in the file."""
 
     keys: tuple[str, ...]
     begins: tuple[int, ...]
@@ -203,13 +203,16 @@ def _arrays_in(content: bytes) -> Iterator[NDArray[np.generic]]:
 
 
 def write_header(file: Summed, kind: np.dtype[np.generic], length: int) -> None:
-    """Writes type and length of an array of one dimension, whose elements follow."""
+    """Writes type and length of a one-dimensional array, whose elements follow."""
     header = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": (length,)}
     npy.write_array_header_1_0(file, header)
 
 
 def read_header(file: IO[bytes], largest: int = 0) -> tuple[np.dtype[Any], int]:
-    """Type and length of an array of one dimension. Raises ValueError where it is larger than the file or `largest`."""
+    """Type and length of a one-dimensional array.
+
+    Raises ValueError where the array is larger than the file or than `largest`.
+    """
     if npy.read_magic(file) != (1, 0):
         raise ValueError("not written by a run")
     shape, _, kind = npy.read_array_header_1_0(file)
@@ -227,7 +230,7 @@ def _read_column(file: IO[bytes], expected: str) -> NDArray[np.generic]:
 
 
 def check_sum(file: IO[bytes]) -> None:
-    """Reads through a file. Raises ValueError where it is not what was written; it is read on from where it was."""
+    """Tests the check sum of a file; the position in the file is unchanged. Raises ValueError where it is wrong."""
     before = file.tell()
     file.seek(0)
     left, found = os.fstat(file.fileno()).st_size - _CHECK_SUM_BYTES, 0
@@ -249,13 +252,13 @@ def write_pieces(file: IO[bytes], kind: np.dtype[np.void], n_records: int, piece
 
 
 def portions(n_records: int, kind: np.dtype[np.void]) -> Iterator[tuple[int, int]]:
-    """First record and number of records of parts that are no larger than is read at once."""
+    """First record and number of records of portions that are read at once."""
     step = max(1, _BYTES_AT_ONCE // kind.itemsize)
     return ((first, min(step, n_records - first)) for first in range(0, n_records, step))
 
 
 def _read_record_header(file: IO[bytes]) -> tuple[np.dtype[Any], int]:
-    """Type and number of records, which follow. Raises ValueError where the file has another length."""
+    """Type and number of the records that follow. Raises ValueError where the file has another length."""
     kind, n_records = read_header(file)
     if file.tell() + n_records * kind.itemsize + _CHECK_SUM_BYTES != os.fstat(file.fileno()).st_size:
         raise ValueError("the file has another length than it says")

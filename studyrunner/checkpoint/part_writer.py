@@ -1,10 +1,10 @@
-"""What is written at once into a run's folder: some new files, then old ones made into one, then what is left over.
+"""Writes files into the folder of a run: new files first, then merged files; at last files without use are removed.
 
-A run begins with unpacking what is there, and ends with packing it.
+A run unpacks the folder at the beginning and packs the folder at the end.
 
-A new file is written under a temporary name, put on the disk and renamed; that its name is on the disk as well comes
-before anybody hears of it, and before anything is removed that it stands for. So neither a kill nor a loss of power
-costs what was said to be there.
+A new file is written under a temporary name, synced and renamed, and the folder is synced. Only then other parts of the
+program hear of the file, and only then the files that it replaces are removed. Therefore a kill or a loss of power
+loses nothing that was reported as written.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from studyrunner.checkpoint.packed_files import (
     unpacked_path,
 )
 from studyrunner.checkpoint.part_files import Rows, merge_bundles, merge_records, write_bundle, write_records
-from studyrunner.checkpoint.shelf import PartFile
+from studyrunner.checkpoint.segment_index import PartFile
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 
@@ -41,7 +41,7 @@ PARTIAL = ".partial"
 
 @dataclass
 class Batch:
-    """Entries that are written together, by key. finished: keys of tasks whose progress is of no use after that."""
+    """Entries that are written together, by key. finished: keys of tasks whose progress is no longer needed."""
 
     records: dict[str, NDArray[np.void]] = field(default_factory=dict)
     starts: dict[str, Packed] = field(default_factory=dict)
@@ -55,7 +55,7 @@ class Batch:
         return not (self.records or self.starts or self.progress)
 
     def behind(self, earlier: Batch) -> Batch:
-        """Both in one."""
+        """One batch of two; entries of the later one replace those of the earlier one."""
         # what an earlier one has said of a task that is finished meanwhile is not said again
         progress = {key: kept for key, kept in earlier.progress.items() if key not in self.finished}
         return Batch(
@@ -69,7 +69,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Merge:
-    """Files whose entries (rows) go into one. number: of the new file."""
+    """Entries (rows) of files that are merged into one file. number: of the new file."""
 
     sort: str
     number: int
@@ -78,7 +78,7 @@ class Merge:
 
 @dataclass(frozen=True)
 class Job:
-    """What is done at once. number: of the new files. remove: files that nobody has a use for any more."""
+    """One job of the writer. number: of the new files. remove: files without use."""
 
     number: int
     batch: Batch
@@ -88,7 +88,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Written:
-    """New files by their sort, and those that others were merged into; these are missing where there was no room."""
+    """New files by sort of entry, and merged files; merged files are missing where the disk had no room."""
 
     new: Mapping[str, PartFile]
     merged: Sequence[tuple[Merge, PartFile]]
@@ -96,13 +96,15 @@ class Written:
 
 @dataclass(frozen=True)
 class PartWriter:
-    """Writes into a folder. run: a part of all names that no other run has."""
+    """Writes into a folder. run: part of all file names that no other run uses."""
 
     folder: Path
     run: str
 
     def write(self, job: Job) -> Written:
-        """Does a job. Raises StorageError where the batch cannot be written; nothing of it is then there."""
+        """Does a job. Raises StorageError where the batch cannot be written; then nothing of the batch is in the
+        folder.
+        """
         batch, new = job.batch, {}
         sorts: list[tuple[str, list[str], Callable[[IO[bytes]], None]]] = [
             # histories and progress are of no use without the start states before
@@ -130,7 +132,7 @@ class PartWriter:
         return Written(new, ())
 
     def pack(self, sort: str, file: PartFile) -> None:
-        """Puts a packed file in the place of one, which stays where there is no room for it or it cannot be read."""
+        """Replaces a file by its packed form. The file stays where the disk has no room or the file cannot be read."""
         put, target = pack_records if sort == RECORDS else pack_file, packed_path(file.path)
         with contextlib.suppress(OSError, ValueError):
             self._write_as(target, sort, file.number, lambda packed: put(packed, file.path))
@@ -138,7 +140,10 @@ class PartWriter:
             self._remove([file.path])
 
     def unpack(self, sort: str, number: int, packed: Path) -> None:
-        """Writes a packed file as it was, beside it. Raises OSError; ValueError where it is damaged."""
+        """Writes an unpacked file beside a packed one.
+
+        Raises OSError, or ValueError where the packed file is damaged.
+        """
         put = unpack_records if sort == RECORDS else unpack_file
         self._write_as(unpacked_path(packed), sort, number, lambda file: put(file, packed))
 
@@ -156,7 +161,7 @@ class PartWriter:
         return f"{number:08d}-{self.run}{sort}"
 
     def _write_as(self, path: Path, sort: str, number: int, write: Callable[[IO[bytes]], None]) -> int:
-        """Number of bytes that were written."""
+        """Writes a file; number of bytes written."""
         partial = self.folder / (self._name(sort, number) + PARTIAL)
         try:
             with files.create(partial) as file:

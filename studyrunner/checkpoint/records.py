@@ -1,4 +1,4 @@
-"""The record of a history: one element of an array of numpy that holds all that a result says."""
+"""The record of a wear history: one element of an array of numpy with all values of a result."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 
 
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
-    """Type of the record of a history: its hash, then all that its result says."""
+    """Data type of the record of a history: the hash, then all values of a result."""
     sizes = variable_sizes(study, facts)
     fields: list[tuple[str, str, tuple[int, ...]]] = [(KEY, KEY_TYPE, ())]
     fields.extend((name, entry.dtype, ()) for name, entry in KEPT.items())
@@ -40,7 +40,7 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
 
 
 def pack(kind: np.dtype[np.void], key: str, result: MarchResult) -> NDArray[np.void]:
-    """Record (1,) of a history that is known by `key`."""
+    """Record (1,) of a history with the hash `key`."""
     records = empty_record(kind)
     records[KEY] = key.encode("ascii")
     for name, values in result.values.items():
@@ -49,7 +49,7 @@ def pack(kind: np.dtype[np.void], key: str, result: MarchResult) -> NDArray[np.v
 
 
 def empty_record(kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """Record (1,) of a point without a result: NaN, or 0 where a variable is a whole number."""
+    """Record (1,) of a point without result: NaN, or 0 in whole numbers."""
     # from bytes: numpy copies a record field by field, which takes ten times as long
     return np.frombuffer(bytearray(_empty_bytes(kind)), kind)
 

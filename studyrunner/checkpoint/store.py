@@ -1,9 +1,9 @@
-"""The folder of a study: everything finished is on the disk a moment later, and a run goes on from it.
+"""The folder of a study: finished results are saved a moment later, and a later run continues from them.
 
-It stands beside the result file. Rank 0 writes all of it, as no other rank need see the folder, on a thread of its own:
-what comes meanwhile waits and goes into the same files, so that a slow disk makes them fewer and larger. Files of about
-one size are put together while the run goes on. Their names are those of no other run, so that two runs in one folder,
-where the file system has no locks, do no harm to each other.
+The folder stands beside the result file. Rank 0 writes all files, as other ranks may not see the folder. A thread
+writes; results that arrive meanwhile go into the next files together, so that a slow disk gets fewer and larger files.
+Files of about one size are merged during the run. File names differ from those of any other run: on a file system
+without locks two runs in one folder do not damage each other's files.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
+from studyrunner.checkpoint.folder_contents import read_folder
 from studyrunner.checkpoint.packed_files import PACKED
 from studyrunner.checkpoint.part_files import load_records, read_entry
 from studyrunner.checkpoint.part_writer import PROGRESS, RECORDS, STARTS, Batch, Job, Merge, PartWriter, Written
-from studyrunner.checkpoint.shelf import PartFile, Place, Shelf
-from studyrunner.checkpoint.stock import take_stock
+from studyrunner.checkpoint.segment_index import PartFile, Place, SegmentIndex
 from studyrunner.checkpoint.writer import Writer
 from studyrunner.system.files import NotPlainError, sync_folder
 from studyrunner.system.folder_lock import FolderLock
 from studyrunner.user_error import StorageError
 
 SECONDS_A_FILE = 0.25
-"""Results wait at most so long for others that go into the same file, where the disk is not slower."""
+"""Longest time, s, that a result waits for others that go into the same file."""
 
 SECONDS_A_PROGRESS = 1.0
-"""The progress of tasks waits so long for that of others."""
+"""Longest time, s, that the progress of a task waits for the progress of other tasks."""
 
 MOST_BYTES_WAITING = 32e6
-"""What is handed over while more is waiting has to wait for the disk: results are not piled up in memory."""
+"""Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
 
 _BYTES_A_FILE = 8e6
 _SECONDS_TO_MORE_ROOM = 60.0
@@ -68,12 +68,12 @@ class Store:
             raise StorageError(folder, error) from error
         try:
             self._part_writer = PartWriter(folder, secrets.token_hex(6))
-            found = take_stock(self._part_writer, kind, alone=self._lock.holds)
+            found = read_folder(self._part_writer, kind, alone=self._lock.holds)
         except OSError as error:
             self._lock.close()
             raise StorageError(folder, error) from error
-        self._shelves, self._others, self._number = found.shelves, found.others, found.last_number
-        self._records, self._starts, self._progress = (self._shelves[sort] for sort in (RECORDS, STARTS, PROGRESS))
+        self._indexes, self._others, self._number = found.indexes, found.others, found.last_number
+        self._records, self._starts, self._progress = (self._indexes[sort] for sort in (RECORDS, STARTS, PROGRESS))
         self._obsolete += found.left_over
         self.notes += [f"{folder.name}: {name} is damaged, what it held is computed again" for name in found.damaged]
         if not self._lock.holds:
@@ -204,10 +204,10 @@ class Store:
     def remove_forgotten(self) -> None:
         """What was forgotten is on the disk no more when this returns, so that no later run finds it."""
         self.flush()
-        for sort, shelf in self._shelves.items():
-            self._obsolete += [file.path for file in shelf.take_dead()]
-            for file in shelf.with_dead_entries():
-                self._merges.append(Merge(sort, self._next_number(), [(file, shelf.live_rows(file))]))
+        for sort, index in self._indexes.items():
+            self._obsolete += [file.path for file in index.take_dead()]
+            for file in index.with_dead_entries():
+                self._merges.append(Merge(sort, self._next_number(), [(file, index.live_rows(file))]))
         for _ in range(2):  # what takes their place comes first
             self._write()
             self._take(wait=True)
@@ -218,10 +218,10 @@ class Store:
         For 0 bytes nothing is left but what is named.
         """
         used = ((self._records, histories), (self._starts, starts), (self._progress, tasks))
-        idle: list[tuple[Shelf | None, PartFile]] = [(None, file) for file in self._others if file.ours]
-        for shelf, keys in used:
-            numbers = {shelf.places[key][0] for key in keys if key in shelf.places}
-            idle += [(shelf, file) for number, file in shelf.files.items() if file.ours and number not in numbers]
+        idle: list[tuple[SegmentIndex | None, PartFile]] = [(None, file) for file in self._others if file.ours]
+        for index, keys in used:
+            numbers = {index.places[key][0] for key in keys if key in index.places}
+            idle += [(index, file) for number, file in index.files.items() if file.ours and number not in numbers]
         too_much = sum(file.n_bytes for _, file in idle) - most
         for holder, file in sorted(idle, key=lambda entry: entry[1].number):
             if too_much <= 0.0:
@@ -233,9 +233,9 @@ class Store:
             else:
                 holder.drop(file)
         if most == 0.0:
-            for shelf, keys in used:
-                for key in set(shelf.places).difference(keys):
-                    shelf.forget(key)
+            for index, keys in used:
+                for key in set(index.places).difference(keys):
+                    index.forget(key)
             self.remove_forgotten()
 
     def pack(self) -> None:
@@ -243,7 +243,7 @@ class Store:
         self.remove_forgotten()
         if not self.locked:
             return
-        packed = [(sort, file) for sort, shelf in self._shelves.items() for file in shelf.files.values()]
+        packed = [(sort, file) for sort, index in self._indexes.items() for file in index.files.values()]
         of_others = [(RECORDS, file) for file in self._others if not file.path.name.endswith(PACKED)]
         for sort, file in (*packed, *of_others):
             self._part_writer.pack(sort, file)
@@ -290,15 +290,15 @@ class Store:
     def _accept(self, job: Job, written: Written) -> None:
         """Takes note of what is on the disk now."""
         for sort, file in written.new.items():
-            self._shelves[sort].put(file)
+            self._indexes[sort].put(file)
         for merge, file in written.merged:
-            self._shelves[merge.sort].put_merged(file, merge.sources)
+            self._indexes[merge.sort].put_merged(file, merge.sources)
         if len(written.merged) < len(job.merges):
             self._next_merge = time.monotonic() + _SECONDS_TO_MORE_ROOM
         for key in job.batch.finished:
             self._progress.forget(key)
-        for shelf in self._shelves.values():
-            self._obsolete += [file.path for file in shelf.take_dead()]
+        for index in self._indexes.values():
+            self._obsolete += [file.path for file in index.take_dead()]
         self._handed_over = Batch()
 
     def _refuse(self, job: Job) -> None:
@@ -309,10 +309,10 @@ class Store:
     def _due_merges(self) -> list[Merge]:
         if time.monotonic() < self._next_merge:
             return []
-        due = ((sort, shelf, shelf.to_merge()) for sort, shelf in self._shelves.items())
+        due = ((sort, index, index.to_merge()) for sort, index in self._indexes.items())
         return [
-            Merge(sort, self._next_number(), [(file, shelf.live_rows(file)) for file in found])
-            for sort, shelf, found in due
+            Merge(sort, self._next_number(), [(file, index.live_rows(file)) for file in found])
+            for sort, index, found in due
             if found
         ]
 
@@ -320,9 +320,9 @@ class Store:
         self._number += 1
         return self._number
 
-    def _read(self, shelf: Shelf, key: str) -> Packed:
-        number, row = shelf.places[key]
-        path = shelf.files[number].path
+    def _read(self, index: SegmentIndex, key: str) -> Packed:
+        number, row = index.places[key]
+        path = index.files[number].path
         try:
             return read_entry(path, row)
         except (OSError, ValueError) as error:

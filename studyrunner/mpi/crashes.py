@@ -1,10 +1,10 @@
-"""What a crash of a computing process leaves behind: which task it was at, and where in it.
+"""Traces of a crash: which task ended a process, and where the process was.
 
-Every rank that sees the folder of the run has a file there. The key of its task stands in the first line; Python's
-fault handler writes behind it where the process was. A process that is killed from outside leaves no such text.
+Every rank that sees the folder of the run has a file there. The first line is the hash of the task. Python's fault
+handler writes the position in the code behind it. A process that is killed from outside leaves no such text.
 
-The signal of a crash may come from outside as well, or from a machine that is sick: one says nothing of the task yet.
-What the rank has left is kept under the key of the task, and is the tally of how often that has ended its process.
+The signal of a crash may also come from outside or from a faulty machine, so that one crash says nothing about the
+task. Therefore the text is kept under the hash of the task, and the crashes of each task are counted.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _FRAME = re.compile(r'File "(.*)", line (\d+) in (.*)')
 
 @dataclass(frozen=True)
 class Crash:
-    """A task that ended its process. position: place on a branch that it was on the way to, None for a march."""
+    """A task that ended its process. position: index of the frequency in a branch; None for a wear history."""
 
     key: str
     position: int | None
@@ -46,7 +46,7 @@ class Crash:
 
 @contextlib.contextmanager
 def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate]:
-    """`evaluate`, which leaves word of what it is at in `folder`; as it is where this rank does not see the folder."""
+    """`evaluate` that notes its task in `folder`; `evaluate` itself where this rank does not see the folder."""
     path = folder / f"rank-{rank}.crash"
     file = None
     if folder.is_dir():
@@ -88,7 +88,7 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
 
 
 def count_crashes(folder: Path, rank: int | None = None) -> tuple[Crash, ...]:
-    """Takes what ranks have left that are there no more, or one of them, into the tally: the crashes among it."""
+    """Adds the notes of ranks that have ended, or of one of them, to the tally; returns the crashes among them."""
     crashes = []
     for path in sorted(folder.glob(_OF_A_RANK)) if rank is None else [folder / f"rank-{rank}.crash"]:
         with contextlib.suppress(OSError):
@@ -109,7 +109,7 @@ def count_crashes(folder: Path, rank: int | None = None) -> tuple[Crash, ...]:
 
 
 def read_tally(folder: Path) -> dict[str, tuple[Crash, ...]]:
-    """The crashes of each task so far, by its key, in their order."""
+    """Crashes of each task so far, by hash, in their order."""
     tally: dict[str, tuple[Crash, ...]] = {}
     for path, key in _tally_files(folder):
         crash = _read_crash(path)
@@ -119,7 +119,7 @@ def read_tally(folder: Path) -> dict[str, tuple[Crash, ...]]:
 
 
 def forget_crashes(folder: Path, keys: Collection[str] | None) -> None:
-    """Nothing of these tasks is counted any more, or of any for None."""
+    """Removes tasks from the tally; all tasks for None."""
     for path, key in _tally_files(folder):
         if keys is None or key in keys:
             with contextlib.suppress(OSError):

@@ -1,6 +1,7 @@
-"""Decides which rank gets which task; knows no messages and nothing of what a task is, and is given its clock.
+"""Decides which rank gets which task. This module sends no messages, does not know what a task is, and is given its
+clock.
 
-A server on real ranks and a simulation with thousands of them use the same decisions. No message makes it look at all
+The server on real ranks and a simulation with thousands of ranks make the same decisions. No decision looks at all
 ranks.
 """
 
@@ -11,43 +12,43 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
+from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
 
 AHEAD_SECONDS = 0.2
-"""A rank holds a second task behind one that takes less: behind a longer one it would wait for no gain."""
+"""A rank gets a second task in advance behind a task that takes less than this time, s."""
 
 WATCH_SECONDS = 1.0
-"""Between two looks at the tasks that run, at least."""
+"""Shortest time between two looks at the running tasks, s."""
 
 _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
 _WAITING = 1000
 _WAITING_A_RANK = 16
-_FEW_LESSONS = 16
-_LESSONS_SHARE = 8
+_FEW_MEASURED = 16
+_MEASURED_SHARE = 8
 
 
 class Work(Protocol):
-    """What has to be known of a task."""
+    """Properties of a task that the dispatcher needs."""
 
     @property
     def cost(self) -> float:
-        """Estimated seconds, positive."""
+        """Estimated time, s, positive."""
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated seconds of its first result, or of one of the others."""
+        """Estimated time, s, of the first result, or of one of the others."""
 
     @property
-    def kin(self) -> Kin:
-        """Which tasks it is like, see LearnedCosts."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks, see `CostModel`."""
 
     @property
     def n_results(self) -> int:
-        """Results that it gives, one after the other, at least 1."""
+        """Number of results that the task gives one after the other, at least 1."""
 
     @property
     def opens_others(self) -> bool:
-        """Whether its results make other tasks possible."""
+        """Whether results of the task make other tasks possible."""
 
 
 Task = TypeVar("Task", bound=Work)
@@ -63,62 +64,65 @@ class Assignment(Generic[Task]):
 
 @dataclass
 class _Held(Generic[Task]):
-    """A task that a rank has. began: when its rank took it up, None as long as it waits there.
+    """A task that a rank has.
 
-    n_left: results that it has still to give. lesson: what its being overdue has taught.
+    n_left: number of results that are still to come. began: when the rank began the task, None where the task waits.
+    measurement: what the cost model has learnt from a task that takes longer than expected.
     """
 
     task: Task
     n_left: int
     began: float | None
-    lesson: Lesson | None = None
+    measurement: Measurement | None = None
 
 
 class WaitingTasks(Generic[Task]):
-    """Tasks that wait; the one that is expected to take longest comes first, of equal ones the earliest."""
+    """Waiting tasks; the one with the longest expected time comes first, of equal ones the earliest."""
 
-    def __init__(self, costs: LearnedCosts) -> None:
+    def __init__(self, costs: CostModel) -> None:
         self._costs = costs
-        # with its kin, which takes a moment to tell
-        self._tasks: dict[int, tuple[Task, Kin]] = {}
+        # with the keys, which are not computed twice
+        self._tasks: dict[int, tuple[Task, CostKeys]] = {}
         self._order: list[tuple[float, int]] = []
 
     def __len__(self) -> int:
         return len(self._tasks)
 
     def add(self, number: int, task: Task) -> None:
-        """One more."""
-        self._tasks[number] = task, task.kin
+        """Adds a task."""
+        self._tasks[number] = task, task.cost_keys
         heapq.heappush(self._order, (-self._expected(*self._tasks[number]), number))
 
     def pop(self) -> tuple[int, Task]:
-        """The next one and its number. Raises IndexError where none waits."""
+        """Removes the next task; number and task. Raises IndexError where no task waits."""
         _, number = heapq.heappop(self._order)
         return number, self._tasks.pop(number)[0]
 
     def reorder(self) -> None:
-        """Puts all of them in the order of what is expected now."""
-        self._order = [(-self._expected(task, kin), number) for number, (task, kin) in self._tasks.items()]
+        """Puts all tasks in the order of the times that are expected now."""
+        self._order = [(-self._expected(task, cost_keys), number) for number, (task, cost_keys) in self._tasks.items()]
         heapq.heapify(self._order)
 
-    def _expected(self, task: Task, kin: Kin) -> float:
-        return task.cost * self._costs.correction(kin)
+    def _expected(self, task: Task, cost_keys: CostKeys) -> float:
+        return task.cost * self._costs.correction(cost_keys)
 
 
 class Dispatcher(Generic[Task]):
-    """Who computes what.
+    """Decides which rank gets which task.
 
-    Tasks that make others possible go first, unless so many wait already that all ranks have enough for long: what
-    waits, and what it holds, is then bounded. Of the others the longest go first, so that the ranks end together.
-    Tasks that may have ended a rank come first of all, but not on rank 0, which all need, while there is another.
+    - Tasks that make other tasks possible go first, unless enough tasks wait for all ranks: so the memory for waiting
+      tasks is bounded.
+    - Of the other tasks the longest go first, so that the ranks end together.
+    - Tasks that may have ended a rank come first of all, but not on rank 0, which all ranks need, while there is
+      another rank.
     """
 
-    def __init__(self, n_ranks: int, costs: LearnedCosts, clock: Callable[[], float]) -> None:
+    def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
         self._n_ranks = n_ranks
         self._costs = costs
         self._clock = clock
         self._n_known = 0
-        self._n_lessons = 0
+        self._n_measured = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
         self._openers: WaitingTasks[Task] = WaitingTasks(costs)
@@ -133,30 +137,30 @@ class Dispatcher(Generic[Task]):
 
     @property
     def done(self) -> bool:
-        """Whether nothing waits and nothing is computed."""
+        """Whether no task waits and no task runs."""
         return not self._held and self._n_waiting == 0 and not self._suspects
 
     @property
     def wants_more(self) -> bool:
-        """Whether fewer tasks wait than all ranks have use for, for long."""
+        """Whether fewer tasks wait than all ranks can use for some time."""
         return not self._enough_waits
 
     def add(self, tasks: Iterable[Task]) -> None:
-        """Tasks that have become possible."""
+        """Adds tasks that have become possible."""
         for task in tasks:
             (self._openers if task.opens_others else self._others).add(self._n_known, task)
             self._n_known += 1
 
     def add_lost(self, tasks: Iterable[Task]) -> None:
-        """Tasks of a rank that is lost, maybe by one of them."""
+        """Adds tasks of a lost rank; one of them may have ended the rank."""
         for task in tasks:
             self._suspects.add(self._n_known, task)
             self._n_known += 1
 
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
-        """The ranks that get a task now, and the tasks."""
-        if self._n_lessons >= max(_FEW_LESSONS, len(self._others) // _LESSONS_SHARE):
-            self._n_lessons = 0
+        """Ranks that get a task now, and the tasks."""
+        if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
+            self._n_measured = 0
             self._others.reorder()
         only_0 = self._n_ranks - len(self._shunned - {0}) == 1
         while self._suspects and (rank := next((rank for rank in self._free if rank or only_0), None)) is not None:
@@ -171,19 +175,19 @@ class Dispatcher(Generic[Task]):
             rank, _ = self._ahead.popitem()
             yield rank, self._hand_out(rank)
 
-    def deliver(self, rank: int, number: int, seconds: float, *, teaches: bool = True) -> Task:
-        """The task of which a rank has sent a result that took it so long.
+    def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
+        """Notes a result; returns its task. seconds: time that the result took.
 
-        teaches: whether others like it may take as long; not where it broke off.
+        typical: whether similar tasks may take as long; not where the task broke off.
         """
         held = self._held[number]
         task = held.task
-        if held.lesson is not None:
-            self._costs.forget(held.lesson)
-            held.lesson = None
-        if teaches:
-            self._costs.learn(task.kin, task.cost_of(first=held.n_left == task.n_results), seconds)
-            self._n_lessons += 1
+        if held.measurement is not None:
+            self._costs.forget(held.measurement)
+            held.measurement = None
+        if typical:
+            self._costs.learn(task.cost_keys, task.cost_of(first=held.n_left == task.n_results), seconds)
+            self._n_measured += 1
         held.n_left -= 1
         held.began = self._clock()
         if held.n_left == 0:
@@ -198,12 +202,12 @@ class Dispatcher(Generic[Task]):
         return task
 
     def lose(self, rank: int) -> list[tuple[Task, int]]:
-        """A rank is there no more. The tasks that it had, and how many results each still had to give."""
+        """Removes a lost rank. Returns its tasks, and the number of results that each still had to give."""
         lost = []
         for number in self._held_by[rank]:
             held = self._held.pop(number)
-            if held.lesson is not None:
-                self._costs.forget(held.lesson)
+            if held.measurement is not None:
+                self._costs.forget(held.measurement)
             lost.append((held.task, held.n_left))
         self._held_by[rank] = []
         self._shunned.discard(rank)
@@ -217,18 +221,18 @@ class Dispatcher(Generic[Task]):
         return lost
 
     def shun(self, rank: int) -> None:
-        """A rank is sick: it gets no more tasks, as long as another one does."""
+        """Gives a faulty rank no more tasks, as long as there is another rank."""
         if len(self._shunned) + 1 < self._n_ranks:
             self._shunned.add(rank)
             self._free.pop(rank, None)
             self._ahead.pop(rank, None)
 
     def task(self, number: int) -> Task:
-        """A task that is computed."""
+        """A running task."""
         return self._held[number].task
 
     def running(self) -> list[tuple[Task, int, float]]:
-        """What is computed at the moment, longest first: the task, results still to come, seconds since the last."""
+        """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
         now = self._clock()
         busy = [(held.task, held.n_left, now - held.began) for held in self._held.values() if held.began is not None]
         return sorted(busy, key=lambda entry: -entry[2])
@@ -236,7 +240,8 @@ class Dispatcher(Generic[Task]):
     def watch(self) -> None:
         """Called many times a second: now and then learns from tasks that take longer than expected.
 
-        A march that takes a hundred times as long as most teaches this long before it ends, in time for those like it.
+        A history that takes a hundred times as long as most corrects the cost model long before its end, in time for
+        the order of similar tasks.
         """
         now = self._clock()
         if now < self._next_watch or not self._n_waiting:
@@ -247,11 +252,11 @@ class Dispatcher(Generic[Task]):
             if held.began is None or task.opens_others:
                 continue
             at_least = _AS_LONG_AGAIN * (now - held.began)
-            if at_least > task.cost * self._costs.correction(task.kin):
-                if held.lesson is not None:
-                    self._costs.forget(held.lesson)
-                held.lesson = self._costs.learn(task.kin, task.cost, at_least)
-        self._n_lessons = 0
+            if at_least > task.cost * self._costs.correction(task.cost_keys):
+                if held.measurement is not None:
+                    self._costs.forget(held.measurement)
+                held.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
+        self._n_measured = 0
         self._others.reorder()
 
     @property
@@ -271,9 +276,9 @@ class Dispatcher(Generic[Task]):
         return Assignment(number, task)
 
     def _see_ahead(self, rank: int) -> None:
-        """Whether a rank that holds one task may get a second one."""
+        """Notes whether a rank with one task may get a second task."""
         task = self._held[self._held_by[rank][0]].task
         if rank in self._shunned:
             return
-        if task.n_results == 1 and task.cost * self._costs.correction(task.kin) < AHEAD_SECONDS:
+        if task.n_results == 1 and task.cost * self._costs.correction(task.cost_keys) < AHEAD_SECONDS:
             self._ahead[rank] = None

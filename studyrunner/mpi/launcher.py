@@ -1,4 +1,4 @@
-"""What started this process: the launcher of a parallel run, as its variables in the environment tell, without MPI."""
+"""The launcher that started this process, from variables of the environment, without MPI."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PACKAGED_LIBRARIES = (
 
 
 class LauncherError(Exception):
-    """The launcher started several processes that cannot talk to each other: each would compute the whole study."""
+    """The launcher started several processes that cannot exchange messages: each would compute the whole study."""
 
 
 def has_launcher(environment: Mapping[str, str] = os.environ) -> bool:
@@ -30,17 +30,17 @@ def has_launcher(environment: Mapping[str, str] = os.environ) -> bool:
 
 
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of this process as the launcher counts, 0 without one; known without MPI."""
+    """Number of this process according to the launcher, 0 without launcher."""
     return max(_count(environment, name) for name in _RANKS)
 
 
 def launcher_size(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of processes that the launcher says it started, 0 where none says so."""
+    """Number of processes according to the launcher, 0 without launcher."""
     return max(_count(environment, name) for name in _SIZES)
 
 
 def job_size(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of processes that a batch system has room for, where no launcher has started them; 0 if unknown."""
+    """Number of processes that a batch system has room for, without launcher; 0 if unknown."""
     return 0 if launcher_size(environment) else max(_count(environment, name) for name in _JOBS)
 
 

@@ -1,7 +1,7 @@
-"""The ranks of a run: processes that a launcher started together, or one process alone.
+"""The ranks of a run: processes that a launcher has started together, or one process alone.
 
-The only importer of mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All calls of
-MPI come from the main thread, so that any MPI library will do (MPI_THREAD_FUNNELED).
+Only this module imports mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All MPI
+calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 POLL_SECONDS = 1e-3
-"""How long a rank sleeps between two looks for a message: a blocking receive would keep a core busy."""
+"""Time between two looks for a message, s. A blocking receive would keep a core busy."""
 
 _SECONDS_TO_PRINT = 1.0
 _MANY_SENT = 64
 
 _TOLERANT = "OMPI_MCA_mpi_ft_enable"
-"""Set by the launcher of Open MPI where it was told --with-ft ulfm."""
+"""Variable that the launcher of Open MPI sets with --with-ft ulfm."""
 
 _SECONDS_TO_START = 120.0
-"""From the first rank that calls the library to the last: the ranks of a job start within seconds of each other."""
+"""Longest time from the first rank that calls the library to the last, s. Ranks of a job start within seconds."""
 
 _SECONDS_TO_MISS_RANK_0 = 0.5
 
@@ -48,36 +48,36 @@ class Ranks(Protocol):
 
     @property
     def rank(self) -> int:
-        """Number of this process, 0 for the one that hands out the work."""
+        """Number of this process; process 0 hands out the work."""
 
     @property
     def size(self) -> int:
-        """Number of processes, those that are lost included."""
+        """Number of processes, lost ones included."""
 
     @property
     def lost(self) -> frozenset[int]:
-        """Processes that have ended before their time, as far as known here. Where that ends all, there are none."""
+        """Processes that have ended before their time, as far as known here; empty where the loss of one ends all."""
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
 
     def flush(self) -> None:
-        """Waits until all that was sent is received or on its way by itself; before a rank goes on computing.
+        """Waits until all messages are received, or need this process no more; called before a rank goes on computing.
 
-        The receiver has to be looking for messages: a large one moves only while its sender is in the MPI library.
+        The receiver has to look for messages: a large message moves only while its sender is in the MPI library.
         """
 
     def receive(self, rank: int | None = None) -> tuple[int, object] | None:
-        """The rank that sent the next message and the message, or None where there is none yet.
+        """Sender and content of the next message, or None where there is none yet.
 
-        rank: takes what this one sent only; what others have sent stays where it is.
+        rank: sender; messages of other senders stay where they are. None for any sender.
         """
 
     def close(self) -> None:
-        """Ends the communication in good order; called once, by every rank."""
+        """Ends the communication; every rank calls this once."""
 
     def abort(self, status: int) -> None:
-        """Ends all ranks at once; returns only where there is no other one."""
+        """Ends all ranks at once; returns only where there is no other rank."""
 
 
 class Alone:
@@ -88,21 +88,21 @@ class Alone:
     lost: frozenset[int] = frozenset()
 
     def send(self, message: object, rank: int) -> None:
-        """There is nobody to send to: a call is a bug."""
+        """There is no receiver: a call is a bug."""
         raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
-        """Nothing was sent."""
+        """Does nothing."""
 
     def receive(self, rank: int | None = None) -> tuple[int, object] | None:  # noqa: ARG002 - as in Ranks
-        """Nobody sends."""
+        """There is no sender."""
         return None
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Does nothing."""
 
     def abort(self, status: int) -> None:
-        """Nobody waits."""
+        """Does nothing."""
 
 
 class MpiRanks:
@@ -178,10 +178,10 @@ class MpiRanks:
 
 
 class TolerantRanks(MpiRanks):
-    """MPI's world where the end of one process is not that of all: Open MPI 5 under `mpiexec --with-ft ulfm`.
+    """MPI ranks where the end of one process does not end all: Open MPI 5 under `mpiexec --with-ft ulfm`.
 
-    MPI says that a process is lost where it is asked for messages (ULFM, MPI 5); they are then taken note of, and what
-    goes to them goes nowhere. Without rank 0 there is nobody to go on for: the others end all.
+    MPI reports a lost process when it is asked for messages (ULFM, MPI 5). Messages to lost processes are dropped.
+    Without rank 0 the other ranks end.
     """
 
     def __init__(self) -> None:
@@ -201,7 +201,7 @@ class TolerantRanks(MpiRanks):
             signal.setitimer(signal.ITIMER_REAL, _SECONDS_TO_MISS_RANK_0, _SECONDS_TO_MISS_RANK_0)
 
     def send(self, message: object, rank: int) -> None:
-        """As in Ranks; a message to a process that is lost is as good as sent."""
+        """As in Ranks; a message to a lost process is dropped."""
         if rank not in self.lost:
             try:
                 super().send(message, rank)
@@ -243,7 +243,7 @@ class TolerantRanks(MpiRanks):
             self._note_lost(error)
 
     def _note_lost(self, error: MPI.Exception) -> None:
-        """Takes note of the processes whose loss an error tells of. Raises any other error."""
+        """Notes the lost processes that an error names. Raises any other error."""
         if error.Get_error_class() not in (self._mpi.ERR_PROC_FAILED, self._mpi.ERR_PROC_FAILED_PENDING):
             raise error
         failed = self._world.Get_failed()
@@ -292,7 +292,7 @@ def start_ranks() -> Ranks:
 
 
 def _survives_losses() -> bool:
-    """Whether the launcher lets the others go on when a process is lost, and mpi4py can tell of it."""
+    """Whether the launcher keeps the other ranks when a process is lost, and mpi4py can report the loss."""
     if os.environ.get(_TOLERANT, "0").lower() not in ("1", "true"):
         return False
     version = tuple(int(part) for part in metadata.version("mpi4py").split(".")[:2])
@@ -300,7 +300,7 @@ def _survives_losses() -> bool:
 
 
 def wait_for_message(ranks: Ranks) -> object:
-    """The next message, whenever it comes; for ranks that have nothing else to do."""
+    """The next message; for ranks that have nothing else to do."""
     while (received := ranks.receive()) is None:
         time.sleep(POLL_SECONDS)
     return received[1]

@@ -1,8 +1,8 @@
-"""Sends tasks to ranks while they run, and receives the results; knows nothing of what a task is.
+"""Sends tasks to ranks and receives results. This module does not know what a task is.
 
-A task has one result or several; each is handed on at once, while its rank goes on with the task. A long one says now
-and then how far it is, so that another run can go on from there. Rank 0 computes as well: its main thread sends tasks
-and receives results, a second thread computes. Which rank gets which task is decided in `dispatch`.
+A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
+so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
+a second thread computes. `dispatch` decides which rank gets which task.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from typing import Generic, TypeVar
 
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.cost_model import CostModel
 from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
 from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 
 SECONDS_TO_PROGRESS = 3.0
-"""A task says how far it is at most so often, with many ranks less often.
+"""Shortest time between two reports of progress of a task, s; longer with many ranks.
 
-With the second that this waits for that of others (`checkpoint.store`) a kill costs no step that was finished more than
-5 s before, where steps are short and the disk keeps up.
+Together with the second that a report waits for others (`checkpoint.store`) a kill loses no step that was finished more
+than 5 s before, where steps are short and the disk is fast enough.
 """
 
 SECONDS_TO_WORDS = 1.0
-"""A task says in words what it is at at most so often."""
+"""Shortest time between two reports in words, s."""
 
 _MANY_RANKS = 100
-"""More ranks say it less often, as rank 0 writes all of it to the disk."""
+"""With more ranks each rank reports less often, as rank 0 writes all reports to the disk."""
 
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
@@ -44,7 +44,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class _Delivery(Generic[Result]):
-    """A result on its way back, and the time that it took, s."""
+    """A result that is sent to rank 0, and the time that it took, s."""
 
     number: int
     result: Result
@@ -53,7 +53,7 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """How far a task is: something to go on from, or words."""
+    """Progress of a task: data to continue from, or words."""
 
     number: int
     progress: object
@@ -61,11 +61,11 @@ class _Progress:
 
 @dataclass(frozen=True)
 class RankInterrupted:
-    """A rank was told from outside to end: so are all."""
+    """Message of a rank that was ended from outside; all ranks end."""
 
 
 Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
-"""Does a task and gives its results one by one; it may hand its progress to the function that it is given."""
+"""Does a task: gives the results one by one and may hand the progress to the given function."""
 
 
 def _work(
@@ -74,7 +74,7 @@ def _work(
     send: Callable[[object], None],
     seconds_to_progress: float,
 ) -> None:
-    """Sends back what a task gives, as soon as it is there."""
+    """Sends the results of a task, each as soon as it is there."""
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
@@ -113,11 +113,11 @@ class _LocalWorker(Generic[Task, Result]):
         self._thread.start()
 
     def assign(self, assignment: Assignment[Task]) -> None:
-        """Puts a task behind those that it already has."""
+        """Puts a task behind those that wait."""
         self._waiting.put(assignment)
 
     def receive(self, seconds: float) -> object:
-        """What it sends next, None where nothing comes within `seconds`. Raises what a task raised."""
+        """The next message; None where none comes within `seconds`. Raises the exception of a task."""
         if seconds:
             self._sent.wait(seconds)
         message = self._sent.take()
@@ -126,16 +126,16 @@ class _LocalWorker(Generic[Task, Result]):
         return message
 
     def stop(self) -> None:
-        """Ends the thread; it has nothing left to do. Raises what its last task raised after the last result."""
+        """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
         self._waiting.put(None)
         with uninterrupted():
             self._thread.join()
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Nobody wants any more results: the thread ends as soon as what it calls returns.
+        """Ends the thread without its results, as soon as the running call of a library returns.
 
-        The main thread may have to wait for the interpreter as long as each of these calls takes, at each of its own.
+        Until then each call of the main thread may wait for the interpreter as long as such a call takes.
         """
         self._ended = True
         if self._thread.ident is not None:
@@ -156,130 +156,169 @@ class _LocalWorker(Generic[Task, Result]):
 
 
 TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
-"""What is to be done in place of the tasks of a rank that is lost; the number is that of results still to be given."""
+"""Tasks that are done in place of the tasks of a lost rank; the number is that of results still to come."""
 
 
 def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
-    """Tasks that begin anew on another rank."""
+    """The tasks of a lost rank, which begin anew."""
     return [task for task, _ in lost]
+
+
+@dataclass(frozen=True)
+class Handlers(Generic[Task, Result]):
+    """What rank 0 does with results and messages. All of them are called in the main thread.
+
+    take: called with a task and each of its results, in the order in which results arrive; returns the tasks that the
+        result makes possible.
+    tick: called many times a second with a function that returns the running tasks, as `Dispatcher.running`.
+    keep: called with a task and its progress, or words on its progress; never after the last result of the task.
+    take_back: called with a lost rank and the tasks that it had; returns the tasks to be done instead.
+    is_sick: whether a result of a rank shows that the rank should get no more tasks.
+    """
+
+    take: Callable[[Task, Result], Iterable[Task]]
+    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None
+    keep: Callable[[Task, object], None] = lambda *_: None
+    take_back: TakeBack[Task] = give_again
+    is_sick: Callable[[int, Result], bool] = lambda *_: False
 
 
 def serve_tasks(
     ranks: Ranks,
     tasks: Iterable[Task],
     run: Run[Task, Result],
-    take: Callable[[Task, Result], Iterable[Task]],
-    costs: LearnedCosts,
-    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None,
-    keep: Callable[[Task, object], None] = lambda *_: None,
-    take_back: TakeBack[Task] = give_again,
-    is_sick: Callable[[int, Result], bool] = lambda *_: False,
+    handlers: Handlers[Task, Result],
+    costs: CostModel,
 ) -> None:
-    """Rank 0: has all tasks done, its own ones by `run`, and hands every result to `take`.
+    """Rank 0: has all tasks done and computes some of them.
 
-    An exception on another rank ends that rank's process; one of a task on this rank is raised here.
+    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here.
 
     Parameters
     ----------
     ranks
-        All of them.
+        All ranks.
     tasks
-        Are taken one by one, as there is use for them.
+        Taken one by one, when ranks can use more.
     run
         Gives the results of a task one by one.
-    take
-        Called in the main thread, in the order in which results arrive; returns the tasks that a result makes possible.
+    handlers
+        What is done with results and messages.
     costs
-        Learns what tasks take.
-    tick
-        Called many times a second, with what tells the tasks that run, as `Dispatcher.running`.
-    keep
-        Called with how far a task is, or in words with what it is at; never after its last result.
-    take_back
-        Called with a rank that is lost and the tasks that it had.
-    is_sick
-        Whether a result of a rank tells that it should get no more tasks.
+        Learns the run times of tasks.
 
     Raises
     ------
     KeyboardInterrupt
         Where another rank was interrupted.
     """
-    dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
-    local = _LocalWorker(run, _seconds_to_progress(ranks))
-    known = iter(tasks)
-    lost: frozenset[int] = frozenset()
+    server = _Server(ranks, tasks, run, handlers, costs)
+    try:
+        with uninterrupted():
+            server.begin()
+        while not server.done:
+            with uninterrupted():
+                server.look()
+    except BaseException:
+        server.give_up()
+        raise
+    server.stop()
 
-    def hand_out() -> None:
-        while dispatcher.wants_more and (more := list(itertools.islice(known, _AT_ONCE))):
-            dispatcher.add(more)
-        for rank, assignment in dispatcher.assign():
+
+class _Server(Generic[Task, Result]):
+    """Rank 0: sends tasks, receives results."""
+
+    def __init__(
+        self,
+        ranks: Ranks,
+        tasks: Iterable[Task],
+        run: Run[Task, Result],
+        handlers: Handlers[Task, Result],
+        costs: CostModel,
+    ) -> None:
+        self._ranks = ranks
+        self._waiting = iter(tasks)
+        self._handlers = handlers
+        self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
+        self._local = _LocalWorker(run, _seconds_to_progress(ranks))
+        self._lost: frozenset[int] = frozenset()
+
+    @property
+    def done(self) -> bool:
+        """Whether all tasks are done."""
+        return self._dispatcher.done
+
+    def begin(self) -> None:
+        """Sends the first tasks."""
+        self._do_without_the_lost()
+        self._hand_out()
+
+    def look(self) -> None:
+        """Receives what there is; waits a moment where there is nothing."""
+        if self._ranks.lost != self._lost:
+            self.begin()
+        quiet = False
+        for _ in range(_LOOKS_A_TICK):
+            received, message = self._ranks.receive(), self._local.receive(0.0)
+            if received is not None:
+                self._accept(*received)
+            if message is not None:
+                self._accept(0, message)
+            quiet = received is None and message is None
+            if quiet:
+                break
+        self._dispatcher.watch()
+        self._handlers.tick(self._dispatcher.running)
+        wait = POLL_SECONDS if self._ranks.size > 1 else LONGEST_WAIT
+        if quiet and (message := self._local.receive(wait)) is not None:
+            self._accept(0, message)
+
+    def give_up(self) -> None:
+        """Ends the computing thread of rank 0 before its task is done."""
+        self._local.give_up()
+
+    def stop(self) -> None:
+        """Ends the computing thread of rank 0 and the work of the other ranks."""
+        self._local.stop()
+        for rank in range(1, self._ranks.size):
+            self._ranks.send(None, rank)
+
+    def _hand_out(self) -> None:
+        while self._dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
+            self._dispatcher.add(more)
+        for rank, assignment in self._dispatcher.assign():
             if rank == 0:
-                local.assign(assignment)
+                self._local.assign(assignment)
             else:
-                ranks.send(assignment, rank)
+                self._ranks.send(assignment, rank)
 
-    def do_without_the_lost() -> None:
-        nonlocal lost
-        new, lost = ranks.lost - lost, ranks.lost
+    def _do_without_the_lost(self) -> None:
+        new, self._lost = self._ranks.lost - self._lost, self._ranks.lost
         for rank in sorted(new):
-            dispatcher.add_lost(take_back(rank, dispatcher.lose(rank)))
+            self._dispatcher.add_lost(self._handlers.take_back(rank, self._dispatcher.lose(rank)))
 
-    def accept(rank: int, message: object) -> None:
-        if rank in lost:
-            # sent before it was lost; its task is done again
+    def _accept(self, rank: int, message: object) -> None:
+        if rank in self._lost:
+            # sent before the rank was lost; its task is done again
             return
         if isinstance(message, _Progress):
-            keep(dispatcher.task(message.number), message.progress)
+            self._handlers.keep(self._dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-        sick = is_sick(rank, message.result)
+        sick = self._handlers.is_sick(rank, message.result)
         if sick:
-            dispatcher.shun(rank)
-        task = dispatcher.deliver(rank, message.number, message.seconds, teaches=not sick)
-        dispatcher.add(take(task, message.result))
-        hand_out()
-
-    def look() -> None:
-        if ranks.lost != lost:
-            do_without_the_lost()
-            hand_out()
-        quiet = False
-        for _ in range(_LOOKS_A_TICK):
-            received, message = ranks.receive(), local.receive(0.0)
-            if received is not None:
-                accept(*received)
-            if message is not None:
-                accept(0, message)
-            quiet = received is None and message is None
-            if quiet:
-                break
-        dispatcher.watch()
-        tick(dispatcher.running)
-        if quiet and (message := local.receive(POLL_SECONDS if ranks.size > 1 else LONGEST_WAIT)) is not None:
-            accept(0, message)
-
-    try:
-        with uninterrupted():
-            do_without_the_lost()
-            hand_out()
-        while not dispatcher.done:
-            with uninterrupted():
-                look()
-    except BaseException:
-        local.give_up()
-        raise
-    local.stop()
-    for rank in range(1, ranks.size):
-        ranks.send(None, rank)
+            self._dispatcher.shun(rank)
+        task = self._dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
+        self._dispatcher.add(self._handlers.take(task, message.result))
+        self._hand_out()
 
 
 def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:
-    """Any other rank: computes what rank 0 sends, until it sends None."""
+    """Any other rank: does the tasks that rank 0 sends, until rank 0 sends None."""
 
     def send(reply: object) -> None:
         ranks.send(reply, 0)

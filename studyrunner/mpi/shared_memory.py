@@ -1,7 +1,7 @@
-"""An object whose arrays stand in memory once on a machine, however many of its processes read them.
+"""An object whose arrays are in memory once on a machine, whatever the number of processes that read them.
 
-The memory is a file without a name (`memfd_create` of Linux): it is gone with the last process that holds it, however
-that ends, and the end of one process takes nothing from the others.
+The memory is a file without a name (`memfd_create` of Linux). It exists until the last process that holds it ends, in
+whatever way. The end of one process does not disturb the others.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ Thing = TypeVar("Thing")
 class Address:
     """Where another process of the machine finds a shared object.
 
-    process, descriptor: who holds the memory, and under which number. inode: of the memory, by which it is known.
-    head: the object without what its arrays hold. lengths: of these, bytes.
+    process, descriptor: the process that holds the memory, and the number of the file there.
+    inode: identity of the memory.
+    head: the object without the contents of its arrays.
+    lengths: lengths of the contents, bytes.
     """
 
     process: int
@@ -35,11 +37,11 @@ class Address:
 
 
 class SharedObject(Generic[Thing]):
-    """A copy of an object whose arrays stand in memory that others on this machine can map.
+    """A copy of an object whose arrays other processes of this machine can map.
 
-    value: the copy. What a process writes into its arrays is seen by that process alone.
+    value: the copy. Changes of its arrays are seen by the process alone that makes them.
 
-    Raises OSError where the system has no such memory, or not enough of it.
+    Raises OSError where the system has no such memory, or not enough.
     """
 
     def __init__(self, thing: Thing) -> None:
@@ -62,14 +64,14 @@ class SharedObject(Generic[Thing]):
             raise
 
     def close(self) -> None:
-        """No further process can find it; those that have it, this one as well, keep it."""
+        """No further process can map the object; processes that have mapped it, this one included, keep it."""
         os.close(self._descriptor)
 
 
 def open_shared(address: Address) -> object:
     """The object that another process of this machine shares.
 
-    Raises OSError where it cannot be reached: another machine or container, or a system that does not let us.
+    Raises OSError where the object cannot be mapped: another machine or container, or no permission.
     """
     descriptor = os.open(f"/proc/{address.process}/fd/{address.descriptor}", os.O_RDONLY | os.O_CLOEXEC)
     try:
@@ -79,7 +81,7 @@ def open_shared(address: Address) -> object:
 
 
 def _places(lengths: Sequence[int]) -> list[int]:
-    """Where each begins, and where all end, bytes."""
+    """Begin of each content, and end of all, bytes."""
     places = [0]
     for length in lengths:
         places.append(places[-1] + -(-length // _ALIGNED) * _ALIGNED)
@@ -87,7 +89,7 @@ def _places(lengths: Sequence[int]) -> list[int]:
 
 
 def _reserve(descriptor: int, n_bytes: int) -> None:
-    """Takes the memory now: a write to what is not there later on would end the process."""
+    """Reserves the memory now: a later write to memory that does not exist would end the process."""
     if n_bytes:
         os.posix_fallocate(descriptor, 0, n_bytes)
 

@@ -1,4 +1,4 @@
-"""Before anything else the ranks compare the software that they run: with another one the numbers may differ."""
+"""The ranks compare the versions of their software before anything else: with other versions the numbers may differ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from studyrunner.mpi.launcher import LauncherError
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks
 
 SECONDS_TO_ANSWER = 60.0
-"""All ranks have started when the first one asks; one that runs an older version never answers."""
+"""Longest time for an answer, s. All ranks have started when rank 0 asks; an older version never answers."""
 
 _REMEDY = "install the same software for all ranks"
 _PACKAGES = ("fretwear", "numba", "numpy", "scipy")
@@ -25,7 +25,11 @@ _SOURCES = ("solver", "studies", "studyrunner")
 
 @dataclass(frozen=True)
 class Machine:
-    """Where a rank is. host: its name. boot, processes: what tells machines of one name, and containers, apart."""
+    """Machine of a rank.
+
+    host: name of the machine.
+    boot, processes: tell machines with the same name, and containers, apart.
+    """
 
     host: str
     boot: str
@@ -33,7 +37,7 @@ class Machine:
 
 
 def describe_software() -> dict[str, str]:
-    """What this process runs, by name; a digest stands for the source."""
+    """Versions of the software of this process, by name; a hash stands for the source."""
     digest = hashlib.sha256()
     for package in _SOURCES:
         specification = find_spec(package)
@@ -49,12 +53,12 @@ def describe_software() -> dict[str, str]:
 
 
 def report_version(ranks: Ranks) -> None:
-    """Any other rank: tells rank 0 where it is and what it runs."""
+    """Any other rank: tells rank 0 its machine and versions."""
     ranks.send((describe_machine(), describe_software()), 0)
 
 
 def describe_machine() -> Machine:
-    """Where this process is. Ranks of the same machine see each other's processes."""
+    """Machine of this process. Ranks of the same machine see each other's processes."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         processes = Path("/proc/self/ns/pid").readlink().as_posix()
@@ -65,17 +69,17 @@ def describe_machine() -> Machine:
 
 
 def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> dict[int, Machine]:
-    """Rank 0: compares what the other ranks run with what it runs itself.
+    """Rank 0: compares the versions of all ranks.
 
     Returns
     -------
     dict of int, Machine
-        Where each rank is.
+        Machine of each rank.
 
     Raises
     ------
     LauncherError
-        Where another rank runs something else, or does not answer within `seconds`.
+        Where another rank has other versions, or does not answer within `seconds`.
     KeyboardInterrupt
         Where another rank was interrupted.
     """

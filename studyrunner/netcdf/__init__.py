@@ -1,1 +1,1 @@
-"""The result file: gathered from the folder of a run, with its provenance and its scene."""
+"""The result file: written from the folder of a run, with attributes on its origin and with its scene."""

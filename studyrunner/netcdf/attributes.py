@@ -36,7 +36,7 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
 
 
 def coordinate_entry(study: Study, name: str) -> Variable:
-    """What a coordinate of this study is."""
+    """Entry of a coordinate in the list of variables."""
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
@@ -62,7 +62,7 @@ def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray
 
 
 def _labels(values: Sequence[object]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every reader of NetCDF knows; all text where one is."""
+    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text."""
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
     return array.astype(np.int32) if array.dtype.kind == "i" else array

@@ -1,4 +1,4 @@
-"""The date of creation that a result bears where it is asked for: equal runs have equal files without it."""
+"""The date of creation in a result; only on request, so that equal runs have equal files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from datetime import UTC, date, datetime
 from studyrunner.user_error import UserError
 
 NOW = "now"
-"""Stands for the moment at which the file is written."""
+"""Stands for the time at which the file is written."""
 
 
 def check_date(text: str, place: str, key: str) -> str:
@@ -16,14 +16,14 @@ def check_date(text: str, place: str, key: str) -> str:
     Parameters
     ----------
     text
-        What the user gave: a date, or a date and time, in any form of ISO 8601; or `NOW`.
+        Input of the user: a date, or date and time, in any form of ISO 8601; or `NOW`.
     place, key
-        Where it was given, for the message.
+        Where the input was given, for the message.
 
     Raises
     ------
     UserError
-        Where it is none of these.
+        Where the text is neither.
     """
     if text == NOW:
         return NOW
@@ -39,7 +39,7 @@ def check_date(text: str, place: str, key: str) -> str:
 
 
 def describe_date(checked: str | None) -> dict[str, str]:
-    """Attribute of the file, with the time in UTC for `NOW`; none where no date is asked for."""
+    """Attribute of the file, in UTC for `NOW`; none without date."""
     if checked is None:
         return {}
     return {"date_created": _extended(datetime.now(UTC).replace(microsecond=0)) if checked == NOW else checked}

@@ -1,6 +1,6 @@
-"""Records of histories -> one labelled NetCDF file, written under a temporary name and renamed.
+"""Writes the records of wear histories to one NetCDF file, under a temporary name that is changed at the end.
 
-The file is written slab by slab from the files of a run: only a slab is ever in memory, however many points there are.
+The file is written in slabs from the files of a run. Only one slab is in memory, whatever the number of points.
 """
 
 from __future__ import annotations
@@ -45,10 +45,12 @@ Region = tuple[int | slice, ...]
 
 @dataclass(frozen=True)
 class Gathered:
-    """What the end of a run tells.
+    """Summary of a result.
 
-    outcomes: points by number of their outcome. certificates: the table. findings: lines that name the points that
-    failed or are less exact than was asked for. doubts: lines on what is hardly what was meant.
+    outcomes: number of points for each outcome.
+    certificates: the table of the largest errors.
+    findings: lines on points that failed or are less exact than requested.
+    doubts: lines on values that are probably not intended.
     """
 
     outcomes: Mapping[int, int]
@@ -59,9 +61,10 @@ class Gathered:
 
 @dataclass(frozen=True)
 class _Index:
-    """Where the record of each point is, in the order of the file: file (n_points,), row in it (n_points,).
+    """Places of the records of all points, in the order of the result file.
 
-    key (n_points,): what stands in that record. The file is -1 for points that are not computed.
+    file, row (n_points,): number of a file of the run, -1 for points that are not computed, and row in the file.
+    key (n_points,): hash of the record.
     """
 
     file: NDArray[np.int32]
@@ -71,7 +74,7 @@ class _Index:
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A record in a file: its place there, its hash, and the points that have it."""
+    """A record: row in the file, hash, and points that have this history."""
 
     row: int
     key: str
@@ -90,24 +93,24 @@ def gather(
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
-    Points that are not computed yet say so in their outcome.
+    Points that are not computed yet have the outcome `not_computed`.
 
     Parameters
     ----------
     study, facts
-        The study, and what is known of its scene.
+        The study, and facts of its scene.
     completion
-        The histories that there are.
+        The finished histories.
     path
-        The file, which is replaced by a whole one or stays as it was.
+        The result file, which is replaced as a whole or not at all.
     of_scene
-        What no task computes.
+        Variables of the scene, which no task computes.
     scene
-        What goes into the group of the scene, None for none.
+        Contents of the group of the scene; None for none.
     keep_finished
-        `path` holds a finished result, and is left as it is where points of this one are missing.
+        Whether `path` holds a finished result, which is kept where points of the new result are missing.
     origin
-        Attributes on where and when the result was made, which are no part of it.
+        Attributes on place and time of the computation.
 
     Raises
     ------
@@ -138,9 +141,9 @@ def gather(
 
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
-    """A new NetCDF file. Raises OSError with the reason that the system has.
+    """A new NetCDF file. Raises OSError with the reason of the system.
 
-    Whatever that is, the library says that there is no permission, or that there is an error of HDF.
+    The library itself reports missing permission or an error of HDF, whatever the reason.
     """
     try:
         with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
@@ -150,9 +153,9 @@ def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
 
 
 def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[_Index, Gathered]:
-    """Reads every file once, piece by piece: where each point is, how it ended, and the table.
+    """Reads every file once, piece by piece: places and outcomes of all points, and the table.
 
-    A record that is not the one that is asked for, as another run may have changed its file, leaves its points out.
+    Points are left out whose record has another hash, as another run may have changed the file.
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     n_points = math.prod(shape)
@@ -193,7 +196,7 @@ def _records_at_once(store: Store) -> int:
 
 
 def _read_entries(store: Store, number: int, entries: Sequence[_Entry]) -> tuple[Sequence[_Entry], NDArray[np.void]]:
-    """Those entries of a file that are there, and their records. Raises StorageError where the disk fails."""
+    """Entries that exist in a file, and their records. Raises StorageError where the disk fails."""
     try:
         kept = store.read(number)
         if len(kept) <= entries[-1].row or kept.dtype != store.kind:
@@ -239,7 +242,7 @@ def _write_slab(
     loops: Sequence[int],
     records: NDArray[np.void],
 ) -> None:
-    """Records of all points of a region; nothing of them stays in memory."""
+    """Writes the records of all points of a region."""
     lengths = [at.stop - at.start for at in region if isinstance(at, slice)]
     for name, entry in variables.items():
         values = records[name].reshape(*lengths, *records[name].shape[1:])
@@ -266,12 +269,12 @@ def _create(
 
 
 def _one_pair(name: str, dimension: str) -> bool:
-    """Whether a chunk holds a single pair: then those whose loops were not asked for take no room."""
+    """Whether a chunk holds a single pair: then pairs without loops take no room."""
     return name in LOOPS and dimension == "contact"
 
 
 def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
-    """Points along each axis that are written at once, and make a compressed chunk: as many as fit into a slab."""
+    """Points along each axis that are written at once and make a compressed chunk."""
     left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
     lengths = []
     for size in reversed(shape):
@@ -282,7 +285,7 @@ def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
 
 
 def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, int, int]]:
-    """Regions of the axes, and the first point of each and the one after the last, in the order of the file."""
+    """Regions of the axes; the first point of each and the point after the last, in the order of the file."""
     first = 0
     starts = (range(0, size, length) for size, length in zip(shape, slab, strict=True))
     for corner in itertools.product(*starts):
@@ -295,7 +298,7 @@ def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, 
 
 
 def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np.void]:
-    """Records of points that follow each other in the file."""
+    """Records of consecutive points of the file."""
     files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
     missing = empty_record(store.kind)
     missing["outcome"] = Outcome.NOT_COMPUTED
@@ -343,7 +346,7 @@ def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -
 def _write_whole(
     file: netCDF4.Dataset, name: str, dimensions: tuple[str, ...], values: NDArray[np.generic], entry: Variable
 ) -> None:
-    """A coordinate or another small array."""
+    """Writes a coordinate or another small array."""
     texts = values.dtype.kind == "U"
     kind: Any = str if texts else values.dtype
     variable = file.createVariable(name, kind, dimensions)

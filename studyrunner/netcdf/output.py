@@ -1,4 +1,4 @@
-"""The files that a run writes: where they go and what stands in their way, found before anything is computed."""
+"""Paths of the files that a run writes; obstacles are found before anything is computed."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _STREAMS = (0, 1, 2)
 
 
 def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
-    """The file that `path` stands for, links followed, after a try whether it can be written; nothing is changed.
+    """The file at `path`, links followed, after a test that it can be written; nothing is changed.
 
     Parameters
     ----------
     option
-        The one on the command line that gave the path.
+        The option of the command line that gave the path.
     path
-        As the user gave it.
+        Input of the user.
     inputs
         Files that the run reads and must not replace.
 
     Raises
     ------
     UserError
-        Where it cannot be written, or is one of the inputs.
+        Where the file cannot be written, or is one of the inputs.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -53,9 +53,8 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
 
 
 def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
-    """What would have to be another way for a file to be written to `target`, which `path` stands for; "" for nothing.
-
-    Raises OSError.
+    """What keeps a file from being written to `target`, the file at `path`, as a remedy; "" for nothing. Raises
+    OSError.
     """
     if target.is_dir():
         return "give the name of a file: this is a folder"
@@ -77,7 +76,7 @@ def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> 
 
 
 def _is_stream(target: Path) -> bool:
-    """Whether stdin, stdout or stderr of this process are this file."""
+    """Whether this file is stdin, stdout or stderr of this process."""
     for number in _STREAMS:
         with contextlib.suppress(OSError):
             if os.path.samestat(target.stat(), os.fstat(number)):
@@ -86,7 +85,7 @@ def _is_stream(target: Path) -> bool:
 
 
 def try_to_create(path: Path) -> None:
-    """Makes a new file beside `path`, with something in it, and removes it. Raises OSError."""
+    """Creates a file beside `path`, writes to it and removes it. Raises OSError."""
     trial = new_partial(path)
     with create(trial) as file:
         try:
@@ -97,12 +96,12 @@ def try_to_create(path: Path) -> None:
 
 
 def remove_leftovers(path: Path, *, alone: bool) -> None:
-    """Removes what runs that were killed have left while they wrote `path`.
+    """Removes temporary files of `path` that killed runs have left.
 
     Parameters
     ----------
     alone
-        Whether no other run is at work on it; else only what is old.
+        Whether no other run writes this file; else only old files are removed.
     """
     for found in leftovers(path):
         # the file may have gone meanwhile, and one that stays is no harm
@@ -112,5 +111,5 @@ def remove_leftovers(path: Path, *, alone: bool) -> None:
 
 
 def parts_folder(path: Path) -> Path:
-    """The folder of results that are to go into the file `path`."""
+    """Folder of the finished results of the result file `path`."""
     return path.with_name(f"{path.name}.parts")

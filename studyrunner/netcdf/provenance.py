@@ -1,4 +1,4 @@
-"""Where a result comes from: attributes of the file, and whether a result that it holds would be computed again."""
+"""Origin of a result: attributes of the file, and a comparison of a result with the present scene and solver."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
 
 POINTS_LEFT = "points_not_computed"
-"""Attribute of a result file: how many of its points a run that was ended has left, 0 where it is finished."""
+"""Attribute of a result file: number of points that are not computed, 0 in a finished result."""
 
 _REFERENCE = (
     "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
@@ -35,11 +35,10 @@ _COMMENT = (
 
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
-    """Attributes of the file. None of them depends on when, where or on how many ranks the study ran.
+    """Attributes of the file. They do not depend on time, place or number of ranks.
 
-    So there is no date_created unless it is asked for: equal runs have equal files, but for the run times that they
-    measure. For the same reason the id is a hash of what the result depends on: it names the result, whoever computes
-    it.
+    Therefore there is no date_created without request: equal runs have equal files except for the run times. The id is
+    a hash of all inputs of the result.
     """
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
@@ -64,7 +63,7 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
 
 
 def _summarise(study: Study, facts: SceneFacts) -> str:
-    """What ACDD calls an abstract: what was computed, for what and over which ranges."""
+    """Abstract in the sense of ACDD: quantities, scene and ranges of the study."""
     pairs = "one contact pair" if len(facts.area) == 1 else f"{len(facts.area)} contact pairs"
     ranges = [
         f"{name} {min(values):.6g} to {max(values):.6g} ({len(values)} values)"
@@ -81,15 +80,15 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
 
 
 def describe_versions() -> str:
-    """Python and the packages that have a part in the result."""
+    """Versions of Python and of the packages that compute the result."""
     packages = [f"{name} {metadata.version(name)}" for name in PACKAGES]
     return ", ".join([f"Python {platform.python_version()}", *packages])
 
 
 def compare_with_archived(study: Study, model: ReducedModel) -> tuple[str, ...]:
-    """Lines that say why a study that was read from a result file may have another result now; none of other studies.
+    """Reasons why a study from a result file may now have another result, as lines; none for other studies.
 
-    Only the scene that the file names is compared: with other parameters it is another study.
+    Only the scene of the file is compared: with other parameters the study is another one.
     """
     archived = study.archived
     if archived is None:

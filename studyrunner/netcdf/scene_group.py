@@ -1,4 +1,4 @@
-"""The group of a result file that holds what a scene file holds, under the same names."""
+"""The group of a result file with the contents of a scene file, under the same names."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import netCDF4
 import numpy as np
 
 from studyrunner.scene.scene import KeptScene
-from studyrunner.study.archive import SCENE_GROUP
+from studyrunner.study.study_of_result import SCENE_GROUP
 
 _COMPLEX = np.dtype([("r", "f8"), ("i", "f8")])
 _SAID = {
@@ -36,7 +36,7 @@ _SAID = {
 
 
 def write_scene_group(file: netCDF4.Dataset, scene: KeptScene) -> None:
-    """Writes the group. It reads like a scene file; complex numbers are compounds {r, i}."""
+    """Writes the group, which reads like a scene file; complex numbers are compounds {r, i}."""
     root = file.createGroup(SCENE_GROUP)
     root.setncattr("comment", "The reduced model that the study was computed with, in the layout of scene files.")
     root.setncatts({name: np.int64(value) for name, value in scene.attributes.items()})
@@ -58,7 +58,7 @@ def write_scene_group(file: netCDF4.Dataset, scene: KeptScene) -> None:
 
 
 def _dimension(root: netCDF4.Group, length: int) -> str:
-    """Name of the dimension of a length: those of a scene file have none."""
+    """Name of the dimension of a length; a scene file has no names."""
     name = f"length_{length}"
     if name not in root.dimensions:
         root.createDimension(name, length)

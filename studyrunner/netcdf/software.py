@@ -1,6 +1,6 @@
-"""Which software made a result: where it is published and its commit, where that is known.
+"""Software of a result: address of publication and commit, where they are known.
 
-Nothing of this is needed for a result: whatever is missing, damaged or slow is left out.
+A result does not need these attributes: what is missing, damaged or slow is left out.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from importlib import metadata
 from pathlib import Path
 
 CHANGED = " with local changes"
-"""Ends the text of a commit some of whose files were changed since."""
+"""End of the text of a commit with changed files."""
 
 _PUBLISHED_AS = ("repository", "source", "source code", "homepage", "documentation")
 _SECONDS_FOR_GIT = 5.0
 
 
 def describe_software(name: str) -> dict[str, str]:
-    """Attributes of a result, `software_url` and `software_commit`; each only where it is known.
+    """Attributes `software_url` and `software_commit` of a result; each only where known.
 
     Parameters
     ----------
     name
-        Of the distribution.
+        Name of the distribution.
     """
     origin = _installed_from(metadata.distribution(name).read_text("direct_url.json"))
     url = published_at(metadata.metadata(name).get_all("Project-URL") or [])
@@ -36,15 +36,15 @@ def describe_software(name: str) -> dict[str, str]:
 
 
 def published_at(urls: list[str]) -> str:
-    """The URL under which the source is found, of the labelled ones of a package; empty where there is none."""
+    """URL of the source in the metadata of a package; empty where there is none."""
     labelled = {label.strip().lower(): url.strip() for label, _, url in (line.partition(",") for line in urls)}
     return next((labelled[label] for label in _PUBLISHED_AS if labelled.get(label)), "")
 
 
 def commit_of(folder: Path) -> str:
-    """Commit that is checked out in a folder, with `CHANGED` where files of it were changed; empty where it is unknown.
+    """Commit that is checked out in a folder, with `CHANGED` where files were changed; empty where unknown.
 
-    A folder inside a checkout, as an environment may be, is none.
+    The commit of a folder inside a checkout, such as an environment, is unknown.
     """
     if not (folder / ".git").exists():
         return ""
@@ -68,7 +68,7 @@ def commit_of(folder: Path) -> str:
 
 
 def _installed_from(text: str | None) -> Mapping[str, str]:
-    """Commit and, where everybody can follow it, URL of a package that was installed from a repository (PEP 610)."""
+    """Commit, and public URL, of a package that was installed from a repository (PEP 610)."""
     try:
         found = json.loads(text or "{}")
         info, url = found.get("vcs_info"), found.get("url")

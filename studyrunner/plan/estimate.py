@@ -1,7 +1,7 @@
-"""Rough figures of the work in a task: for the order of the tasks, the time left and `--plan`.
+"""Estimated work of a task, for the order of the tasks, the time left and `--plan`.
 
-They fit the bundled studies on one core within a factor of two. A joint that jumps takes longer, and one in which
-nothing slips takes no step at all.
+The estimates fit the bundled studies on one core within a factor of two. A joint that jumps takes longer. A joint in
+which nothing slips takes no step.
 """
 
 from __future__ import annotations
@@ -10,40 +10,40 @@ import math
 from pathlib import Path
 
 ITERATIONS_AT_FIRST = 1400
-"""For the walk to the first state of a sweep (the dovetail to the foot of its resonance 660, to its top 1500; the root
-of the deck `blade_root` to its top 1990; two masses and a slider 180)."""
+"""Newton iterations to the first state of a sweep (the dovetail to the foot of its resonance 660, to its top 1500; the
+root of the deck `blade_root` to its top 1990; two masses and a slider 180)."""
 
 ITERATIONS_OF_RAMP = 400
-"""For the way to the only state of a ramp (30 and 52 pairs: 404 and 417)."""
+"""Newton iterations to the only state of a ramp (30 and 52 pairs: 404 and 417)."""
 
 ITERATIONS_A_STATE = 50
-"""For each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the dovetail 65, 11 of a
-mass that hits a wall 130 to 260; 3 where nothing slips)."""
+"""Newton iterations for each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the
+dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
 
 ITERATIONS_A_STEP = 3
-"""For one step on the slow time scale, explicit or implicit (measured: 2 to 4 where the joint slips)."""
+"""Newton iterations of one step in slow time, explicit or implicit (measured: 2 to 4 where the joint slips)."""
 
 ADAPTIVE_STEPS = 40
-"""Of a march by the adaptive scheme, whatever `step` says."""
+"""Steps of a history with the adaptive scheme."""
 
 STEPS_TO_THE_END = 100
-"""Of a march with growing steps, until nothing wears any more (20 pairs: 50 to 110)."""
+"""Steps of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
 
 ITERATIONS_TO_A_FINAL_STATE = 50
-"""Of the scheme "final" where it needs no march (4 to 35 pairs: 15 to 60)."""
+"""Newton iterations of the scheme "final" without integration (4 to 35 pairs: 15 to 60)."""
 
 ITERATIONS_AN_ADAPTIVE_STEP = 20
-"""For one of them, steps that are refused, estimates of errors (with more harmonics) and the coarser history included,
-beside the resonance (48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away from it."""
+"""Newton iterations of one adaptive step near the resonance (48 pairs: 10 to 25, 160 pairs: 20, 336 pairs: 24); 3 away
+from the resonance. Refused steps, error estimates and the coarser history are included."""
 
 AUTOMATIC_HARMONICS = 5
-"""That a state takes on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
+"""Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
 
 COMPILE_SECONDS = 9
-"""For the kernels of the solver, once on a machine."""
+"""Time for compiling the functions of the solver, s, once on a machine."""
 
 AUTOMATIC_HARMONICS_AT_MOST = 9
-"""That the memory is to hold, beside those that they are compared with."""
+"""Largest automatic number of harmonics for which the memory is estimated."""
 
 _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
@@ -75,12 +75,13 @@ def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:
-    """Memory of one rank, bytes: the libraries, what is as large as dense matrices, and the arrays of the result.
+    """Memory of one rank, bytes: the libraries, the dense matrices, and the arrays of the result.
 
     Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
 
-    n_unknowns: of the largest state. automatic: whether that is one of `AUTOMATIC_HARMONICS`. built_with: bytes that
-    building the scene takes beside the libraries, which every rank does.
+    n_unknowns: number of unknowns of the largest state. result_values: numbers in the result. automatic: whether the
+    largest state has `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries,
+    bytes.
     """
     grown = (2.0 * AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
     solved = _BASE_MEMORY + _MATRICES_A_RANK * 8.0 * (grown * n_unknowns) ** 2
@@ -89,9 +90,9 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
 
 
 def largest_memory() -> float:
-    """Memory that this process has had at most, bytes; 0 where the system does not say.
+    """Largest memory of this process so far, bytes; 0 where the system does not tell.
 
-    That of `getrusage` would be the largest one of the process that has started this one, too.
+    `getrusage` is not used: its value includes the memory of the process that has started this one.
     """
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()

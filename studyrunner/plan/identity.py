@@ -1,7 +1,7 @@
-"""What a finished task is known by: a hash of all that its result depends on, the solver included.
+"""Hashes by which results are found again: hashes of all inputs of a result, the solver included.
 
-A study that is changed keeps the results whose hash is still asked for. A start state depends on its own frequency and
-on how it is reached, not on the other frequencies of the study: a sweep has steps of its own; a march depends on its
+A changed study uses the results with unchanged hashes. A start state depends on its own frequency and on its sweep, not
+on the other frequencies of the study, as the steps of a sweep follow from the joint. A wear history depends on its
 start state.
 """
 
@@ -27,8 +27,9 @@ _COMPUTING = ("fretwear", "numba", "numpy", "scipy")
 class Identities:
     """Hashes of the tasks of a study on one scene.
 
-    scene_digest: of the model, see SceneFacts. kind: describes the record of a result, so that results with other
-    variables or numbers of outputs are not taken for these.
+    scene_digest: hash of the model, see SceneFacts.
+    kind: description of the record of a result. Results with other variables or other numbers of outputs have other
+        hashes.
     """
 
     def __init__(self, study: Study, scene_digest: str, kind: str) -> None:
@@ -39,9 +40,9 @@ class Identities:
         self._kept: dict[tuple[object, ...], str] = {}
 
     def of_starts(self, branch: BranchTask) -> tuple[str, ...]:
-        """Of the start states at all frequencies of a branch, (n_frequencies,)."""
+        """Hashes of the start states at all frequencies of a branch, (n_frequencies,)."""
         if branch.number not in self._lines:
-            # a time limit decides whether there is a result, not which
+            # A time limit decides whether there is a result, not the values of the result.
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
             line = (branch.excitation_amplitude, branch.sweep, settings)
             key = _digest("line", self._scene, line)
@@ -49,7 +50,7 @@ class Identities:
         return self._lines[branch.number]
 
     def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:
-        """Of the histories of a march, one after the other."""
+        """Hashes of the histories of a task."""
         start = self.of_starts(branch)[march.position]
         own = (*self._wear(march, march.histories[0]), march.scheme if not march.held else "", march.held)
         ends = [None if each is None else astuple(each) for each in (march.until, march.to_the_end)]
@@ -62,16 +63,16 @@ class Identities:
 
     @staticmethod
     def of_march(histories: tuple[str, ...]) -> str:
-        """Of the progress of a march with these histories, which depends on all counts that are read from it."""
+        """Hash of the progress of a task with these histories. The progress depends on the counts of all histories."""
         return _digest("march", histories)
 
     def of_branch(self, branch: BranchTask) -> str:
-        """Of the progress of a branch."""
+        """Hash of the progress of a branch."""
         return _digest("branch", self.of_starts(branch))
 
     @staticmethod
     def _wear(march: MarchTask, scaled: ScaledHistory) -> tuple[float, float | None]:
-        """Wear coefficient and, where it matters, step."""
+        """Wear coefficient, and step where the step matters."""
         of_its_own = march.held or march.scheme in ("adaptive", "final")
         of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
         return scaled.wear_coefficient, None if of_its_own else scaled.step
@@ -79,7 +80,7 @@ class Identities:
 
 @cache
 def solver_digest() -> str:
-    """Of the solver: its source and the packages that it computes with. Numbers of another one may differ."""
+    """Hash of the source of the solver and of the versions of the packages that it uses."""
     specification = find_spec("solver")
     if specification is None or not specification.submodule_search_locations:
         raise ModuleNotFoundError("the package solver is not installed")
@@ -88,7 +89,7 @@ def solver_digest() -> str:
 
 
 def source_hashes(folder: Path) -> list[tuple[str, str]]:
-    """Place and hash of all source files of a package, those in its rooms included."""
+    """Path and hash of all source files of a package."""
     return [
         (path.relative_to(folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest())
         for path in sorted(folder.rglob("*.py"))
@@ -96,11 +97,11 @@ def source_hashes(folder: Path) -> list[tuple[str, str]]:
 
 
 def _digest(*values: object) -> str:
-    """Numbers are written so that they come back to the last bit."""
+    """Hash of values; numbers enter with all bits."""
     text = json.dumps(values, allow_nan=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def hash_of_kind(fields: Sequence[object]) -> str:
-    """Of the description of a record."""
+    """Hash of the description of a record."""
     return hashlib.sha256(repr(fields).encode()).hexdigest()[:32]

@@ -1,4 +1,4 @@
-"""What a task hands back: plain arrays, ready to be sent between ranks and put into the result."""
+"""Results of tasks: plain arrays that can be sent between ranks and written to the result file."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from studyrunner.plan.tasks import BranchTask, MarchTask
 
 @dataclass(frozen=True)
 class StartResult:
-    """Start state at one frequency of a branch; a branch gives one after the other.
+    """Start state at one frequency of a branch.
 
-    position: place of the frequency in the branch. start: what a march starts from. moves: whether anything slips or
-    lifts in the joint; where nothing does nothing wears. n_unknowns: of the state, with the harmonics that it took; 0
-    where there is no state. lost: the fault of the machine that it broke off with: then this is no result.
+    position: index of the frequency in the branch.
+    start: state from which a wear history starts.
+    moves: whether any pair slips or lifts; otherwise nothing wears.
+    n_unknowns: number of unknowns of the state; 0 where there is no state.
+    lost: fault of the machine that ended the computation; then this is no result. Empty without a fault.
     """
 
     position: int
@@ -33,24 +35,26 @@ class StartResult:
         return self.n_unknowns == 0
 
     def pack(self) -> Packed:
-        """All but the position, for a file."""
+        """Everything except the position, for a file."""
         return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
 
 def unpack_start(position: int, packed: Packed) -> StartResult:
-    """What `StartResult.pack` gave."""
+    """The start state from the output of `StartResult.pack`."""
     moves, n_unknowns, text = json.loads(packed.text)
     return StartResult(position, Packed(text, packed.arrays), moves, n_unknowns)
 
 
 @dataclass(frozen=True)
 class MarchResult:
-    """One history of a task, and the points that have it.
+    """One history of a task, and the points that have this history.
 
-    values: variables of the result by name: those of `studyrunner.variables.KEPT`, which have no further dimensions,
-        and arrays with the dimensions of the variable after the axes; after `last_cycle` these are NaN, or 0 where the
-        variable is a whole number. What is not there is not known: NaN, 0 or an empty text in the file.
-    place: its own among the histories of the task. progress: how far a march was that was given up for its time.
+    points: indices along the dimensions of the study.
+    values: variables of the result by name. Variables of `studyrunner.variables.KEPT` are single values, others are
+        arrays with the dimensions of the variable after the axes. Values after `last_cycle` are NaN, or 0 in whole
+        numbers. Missing variables are NaN, 0 or an empty text in the file.
+    place: index of the history in the task.
+    progress: progress of a history that was ended by its time limit.
     """
 
     points: tuple[Index, ...]
@@ -60,22 +64,22 @@ class MarchResult:
 
     @property
     def outcome(self) -> int:
-        """How the computation ended, a number of the result file."""
+        """Outcome of the computation, as a number of the result file."""
         return int(self.values["outcome"])
 
     @property
     def message(self) -> str:
-        """What the outcome does not say by itself."""
+        """Further facts on the outcome."""
         return str(self.values.get("message", ""))
 
 
 Keep = Callable[[Packed | str], None]
-"""Takes note of how far a task is."""
+"""Takes the progress of a task: data to continue from, or words."""
 
 Evaluate = Callable[[BranchTask | MarchTask, Keep], Iterator[StartResult | MarchResult]]
-"""Does a task: gives its results one by one, and hands over now and then how far it is."""
+"""Does a task: gives the results one by one and hands over the progress from time to time."""
 
 
 def failed_result(task: MarchTask, place: int, outcome: int, message: str) -> MarchResult:
-    """Result of a history that nobody computed to its end. place: its own among the histories of the task."""
+    """Result of a history that failed. place: index of the history in the task."""
     return MarchResult(task.histories[place].points, {"outcome": outcome, "message": message}, place)

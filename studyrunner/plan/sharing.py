@@ -1,9 +1,9 @@
-"""Which choices of wear coefficient, step and scheme have the same wear history, so that it is computed once, and why.
+"""Which choices of wear coefficient, step and scheme share one wear history, and why.
 
-Where the rate of the wear law is proportional to its coefficient (`WearLaw.proportional`), as those of all laws are
-that there are, the wear equation is dW/dt = k_w f(W), Eq. (7): with s k_w and the step h / s the same states follow
-each other, each at the count t / s. A march computes the history of the largest k_w; the others are read from it at the
-counts s t. With any other law histories of different k_w have nothing in common.
+The rates of all present wear laws are proportional to the wear coefficient (`WearLaw.proportional`). The wear equation
+is then dW/dt = k_w f(W), Eq. (7). With s k_w in place of k_w and h / s in place of the step h the same states follow
+each other, each at the cycle count t / s. A task computes the history of the largest k_w; the other histories are read
+from this one at the counts s t. With a law that is not proportional no two k_w share a history.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from studyrunner.study.study import AUTO, Study
 
 Index = tuple[int, ...]
 Choice = tuple[int, int, int]
-"""Places on the axes wear_coefficient, step and scheme."""
+"""Indices on the axes wear_coefficient, step and scheme."""
 
 _SAME = 1e-12  # relative: products of wear coefficient and step that differ by round-off, and numbers of steps
 
@@ -38,10 +38,11 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class ScaledHistory:
-    """A history that a march gives, its slow time scaled, and the points that have it at the same cycle counts.
+    """A history that is read from a computed history with scaled slow time, and the points that have this history.
 
-    wear_coefficient: 1/Pa; its ratio to that of the march scales the slow time. step: cycles; that of the first point
-    where the step does not matter. points: indices along the dimensions of the study.
+    wear_coefficient: 1/Pa. The ratio to the wear coefficient of the computed history scales the slow time.
+    step: cycles; the step of the first point where the step does not matter.
+    points: indices along the dimensions of the study.
     """
 
     wear_coefficient: float
@@ -51,10 +52,11 @@ class ScaledHistory:
 
 @dataclass(frozen=True)
 class Alike:
-    """Choices whose histories one march computes.
+    """Choices whose histories one task computes.
 
-    histories: for each of them the choices that have it; first those of the march itself, which goes farthest.
-    held: nothing wears, so the state at cycle 0 holds for all cycles.
+    histories: for each history the choices that have this history. The first history is the computed one; it needs the
+        most cycles.
+    held: whether nothing wears, so that the state at cycle 0 holds for all cycles.
     """
 
     histories: tuple[tuple[Choice, ...], ...]
@@ -63,7 +65,7 @@ class Alike:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Points that are not computed on their own, and why."""
+    """Number of points that are not computed alone, and the reason."""
 
     n_points: int
     reason: str
@@ -71,13 +73,17 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Sharing:
-    """What is computed from each start state of a study: every choice is in one history of one march."""
+    """What is computed from each start state of a study.
+
+    marches: groups of choices; every choice is in one history of one group. causes: number of choices by reason for
+    sharing.
+    """
 
     marches: tuple[Alike, ...]
     causes: Counter[str]
 
     def left_out(self, n_starts: int, n_points: int) -> tuple[LeftOut, ...]:
-        """Points of a study with so many start states that are not computed on their own, by reason."""
+        """Numbers of points that are not computed alone, by reason, of a study with so many start states and points."""
         n_choices = len(self.marches) + self.causes.total()
         counts = Counter({cause: n_starts * n for cause, n in self.causes.items()})
         counts["rtol"] = n_points - n_starts * n_choices
@@ -85,7 +91,7 @@ class Sharing:
 
 
 def share_histories(study: Study) -> Sharing:
-    """The histories that are computed once, for a reason that the study itself shows; all with `shortcuts = false`."""
+    """The histories of a study that have to be computed; with `shortcuts = false` no history is shared."""
     axes, slow_time, proportional = study.axes, study.slow_time, study.wear_law.proportional
     choices = itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme)))
     if not study.solver.shortcuts:
@@ -133,7 +139,7 @@ def share_histories(study: Study) -> Sharing:
 
 
 def rtol_is_idle(study: Study, harmonics: int | Automatic, samples: int | Automatic) -> bool:
-    """Whether `rtol` changes nothing with such harmonics and samples, so that its values share branch and histories."""
+    """Whether `rtol` has no effect with these harmonics and samples, so that its values share their histories."""
     return (
         study.solver.shortcuts
         and AUTO not in (harmonics, samples)
@@ -142,10 +148,10 @@ def rtol_is_idle(study: Study, harmonics: int | Automatic, samples: int | Automa
 
 
 def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Choice, ...]]:
-    """Choices of one scheme with steps of given length, those with the same history together, the farthest first.
+    """Groups of choices with the same history, for one scheme with steps of given length; longest history first.
 
-    The last step of a march is shortened to end with it. A history that ends earlier than another one, with a shortened
-    step, is not a part of it.
+    The last step of a history is shortened to end at the last cycle count. A history whose shortened last step is no
+    whole step of the longer history is not part of the longer history.
     """
     wears, steps = study.axes.wear_coefficient, study.axes.step
 
@@ -160,7 +166,7 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
             groups.append([choice])
     for group in groups:
         farthest, *others = sorted(group, key=lambda choice: -wears[choice[0]])
-        # a march to the end has no last step that is shortened
+        # integration to the steady state has no shortened last step
         whole = [
             choice
             for choice in others
@@ -173,9 +179,10 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
 def march_counts(
     cycles: Sequence[float], scaled: ScaledHistory, march: ScaledHistory, steps_of_given_length: bool
 ) -> tuple[float, ...]:
-    """Cycle counts of a march at which its states are those of a scaled history at `cycles`, ascending.
+    """Cycle counts, ascending, at which a scaled history at `cycles` is read from the computed history.
 
-    A count at the end of a step lies a hair before it, so that it belongs to that step whatever the round-off.
+    A count at the end of a step is moved slightly before the end, so that round-off does not move the count to the next
+    step.
     """
     if scaled == march:
         return tuple(cycles)
@@ -191,6 +198,6 @@ def march_counts(
 
 
 def _whole_number(value: float) -> int | None:
-    """The whole number, 1 or more, that a value is but for round-off; None where it is not."""
+    """The whole number, at least 1, that a value equals up to round-off; None where there is none."""
     near = round(value)
     return near if near >= 1 and abs(value - near) <= _SAME * near else None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings, ToTheEnd, WearTarget
-from studyrunner.plan.costs import Kin
+from studyrunner.plan.cost_model import CostKeys
 from studyrunner.plan.estimate import (
     AUTOMATIC_HARMONICS,
     ITERATIONS_A_STATE,
@@ -33,7 +33,7 @@ from studyrunner.study.study import AUTO, SOLVER_AXES, Study
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
-"""First keys of the kin of tasks, see LearnedCosts."""
+"""Most general keys of tasks in the cost model."""
 
 _NEIGHBOURS = 4  # frequencies whose marches take about as long
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
@@ -41,12 +41,18 @@ _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the r
 
 @dataclass(frozen=True)
 class BranchTask:
-    """One branch along frequencies (Hz, ascending), at one excitation amplitude (N); a result at each of them.
+    """Start states along one branch; a result at each frequency.
 
-    A sweep "up" or "down" passes all frequencies of a line. A "ramp" raises the excitation at a single one, so that it
-    is a task of its own. number: of the branch in the study. cost: estimated seconds. known: places of the frequencies
-    whose results are not asked for: an earlier run has left them, or all that starts from them. resume: how far that
-    run was; None to begin with the first one. key: what the branch is known by in the folder of the run.
+    A sweep "up" or "down" passes all frequencies of a line. A "ramp" has a single frequency.
+
+    number: number of the branch in the study.
+    excitation_amplitude: N.
+    frequencies: Hz, ascending.
+    cost: estimated time, s.
+    known: indices of the frequencies whose results are not needed, as an earlier run has left them or all histories
+        that start from them.
+    resume: progress of an earlier run; None to begin with the first frequency.
+    key: hash of the branch in the folder of the run.
     """
 
     number: int
@@ -61,55 +67,59 @@ class BranchTask:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """Places of the frequencies in the order of the sweep."""
+        """Indices of the frequencies in the order of the sweep."""
         places = range(len(self.frequencies))
         return tuple(reversed(places) if self.sweep == "down" else places)
 
     @property
     def order_left(self) -> tuple[int, ...]:
-        """Those whose results are asked for."""
+        """Indices of the frequencies whose results are needed."""
         return tuple(place for place in self.order if place not in self.known)
 
     @property
     def n_results(self) -> int:
-        """Start states that it gives."""
+        """Number of start states that the task gives."""
         return len(self.frequencies) - len(self.known)
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated seconds of the first state, with all of the way to it, or of one of the others."""
+        """Estimated time, s, of the first state with the sweep to it, or of one of the other states."""
         share = iterations_of_branch(self.sweep, 1) if first else ITERATIONS_A_STATE
         return self.cost * share / iterations_of_branch(self.sweep, self.n_results)
 
     @property
     def opens_others(self) -> bool:
-        """Marches."""
+        """Wear histories start from the states of a branch."""
         return True
 
     @property
     def kind(self) -> str:
-        """First key of its kin."""
+        """Most general key in the cost model."""
         return BRANCHES
 
     @property
-    def kin(self) -> Kin:
-        """What its states cost, in general and on this branch."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks: all branches, this branch."""
         return ((self.kind, (self.kind, self.number)),)
 
 
 @dataclass(frozen=True)
 class MarchTask:
-    """One wear history from a start state on a branch, and those of other points that are read from it.
+    """One wear history from a start state on a branch, and the histories of other points that are read from this one.
 
-    branch, position: number of the branch and place of the frequency in it. histories: the one that goes
-    farthest first, whose wear coefficient and step the march has; a result each. held: nothing wears, so the state at
-    cycle 0 holds for all cycles; step and scheme are then those of the first point.
-    cycles: output counts of every history. until: wear at which it ends before the last of them. to_the_end: where
-        given, cycles are numbers of the outputs, whose counts the march finds.
-    variables: what is handed back. loops: pairs whose fretting loops are in it.
-    cost: estimated seconds. n_unknowns, moves: of the start state, see StartResult. Until it is there, n_unknowns are
-        those planned for and something moves.
-    start: start state, None until its branch has reached it. resume: how far an earlier run was; None to begin with it.
-    number: of the march in the study. key: what it is known by in the folder of the run.
+    number: number of the task in the study.
+    branch, position: number of the branch, and index of the frequency in the branch.
+    histories: one result each. The first history is integrated; it needs the most cycles.
+    held: whether nothing wears, so that the state at cycle 0 holds for all cycles. Step and scheme are then those of
+        the first point.
+    cycles: cycle counts of the output of every history.
+    until: wear at which the history ends before the last count.
+    to_the_end: integration until nothing wears any more. Then `cycles` numbers the outputs.
+    variables: names of the variables in a result. loops: pairs whose fretting loops are among them.
+    cost: estimated time, s.
+    n_unknowns, moves: of the start state, see StartResult; planned values until the start state is there.
+    start: start state; None until the branch has reached it.
+    resume: progress of an earlier run; None to begin with the start state.
+    key: hash of the task in the folder of the run.
     """
 
     number: int
@@ -134,48 +144,48 @@ class MarchTask:
 
     @property
     def wear_coefficient(self) -> float:
-        """Of the march itself, 1/Pa."""
+        """Wear coefficient of the integrated history, 1/Pa."""
         return self.histories[0].wear_coefficient
 
     @property
     def step(self) -> float:
-        """Of the march itself, cycles."""
+        """Step of the integrated history, cycles."""
         return self.histories[0].step
 
     @property
     def points(self) -> tuple[Index, ...]:
-        """All points that it gives a history for."""
+        """All points that get a history from the task."""
         return tuple(itertools.chain.from_iterable(scaled.points for scaled in self.histories))
 
     @property
     def n_results(self) -> int:
-        """Histories that it gives."""
+        """Number of histories that the task gives."""
         return len(self.histories)
 
     def counts(self, scaled: ScaledHistory) -> tuple[float, ...]:
-        """Cycle counts of the march that a history is read at, one for each of `cycles`."""
+        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
         if self.held:
             return (0.0,) * len(self.cycles)
         return march_counts(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated seconds of a history; all come with the first one, and are not told apart."""
+        """Estimated time of a history, s; all histories of a task arrive with the first one."""
         del first
         return self.cost / self.n_results
 
     @property
     def opens_others(self) -> bool:
-        """Nothing."""
+        """No task starts from a wear history."""
         return False
 
     @property
     def kind(self) -> str:
-        """First key of its kin."""
+        """Most general key in the cost model."""
         return MARCHES if self.moves else RESTING
 
     @property
-    def kin(self) -> Kin:
-        """Marches from states that move or rest, with as many unknowns, near this state and from it; with such wear."""
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks: by motion, unknowns and start state, and by wear coefficient, step and scheme."""
         kind = self.kind
         near, here = (kind, self.branch, "near", self.position // _NEIGHBOURS), (kind, self.branch, self.position)
         wear = (kind, self.wear_coefficient, self.step, self.scheme)
@@ -186,8 +196,11 @@ class MarchTask:
 class TaskPlan:
     """All tasks of a study.
 
-    marches: for each branch, the tasks that start from it, by frequency. n_unknowns: in the largest task; an estimate
-    where the number of harmonics is automatic.
+    branches: tasks of the start states.
+    marches: for each branch the tasks of the wear histories, by frequency.
+    left_out: points that share a history, by reason.
+    n_points: number of points of the study.
+    n_unknowns: number of unknowns of the largest task; an estimate where the number of harmonics is automatic.
     """
 
     branches: tuple[BranchTask, ...]
@@ -198,12 +211,12 @@ class TaskPlan:
 
     @property
     def cost(self) -> float:
-        """Estimated seconds on one rank, where every point wears."""
+        """Estimated time on one rank, s, where every point wears."""
         marches = itertools.chain.from_iterable(self.marches)
         return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
-        """The marches from one start state."""
+        """Tasks of the wear histories from one start state."""
         line = self.marches[branch]
         first, last = (side(line, position, key=lambda march: march.position) for side in (bisect_left, bisect_right))
         return line[first:last]

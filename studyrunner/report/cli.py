@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import studyrunner.system.search_path  # noqa: F401 - where all others are looked for
+import studyrunner.system.own_modules_only  # noqa: F401 - where all others are looked for
 
 # isort: split
 import argparse
@@ -142,10 +142,10 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
-        from studyrunner.report.gallery import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.reading.door import check_numbers, reading_errors
+        from studyrunner.report.page_contents import draw_report
         from studyrunner.report.reading.result import open_for_report
+        from studyrunner.report.reading.schema_check import check_numbers, reading_errors
         from studyrunner.report.root.vtu import find_writer
         from studyrunner.system.progress import count, format_seconds
 

@@ -1,4 +1,4 @@
-"""The scene of a study: builds or reads the reduced model, and tells what the runner has to know of it."""
+"""The scene of a study: builds or reads the reduced model and describes the scene for the runner."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What the plan and the result file say of a scene with n_contact pairs.
+    """Facts of a scene with n_contact pairs, for the plan and the result file.
 
-    n_displacements: relative displacements of all pairs, the unknowns of one harmonic coefficient.
-    position (n_contact, 3), m; area (n_contact,), m2; surface: label of each pair; response_names: n_response texts.
-    digest: SHA-256 over all arrays and names of the reduced model, hexadecimal.
-    largest_harmonics: most harmonics that the scene can be solved with, None where any number can.
-    static_response: to the harmonic load, None where it is not known or not asked for.
-    edge (n_contact,): whether the pair is at the edge of the contact (`edge_pairs`); False where that is not known.
+    n_displacements: number of relative displacements, the unknowns of one harmonic coefficient.
+    position (n_contact, 3): m. area (n_contact,): m2. surface: label of each pair. response_names: n_response texts.
+    digest: SHA-256 of all arrays and names of the reduced model, hexadecimal.
+    largest_harmonics: largest number of harmonics for this scene; None without limit.
+    static_response: response to the harmonic load at rest; None where unknown or not requested.
+    edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
     """
 
     n_displacements: int
@@ -53,18 +53,17 @@ def _silent(_: str) -> None:
 
 
 def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -> ReducedModel:
-    """Reduced model of the study's scene, for the largest number of harmonics that the study gives and those beyond
-    that tell the error.
+    """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
-    progress: takes a line on what is done next, where that may take long.
+    progress: takes a line on the next step, where a step may take long.
 
-    Where the number is automatic, a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE and a scene file
-    may hold as few nodal diameters as one harmonic needs: `largest_harmonics` then says how far it goes.
+    With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE. A scene file may have
+    as few nodal diameters as one harmonic needs; `largest_harmonics` then gives the limit.
 
     Raises
     ------
     UserError
-        Where the parameters or the scene file are wrong, or the study asks for what the scene lacks.
+        Where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
     """
     model = _build(study, progress)
     check_outputs(study, model)
@@ -73,7 +72,7 @@ def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -
 
 
 def harmonics_to_build(study: Study) -> int:
-    """Harmonics whose nodal diameters a scene is built with: also those that show the error of a given number."""
+    """Number of harmonics that a scene is built for, those that show the error of a given number included."""
     # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
     shown = 2 * max(study.given_harmonics, default=0) + 3
     return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
@@ -94,7 +93,7 @@ def _build(study: Study, progress: Callable[[str], None]) -> ReducedModel:
 
 
 def _check_friction(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where study and scene file both say what the friction coefficient is, or neither does."""
+    """Raises UserError where both study and scene file give the friction coefficient, or neither."""
     key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
     if own is None and value is None:
         raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
@@ -104,7 +103,7 @@ def _check_friction(study: Study, model: ReducedModel) -> None:
 
 
 def _check_surfaces(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where the study gives factors of the wear to other surfaces than the scene has."""
+    """Raises UserError where the study gives wear factors of surfaces that the scene does not have."""
     if study.wear.surfaces is None:
         return
     try:
@@ -131,7 +130,10 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
 
 
 def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
-    """Writes the scene of a study as a scene file, whole or not at all. Raises UserError where the scene is wrong."""
+    """Writes the scene of a study as a scene file, as a whole or not at all.
+
+    Raises UserError where the scene is wrong.
+    """
     from studies.scene_file import write_scene
 
     model = build_study_scene(study, progress)
@@ -146,7 +148,7 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
 
 @dataclass(frozen=True)
 class KeptScene:
-    """What a result file keeps of a scene, as scene files have it: attributes, and datasets by name with groups.
+    """A scene in a result file: attributes, and datasets with groups, by the names of scene files.
 
     origin: attributes of the result on the files of a finite-element model.
     """
@@ -157,7 +159,7 @@ class KeptScene:
 
 
 def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
-    """The whole content of a scene file; of a bundled scene, which its parameters give again, only on request."""
+    """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
     if study.scene.is_bundled and not study.outputs.scene:
         return None
     from studies.scene_layout import scene_attributes, scene_datasets
@@ -168,7 +170,7 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
 
 
 def describe_origin(study: Study) -> dict[str, str]:
-    """Attributes on the files of a finite-element model; none of other scenes. Raises OSError, SceneError."""
+    """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
     scene = study.scene
     if scene.files is not None:
         from studies.fe_models.from_files.scene import describe_origin as describe_files
@@ -197,7 +199,7 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
 
 
 def largest_harmonics(model: ReducedModel) -> int | None:
-    """Most harmonics for which the model holds all nodal diameters; None where any number can be used."""
+    """Largest number of harmonics for which the model has all nodal diameters; None without limit."""
     # After n_sectors harmonics the nodal diameters come again.
     for harmonic in range(1, model.n_sectors):
         try:
@@ -217,7 +219,7 @@ def _digest(model: ReducedModel) -> str:
 
 
 def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
-    """Everything that a reduced model holds, in an order that does not depend on how it was made."""
+    """All arrays and names of a reduced model, in a fixed order."""
     for nodal_diameter, linear in sorted(model.linear.items()):
         for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
             yield f"{nodal_diameter} {name}", getattr(linear, name)

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, WearTarget
 from studies.fe_models.model_files import ModelFiles
-from studyrunner.study.archive import Archived
+from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import (
     Axis,
     Cycles,
@@ -94,7 +94,7 @@ def _read_target(value: object) -> dict[str, float]:
 
 
 class StudySection(Section):
-    """[study]: how the study is called."""
+    """[study]: name and title of the study."""
 
     name: Annotated[str, BeforeValidator(_read_name)] = Field(description="name of the study and of its result file")
     title: Text = Field("", description="goes into the result")
@@ -120,7 +120,7 @@ class AxesSection(Section):
 
 
 class SlowTimeSection(Section):
-    """[slow_time]: how far, and which cycle counts are kept."""
+    """[slow_time]: end of the histories, and cycle counts of the output."""
 
     cycles: Cycles = Field(
         100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
@@ -144,7 +144,7 @@ class SlowTimeSection(Section):
 
 
 class SolverSection(Section):
-    """[solver]: how finely and how exactly. A key that stands under [axes] is not used from here."""
+    """[solver]: resolution and accuracy. A key under [axes] replaces the key here."""
 
     harmonics: Harmonics = Field(AUTO, description="harmonics above the static one")
     samples: Samples = Field(AUTO, description="time samples in a period")
@@ -159,7 +159,7 @@ class SolverSection(Section):
 
 
 class OutputsSection(Section):
-    """[outputs]: which variables the result holds; `outcome` and the totals of a point are always there."""
+    """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
         tuple(ASKED), description="names of result variables"
@@ -173,18 +173,19 @@ class OutputsSection(Section):
 
 
 class SceneFileParameters(Section):
-    """[scene] of a scene file: the file says all the rest, and this as well where it has one of each pair."""
+    """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
 
     friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more")
 
 
 class SceneSection(Section):
-    """[scene]: which model, and the parameters that this model knows.
+    """[scene]: model, and parameters of this model.
 
-    parameters: checked object of the class that the scene names, with at least `friction_coefficient`.
-    path: the file that the scene stands in, None where it is built here. group: where in that file, empty where it
-    is a scene file. files: those of a finite-element model, None of other scenes. offers: names in `outputs.variables`
-    of what this scene can tell and not all can.
+    parameters: checked object of the class of the scene, with `friction_coefficient` at least.
+    path: file of the scene; None for a scene that is built.
+    group: group of the scene in this file; empty in a scene file.
+    files: files of a finite-element model; None for other scenes.
+    offers: names in `outputs.variables` that this scene knows and not every scene knows.
     """
 
     model: Text
@@ -196,15 +197,16 @@ class SceneSection(Section):
 
     @property
     def is_bundled(self) -> bool:
-        """Whether it is one of the bundled scenes, which needs no file; a result may hold what it was built to."""
+        """Whether the scene is a bundled one; a result may hold the model that it was built to."""
         return not (names_file(self.model) or names_model(self.model))
 
 
 class Study(Section):
     """A whole study.
 
-    source: the file that it was read from, as the user named it. folder: the one that this file stands in.
-    archived: what the file says of the result that it holds, None where it is a study file.
+    source: file of the study, as the user named it.
+    folder: folder of this file.
+    archived: attributes of a result file; None for a study file.
     """
 
     study: StudySection
@@ -221,7 +223,7 @@ class Study(Section):
     @model_validator(mode="before")
     @classmethod
     def _fill_variables(cls, table: object) -> object:
-        """All that cost little, unless the study names others: those of every point, and the mesh if there is one."""
+        """The default variables where the study names none: those of every point, and the mesh if there is one."""
         if not isinstance(table, dict) or not isinstance(scene := table.get("scene"), SceneSection):
             return table
         outputs = table.get("outputs", {})
@@ -303,13 +305,13 @@ class Study(Section):
 
     @property
     def friction_coefficient(self) -> float | None:
-        """Coulomb's coefficient of all pairs; None where the scene has one of each pair."""
+        """Coulomb friction coefficient of all pairs; None where each pair has its own."""
         value = dict(self.scene.parameters)["friction_coefficient"]
         return None if value is None or isinstance(value, dict) else float(value)
 
     @property
     def wear_law(self) -> WearLaw:
-        """What is to be known of the wear law."""
+        """The wear law as the solver takes it."""
         return self.wear.wear_law
 
     @property
@@ -322,12 +324,12 @@ class Study(Section):
 
     @property
     def to_the_end(self) -> bool:
-        """Whether points are marched until nothing wears any more; their cycle counts are then their own."""
+        """Whether histories end where nothing wears any more; then each point has its own cycle counts."""
         return self.slow_time.cycles == math.inf
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
-        """Cycle counts of the result, ascending; numbers of its outputs where points have counts of their own."""
+        """Cycle counts of the result, ascending; numbers of the outputs where each point has its own counts."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if isinstance(outputs, tuple):
             return outputs
@@ -359,12 +361,12 @@ class Study(Section):
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:
-        """The values of `harmonics` that are numbers."""
+        """Values of `harmonics` that are numbers."""
         return tuple(number for number in self.harmonics if number != AUTO)
 
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
-        """Name and values of the axes of the result, in its order; solver keys only where they are axes."""
+        """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
         return {name: getattr(self.axes, name) for name in names}
 

@@ -18,11 +18,11 @@ from pydantic_core import ErrorDetails
 from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
-from studyrunner.study.archive import SCENE_GROUP, Archived, read_archived
-from studyrunner.study.names import nearest_name
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_errors import scene_errors
+from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file, names_model
+from studyrunner.study.study_of_result import SCENE_GROUP, Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 

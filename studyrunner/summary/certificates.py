@@ -1,4 +1,4 @@
-"""How right the results of a run are: worn volumes, outcomes, worst certificates, folds and jumps, as a table."""
+"""Table of the accuracy of a run: worn volumes, outcomes, largest errors of states, folds and jumps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
 from studyrunner.advice import advise_steps
-from studyrunner.plan.places import settings_of
+from studyrunner.plan.point_text import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
@@ -39,21 +39,21 @@ class _Place:
 
 @dataclass
 class _Noted:
-    """How many there are, and the first of them."""
+    """Number of cases, and the first case."""
 
     n: int = 0
     first: Index | None = None
 
     def add(self, point: Index) -> None:
-        """One more."""
+        """Adds a case."""
         self.n += 1
         self.first = point if self.first is None else min(self.first, point)
 
 
 class CertificateTable:
-    """Collects the table from the records of histories, some at a time; their order does not matter.
+    """Collects the table from the records of histories, in any order, some at a time.
 
-    It keeps the worst of each kind and counts: little, however many points there are.
+    The table keeps the largest errors and counts only, whatever the number of points.
     """
 
     def __init__(self, study: Study, facts: SceneFacts) -> None:
@@ -72,7 +72,7 @@ class CertificateTable:
         self._noted = {name: _Noted() for name in ("too long", "oscillating", "unstable")}
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
-        """Records (n,) as in `records`, and the points that each of them is of."""
+        """Adds records (n,), and the points of each record."""
         for collected in (self._volumes, self._small, self._edge, self._outcomes, self._doubts):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
@@ -112,7 +112,7 @@ class CertificateTable:
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
 
     def doubts(self) -> tuple[str, ...]:
-        """Lines on what is hardly what was meant: wear coefficient, depth of the wear, frequencies, amplitudes."""
+        """Lines on values that are probably not intended: wear coefficient, wear depth, frequencies, amplitudes."""
         depth = () if self._small.is_met else (f"small-wear assumption {self._small.format()}",)
         return (*doubts_of_study(self._study), *depth, *self._doubts.format())
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
 from studyrunner.percent import show_percent
-from studyrunner.plan.places import describe_point
+from studyrunner.plan.point_text import describe_point
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.advice import advise
-from studyrunner.plan.places import describe_point, describe_reach, settings_of
+from studyrunner.plan.point_text import describe_point, describe_reach, settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.room_for_wear import describe_room

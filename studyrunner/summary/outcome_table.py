@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.plan.places import describe_value
+from studyrunner.plan.point_text import describe_value
 from studyrunner.plan.sharing import Index
 from studyrunner.study.study import Study
 from studyrunner.summary.worn_volumes import rtol_of

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.outcome import COMPLETE
 from studyrunner.advice import advise_error
 from studyrunner.percent import show_percent, show_rtol
-from studyrunner.plan.places import describe_point, settings_of
+from studyrunner.plan.point_text import describe_point, settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count

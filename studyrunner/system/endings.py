@@ -1,8 +1,8 @@
-"""Signals that end a run in good order: what there is gets written first, which the next signal must not disturb.
+"""Signals that end a run: finished points are written first, and the next signal must not disturb this.
 
-The first one raises KeyboardInterrupt in the main thread. Where that comes to nothing, as in a callback of an import or
-of a library, it is raised again at the next look (`raise_ending`), until somebody has taken it (`begin_ending`). A run
-that takes longer than `SECONDS_OF_GRACE` to end is ended at once by one more.
+The first signal raises KeyboardInterrupt in the main thread. A callback of an import or of a library may lose this
+exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called. A run that takes
+longer than `SECONDS_OF_GRACE` to end is ended at once by one more signal.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from collections.abc import Iterator
 from types import FrameType
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
-"""Ctrl-C, the end of a job's time, of a terminal, and what batch systems send before that."""
+"""Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
 
 SECONDS_OF_GRACE = 10.0
-"""A launcher sends its signal more than once, and a user who does not wait presses Ctrl-C again: a second one ends the
-process at once only so long after the first. A result of 200 MB is written in 3 s."""
+"""Time after the first signal in which further signals do nothing, s. A launcher sends its signal more than once, and a
+user may press Ctrl-C again. A result of 200 MB is written in 3 s.
+"""
 
 INTERRUPTED = 130
-"""Exit status of what was ended from outside."""
+"""Exit status after an end from outside."""
 
 _n_uninterrupted = 0
 _came: float | None = None  # when the first one did
@@ -31,7 +32,9 @@ _last_words = b""
 
 
 def take_endings() -> None:
-    """From here on each of them raises KeyboardInterrupt in the main thread, once; those that are ignored stay so."""
+    """From now on each of these signals raises KeyboardInterrupt in the main thread, once; ignored signals stay
+    ignored.
+    """
     global _came, _begun, _last_words
     _came, _begun, _last_words = None, False, b""
     for number in ENDING:
@@ -40,13 +43,13 @@ def take_endings() -> None:
 
 
 def say_at_last(line: str) -> None:
-    """What is said on stderr where one more of them ends the process at once; nothing by itself."""
+    """Text for stderr where a further signal ends the process at once; empty at first."""
     global _last_words
     _last_words = f"{line}\n".encode()
 
 
 def begin_ending() -> None:
-    """The run is ending now, for whatever reason: the signals that would end it do not disturb that for a while.
+    """The run is ending now: further signals do not disturb this for some time.
 
     A launcher sends its signal to all ranks, and rank 0 may hear of it from another rank first.
     """
@@ -56,19 +59,19 @@ def begin_ending() -> None:
 
 
 def ending_waits() -> bool:
-    """Whether an ending has come that nothing was done about."""
+    """Whether a signal has come that nothing was done about."""
     return _came is not None and not _begun
 
 
 def is_ending(error: BaseException) -> bool:
-    """Whether an error is an ending, or may be what a library has made of one."""
+    """Whether an exception is the end from outside, or may be an exception that a library has made of it."""
     return isinstance(error, KeyboardInterrupt) or ending_waits()
 
 
 def raise_ending() -> None:
-    """Raises KeyboardInterrupt where an ending has come that nothing was done about.
+    """Raises KeyboardInterrupt where a signal has come that nothing was done about.
 
-    Between steps that may hide what was raised when it came.
+    For use between steps that may have lost the exception.
     """
     if ending_waits():
         raise KeyboardInterrupt
@@ -76,10 +79,10 @@ def raise_ending() -> None:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """What is done in here is done as a whole: an ending that comes meanwhile raises KeyboardInterrupt behind it.
+    """A block that is done as a whole: a signal during the block raises KeyboardInterrupt after the block.
 
-    For steps of the main thread that an exception between two of their instructions would leave half done: a message
-    whose memory is given back before it is sent, a lock that is taken and never released.
+    For steps of the main thread that an exception between two instructions would leave half done: a message whose
+    memory is freed before it is sent, or a lock that is never released.
     """
     global _n_uninterrupted
     _n_uninterrupted += 1

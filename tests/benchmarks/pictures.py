@@ -28,7 +28,7 @@ from matplotlib.container import ErrorbarContainer
 
 import studies
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.gallery import draw_report
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result, open_for_report
 from tests.benchmarks.small_png import shrink
 

@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `studyrunner.plan.costs`, `studyrunner.task_progress`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `plan.cost_model` and `task_progress`.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from studyrunner.mpi import hand_out
+from studyrunner.mpi import broadcast
 from studyrunner.mpi.ranks import start_ranks
 from studyrunner.mpi.shared_memory import Address
 from studyrunner.mpi.version_check import check_versions, report_version
@@ -29,15 +29,15 @@ def refuse(_: Address) -> object:
 def share() -> None:
     ranks = start_ranks()
     if str(ranks.rank) == os.environ.get("CANNOT_MAP"):
-        hand_out.open_shared = refuse
+        broadcast.open_shared = refuse
     n_bytes = int(os.environ["SHARED_BYTES"])
     if ranks.rank == 0:
-        handed = hand_out.HandOut(ranks, check_versions(ranks), {"ones": np.ones(n_bytes // 8)})
+        handed = broadcast.Broadcast(ranks, check_versions(ranks), {"ones": np.ones(n_bytes // 8)})
         handed.send()
         value: object = handed.value
     else:
         report_version(ranks)
-        value = hand_out.take_over(ranks)
+        value = broadcast.take_over(ranks)
     assert isinstance(value, dict)
     said = {"sum": float(value["ones"].sum()), **memory_of_mapping("fretwear-scene")}
     Path(f"{ranks.rank}.json").write_text(json.dumps(said), encoding="utf-8")

@@ -11,8 +11,8 @@ import pytest
 from solver.loading_history import start_states
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.options import LOADING
-from solver.loading_history.origin import find_origin
 from solver.loading_history.start_states import FrequencySweep, follow_branch
+from solver.loading_history.sweep_start import find_origin
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -88,11 +88,11 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
     # behind the resonance, with harmonics enough: what the coarse walk misses are its steps alone
     settings = SolverSettings(harmonics=9, samples=128)
     found = {}
-    for change in (0.2, 0.01):
-        options = replace(LOADING, smallest_history_change=change, largest_history_change=change)
+    for change in (0.3, 0.02):
+        options = replace(LOADING, change_limits=(change, change))
         monkeypatch.setattr(sweep_module, "LOADING", options)
         found[change] = starts([213.25], settings=settings)[213.25]
-    coarse, fine = found[0.2], found[0.01]
+    coarse, fine = found[0.3], found[0.02]
     assert coarse.coarse is not None
     assert fine.state is not None
     assert coarse.state is not None
@@ -111,7 +111,7 @@ def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings:
     line.advance(BESIDE)
     assert line.walk is not None
     assert line.walk.here is not None
-    fine, coarse = line.walk.case.resolution, line.walk.coarse_route.case.resolution
+    fine, coarse = line.walk.case.resolution, line.walk.reference_path.case.resolution
     assert (fine == coarse) == same
     assert coarse.highest <= fine.highest
     assert coarse.samples <= fine.samples
@@ -172,10 +172,10 @@ def test_a_joint_without_grip_ends_within_bounded_effort() -> None:
 
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep_module.Sweep, "_choose_harmonics", lambda _: 0.6)
+    monkeypatch.setattr(sweep_module.NodeSweep, "_choose_resolution", lambda _: 0.6)
     sweep = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC)
     origin = find_origin(sweep.model, 100.0, "up")
     sweep.origin, sweep.walk = origin, sweep._new_walk(origin, None)
     sweep._begin(sweep.walk, origin)
     assert sweep.walk.here is None
-    assert sweep.walk.failure is Outcome.UNSETTLED
+    assert sweep.walk.state.failure is Outcome.UNSETTLED

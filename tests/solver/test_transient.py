@@ -14,7 +14,7 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.loading_history.origin import find_origin
+from solver.loading_history.sweep_start import find_origin
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, solve_balance

@@ -1,6 +1,6 @@
 """Craig-Bampton reduction the plain way: one sparse factorisation, a column of static shapes for each displacement.
 
-The slow twin of `studies.scenes.finite_element.reduction`.
+The slow twin of `studies.finite_element`.
 """
 
 from __future__ import annotations
@@ -13,11 +13,16 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from solver.model import FloatArray, LinearModel, Matrix, needed_nodal_diameters
-from studies.scenes.dovetail_mesh import build_dovetail_mesh
-from studies.scenes.dovetail_sector import build_elements, build_pairs, build_sector, tip_row
-from studies.scenes.finite_element.assembly import assemble_geometric_stiffness, assemble_sector
-from studies.scenes.finite_element.contact_pairs import ContactPairs
-from studies.scenes.finite_element.cyclic import CyclicSector
+from studies.finite_element.elements.assembly import (
+    assemble_mass,
+    assemble_stiffness,
+    assemble_tangent_stiffness,
+    centrifugal_load,
+    spin_softening,
+)
+from studies.finite_element.joint.pairing import ContactPairs
+from studies.finite_element.joint_model import JointDefinition
+from studies.scenes.dovetail_sector import define_sector
 
 
 @dataclass(frozen=True)
@@ -33,33 +38,36 @@ class SectorCoordinates:
     relative: sparse.csr_matrix
 
 
-def build_coordinates(sector: CyclicSector, pairs: ContactPairs, nodal_diameter: int) -> SectorCoordinates:
+def build_coordinates(joint: JointDefinition, nodal_diameter: int) -> SectorCoordinates:
     """Coordinates of the sector at a nodal diameter in 0..n_sectors // 2."""
-    angle = 2.0 * np.pi / sector.n_sectors
+    cut, pairs = joint.cut, joint.pairs
+    n_nodes, n_sectors = len(joint.held), cut.axis.n_sectors
+    angle = 2.0 * np.pi / n_sectors
     phase: complex | float
     if nodal_diameter == 0:
         phase = 1.0
-    elif 2 * nodal_diameter == sector.n_sectors:
+    elif 2 * nodal_diameter == n_sectors:
         phase = -1.0
     else:
         phase = cmath.exp(1j * angle * nodal_diameter)
     rotation = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
 
     # Every node follows a master: itself, its image on the left cut face, or the fixed node of its pair.
-    master = np.arange(sector.n_nodes)
-    master[sector.right] = sector.left
-    master[pairs.moving] = pairs.fixed
-    blocks = np.tile(np.eye(3, dtype=type(phase)), (sector.n_nodes, 1, 1))
-    blocks[sector.right] = phase * rotation
-    blocks[np.isin(master, sector.clamped)] = 0.0
+    master = np.arange(n_nodes)
+    master[cut.right] = cut.left
+    master[pairs.moving] = pairs.opposite.argmax(axis=1).ravel()
+    blocks = np.tile(np.eye(3, dtype=type(phase)), (n_nodes, 1, 1))
+    blocks[cut.right] = phase * rotation
+    clamped = np.flatnonzero(joint.held.all(axis=1))
+    blocks[np.isin(master, clamped)] = 0.0
 
-    free = np.setdiff1d(master, sector.clamped)
-    column = np.zeros(sector.n_nodes, dtype=np.int64)
+    free = np.setdiff1d(master, clamped)
+    column = np.zeros(n_nodes, dtype=np.int64)
     column[free] = np.arange(len(free))
-    starts = np.arange(sector.n_nodes + 1)
-    glued = sparse.bsr_matrix((blocks, column[master], starts), shape=(3 * sector.n_nodes, 3 * len(free))).tocsr()
+    starts = np.arange(n_nodes + 1)
+    glued = sparse.bsr_matrix((blocks, column[master], starts), shape=(3 * n_nodes, 3 * len(free))).tocsr()
     glued.eliminate_zeros()
-    return SectorCoordinates(glued=glued, relative=_relative(pairs, sector.n_nodes))
+    return SectorCoordinates(glued=glued, relative=_relative(pairs, n_nodes))
 
 
 def _relative(pairs: ContactPairs, n_nodes: int) -> sparse.csr_matrix:
@@ -133,20 +141,6 @@ def build_basis(
     return ReducedBasis(nodal=np.hstack([constraint, glued @ vectors]), frequencies=np.sqrt(values))
 
 
-def glued_frequencies(
-    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, coordinates: SectorCoordinates, n_modes: int
-) -> FloatArray:
-    """Lowest natural frequencies (n_modes,) of the glued sector, rad/s, ascending; arguments as in `build_basis`.
-
-    Raises ValueError where the glued sector is singular or, from spin softening, unstable.
-    """
-    glued = coordinates.glued
-    glued_h = glued.conj().T.tocsr()
-    inner = (glued_h @ stiffness @ glued).tocsc()
-    values, _ = _lowest_modes(inner, (glued_h @ mass @ glued).tocsr(), factorise(inner), n_modes)
-    return np.sqrt(values)
-
-
 def _lowest_modes(
     stiffness: sparse.csc_matrix, mass: sparse.csr_matrix, factors: SuperLU, n_modes: int
 ) -> tuple[FloatArray, Matrix]:
@@ -182,25 +176,18 @@ def project(matrix: sparse.csr_matrix, basis: Matrix) -> Matrix:
 
 def build_linear(parameters, n_harmonics):
     """Linear models of `dovetail_sector` by nodal diameter, without a retainer."""
-    mesh = build_dovetail_mesh(parameters)
-    pairs, sector = build_pairs(mesh), build_sector(parameters, mesh)
-    hexes = build_elements(parameters, mesh)
-    matrices = assemble_sector(mesh.mesh, hexes)
-    elastic, mass = matrices.stiffness.tocsr(), matrices.mass.tocsr()
-    load = parameters.angular_speed**2 * matrices.load
+    model, joint = define_sector(parameters)
+    elastic, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
+    load = centrifugal_load(mass, model.coordinates, model.rotation)
     stiffness = elastic
     if parameters.stress_stiffening:
-        glued = solve_glued(elastic, load, build_coordinates(sector, pairs, 0))
-        stiffness = (
-            elastic
-            + assemble_geometric_stiffness(mesh.mesh, hexes, glued)
-            - parameters.angular_speed**2 * matrices.spin_mass
-        ).tocsr()
-    tip, excited = tip_row(parameters, mesh), parameters.nodal_diameter
+        glued = solve_glued(elastic, load, build_coordinates(joint, 0))
+        stiffness = (assemble_tangent_stiffness(model.mesh, glued) + spin_softening(mass, model.rotation)).tocsr()
+    tip, excited = joint.load.row(model.mesh.n_nodes), parameters.nodal_diameter
     wanted = needed_nodal_diameters(excited, parameters.n_sectors, n_harmonics)
     linear, damping = {}, 0.0
     for k in sorted({excited, *wanted}, key=lambda k: (k != excited, k)):
-        basis = build_basis(stiffness, mass, build_coordinates(sector, pairs, k), parameters.stuck_modes)
+        basis = build_basis(stiffness, mass, build_coordinates(joint, k), parameters.stuck_modes)
         if k == excited:
             damping = parameters.loss_factor / basis.frequencies[0]
         nodes = basis.nodal

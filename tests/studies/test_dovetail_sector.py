@@ -8,11 +8,10 @@ from pydantic import ValidationError
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
+from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, centrifugal_load
+from studies.finite_element.elements.solid_mesh import SolidMesh
 from studies.scene_error import SceneError
-from studies.scenes.dovetail_mesh import build_dovetail_mesh
-from studies.scenes.dovetail_sector import Parameters, build, build_elements, build_pairs
-from studies.scenes.finite_element.assembly import HexMesh, assemble, assemble_sector
-from studies.scenes.finite_element.hex_element import HexElements
+from studies.scenes.dovetail_sector import Parameters, build, define_sector
 from tests.studies.static_contact import solve_static_contact
 
 # Glued, nodal diameter 0, Hz: 20-node elements without, 8-node ones with the effects of 3000 rpm.
@@ -77,20 +76,22 @@ def test_contact_pairs(default):
 
 
 def test_frames_close_outwards_and_mirror_each_other():
-    frames = build_pairs(build_dovetail_mesh(Parameters())).frames
+    frames = define_sector(Parameters())[1].pairs.frames
     half = np.sqrt(0.5)
     assert np.allclose(frames[:24], [[half, half, 0.0], [0.0, 0.0, 1.0], [half, -half, 0.0]], atol=1e-9)
     assert np.allclose(frames[24:], frames[:24] * [1.0, -1.0, 1.0], atol=1e-9)
 
 
+def blade_alone(parameters):
+    """Mesh of the blade, with the nodes of the disk, which move nothing; and the rotation."""
+    model, _ = define_sector(parameters)
+    (blade,) = (group for group in model.mesh.groups if group.part == "blade")
+    return SolidMesh(model.coordinates, model.numbers, (blade,)), model.rotation
+
+
 def test_free_blade_has_six_rigid_modes():
-    parameters = Parameters()
-    mesh = build_dovetail_mesh(parameters)
-    hexes = build_elements(parameters, mesh)
-    blade = HexElements(hexes.coordinates[mesh.blade_elements], hexes.elasticity, hexes.density)
-    used, elements = np.unique(mesh.mesh.elements[mesh.blade_elements], return_inverse=True)
-    nodes = mesh.mesh.nodes[used]
-    stiffness = assemble(blade.stiffness(), elements.reshape(-1, 8), len(nodes))
+    mesh, _ = blade_alone(Parameters())
+    stiffness, nodes = assemble_stiffness(mesh), mesh.coordinates
     x, y, z = nodes.T
     o = np.zeros_like(x)
     shifts = [np.tile(direction, (len(nodes), 1)) for direction in np.eye(3)]
@@ -121,11 +122,8 @@ def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest)
 
 def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
     parameters = Parameters(stress_stiffening=False)
-    mesh = build_dovetail_mesh(parameters)
-    hexes = build_elements(parameters, mesh)
-    blade = HexElements(hexes.coordinates[mesh.blade_elements], hexes.elasticity, hexes.density)
-    matrices = assemble_sector(HexMesh(mesh.mesh.nodes, mesh.mesh.elements[mesh.blade_elements]), blade)
-    pull = parameters.angular_speed**2 * matrices.load.reshape(-1, 3).sum(axis=0)[0]
+    mesh, rotation = blade_alone(parameters)
+    pull = centrifugal_load(assemble_mass(mesh), mesh.coordinates, rotation).reshape(-1, 3).sum(axis=0)[0]
     for friction_coefficient in (0.5, 1e-6):
         force = solve_static_contact(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
         assert np.all(force[:, 0] > 0.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from studies.finite_element.condensation import projection
+from studies.finite_element.condensation.modes import lowest_modes
 from studies.model_check import check_model
 from studies.scenes.dovetail_sector import Parameters, build, natural_frequencies
-from studies.scenes.finite_element.condensation import projection
-from studies.scenes.finite_element.condensation.modes import lowest_modes
 from tests.studies.reduction_twin import build_linear
 
 MATRICES = ("mass", "damping", "stiffness")

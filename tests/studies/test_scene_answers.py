@@ -14,7 +14,6 @@ from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
-from studies.scenes.finite_element.surface import outer_faces
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
 
 AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])  # Hz, 20-node elements, nodal diameter 0, glued
@@ -110,18 +109,6 @@ def test_without_friction_the_response_is_that_of_the_spring():
     amplitude = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
     assert found.response_amplitude == pytest.approx(np.full((3, 4, 1), amplitude), rel=1e-12, abs=0.0)
     assert found.worn_volume[0, 1] > 0.0
-
-
-def test_outer_faces_of_two_cubes():
-    corners = np.array([[x, y, z] for z in (0, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
-    elements = np.array([range(8), range(4, 12)])
-    faces, element = outer_faces(elements)
-    assert faces.shape == (10, 4)
-    assert np.count_nonzero(element == 0) == 5
-    assert not any(set(face) == {4, 5, 6, 7} for face in faces.tolist())
-    centre = corners[elements].mean(axis=1)[element]
-    normal = np.cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 1]])
-    assert (np.sum(normal * (corners[faces].mean(axis=1) - centre), axis=1) > 0.0).all()
 
 
 def test_the_mesh_is_the_skin_of_blade_and_disk():

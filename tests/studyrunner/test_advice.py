@@ -9,7 +9,7 @@ import pytest
 from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error, advise_steps
 from studyrunner.percent import known_to, show_percent, show_rtol
-from studyrunner.plan.places import settings_of
+from studyrunner.plan.point_text import settings_of
 from studyrunner.study.study_file import read_study
 
 SCHEMES, SWEEPS = ("adaptive", "implicit", "explicit", "final"), ("up", "down", "ramp")

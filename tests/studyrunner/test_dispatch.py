@@ -9,7 +9,7 @@ import pytest
 
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import AHEAD_SECONDS, WATCH_SECONDS, Dispatcher
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.plan.cost_model import CostModel
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Job:
         return self.cost / self.n_results
 
     @property
-    def kin(self) -> tuple[tuple[str, ...], ...]:
+    def cost_keys(self) -> tuple[tuple[str, ...], ...]:
         return (("all", self.kind),)
 
 
@@ -38,7 +38,7 @@ class Clock:
 
 def make(n_ranks: int, *jobs: Job) -> tuple[Dispatcher[Job], Clock]:
     clock = Clock()
-    dispatcher: Dispatcher[Job] = Dispatcher(n_ranks, LearnedCosts(), clock)
+    dispatcher: Dispatcher[Job] = Dispatcher(n_ranks, CostModel(), clock)
     dispatcher.add(jobs)
     return dispatcher, clock
 
@@ -114,7 +114,7 @@ def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_measured_times_change_the_order() -> None:
-    # After 16 lessons: a takes a tenth of what was said, and of b that is less certain.
+    # After 16 measurements: a takes a tenth of what was said, and of b that is less certain.
     jobs = [Job("a", 2.0)] * 30 + [Job("b", 1.9)] * 30
     dispatcher, _ = make(1, *jobs)
     kinds = []
@@ -175,7 +175,7 @@ def test_a_message_costs_the_same_with_any_number_of_ranks() -> None:
 
 
 def test_a_correction_is_the_ratio_of_sums_with_the_parent_as_one_more() -> None:
-    costs = LearnedCosts()
+    costs = CostModel()
     costs.learn((("all", "a"),), 1.0, 3.0)
     costs.learn((("all", "a"),), 3.0, 5.0)
     # mean estimate 2 s; the parent of "all" says 1: (8 + 2) / (4 + 2); that of "a" says 10 / 6.
@@ -187,7 +187,7 @@ def test_a_correction_is_the_ratio_of_sums_with_the_parent_as_one_more() -> None
 
 
 def test_two_respects_multiply_and_are_told_apart() -> None:
-    costs = LearnedCosts()
+    costs = CostModel()
     truth = {"cheap": 1.0, "dear": 8.0, "fine": 5.0, "coarse": 1.0}
     for _ in range(200):
         for place in ("cheap", "dear"):
@@ -199,12 +199,12 @@ def test_two_respects_multiply_and_are_told_apart() -> None:
 
 
 def test_forgetting_takes_everything_back() -> None:
-    costs = LearnedCosts()
-    kin = (("all", "a"), ("scheme",))
-    costs.learn(kin, 1.0, 3.0)
-    before = costs.correction(kin)
-    costs.forget(costs.learn(kin, 2.0, 70.0))
-    assert costs.correction(kin) == pytest.approx(before)
+    costs = CostModel()
+    cost_keys = (("all", "a"), ("scheme",))
+    costs.learn(cost_keys, 1.0, 3.0)
+    before = costs.correction(cost_keys)
+    costs.forget(costs.learn(cost_keys, 2.0, 70.0))
+    assert costs.correction(cost_keys) == pytest.approx(before)
 
 
 def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
@@ -243,9 +243,9 @@ def test_what_a_lost_rank_has_taught_by_being_late_is_forgotten() -> None:
     costs = dispatcher._costs
     clock.now += 1000.0 * WATCH_SECONDS
     dispatcher.watch()
-    assert costs.correction(jobs[0].kin) > 10.0
+    assert costs.correction(jobs[0].cost_keys) > 10.0
     dispatcher.lose(0)
-    assert costs.correction(jobs[0].kin) == 1.0
+    assert costs.correction(jobs[0].cost_keys) == 1.0
 
 
 def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other() -> None:

@@ -14,7 +14,7 @@ import h5py
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.study.archive import check_result_file
+from studyrunner.study.study_of_result import check_result_file
 from studyrunner.user_error import UserError
 from tests.studyrunner.hostile_files import ALLOWED, SCENES, STUDY, TEXTS, change_scene, sparse_file
 from tests.studyrunner.own_time import Stopwatch

@@ -35,7 +35,7 @@ def begin(completion: CompletionIndex, n_starts: int) -> tuple[TaskProgress, Bra
     assert isinstance(branch, BranchTask)
     marches = []
     for started in list(fake_branch(branch))[:n_starts]:
-        progress.costs.learn(branch.kin, branch.cost_of(first=False), 1.0)
+        progress.costs.learn(branch.cost_keys, branch.cost_of(first=False), 1.0)
         marches.extend(progress.take(branch, started))
     return progress, branch, marches
 

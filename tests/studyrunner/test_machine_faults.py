@@ -18,7 +18,7 @@ from solver.outcome import Outcome, describe_error
 from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.plan.costs import Kin, LearnedCosts, Lesson
+from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.machine_faults import is_fault_of_machine, tells_of_machine
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
@@ -116,7 +116,7 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.M
 
 class Chore:
     cost, n_results, opens_others = 1.0, 1, False
-    kin = (("chore",),)
+    cost_keys = (("chore",),)
 
     def cost_of(self, *, first: bool) -> float:
         del first
@@ -124,7 +124,7 @@ class Chore:
 
 
 def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
-    dispatcher: Dispatcher[Chore] = Dispatcher(3, LearnedCosts(), time.monotonic)
+    dispatcher: Dispatcher[Chore] = Dispatcher(3, CostModel(), time.monotonic)
     dispatcher.add([Chore() for _ in range(20)])
     held = [(rank, given.number) for rank, given in dispatcher.assign()]
     ranks: list[int] = []
@@ -149,20 +149,20 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
 def test_a_task_that_broke_off_teaches_nothing_of_those_like_it(
     solver: Solver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own, lessons = LearnedCosts.learn, []
+    own, measurements = CostModel.learn, []
 
-    def learn(self: LearnedCosts, kin: Kin, estimated: float, measured: float) -> Lesson:
-        lessons.append(measured)
-        return own(self, kin, estimated, measured)
+    def learn(self: CostModel, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:
+        measurements.append(measured)
+        return own(self, cost_keys, estimated, measured)
 
-    monkeypatch.setattr(LearnedCosts, "learn", learn)
+    monkeypatch.setattr(CostModel, "learn", learn)
     assert main([*SMALL[:-1], "whole.nc"]) == 0
-    n_whole = len(lessons)
+    n_whole = len(measurements)
     solver.begin_again()
-    lessons.clear()
+    measurements.clear()
     solver.disturb = failing(FAULTS[0], 1, MarchTask)
     assert main(SMALL) == 0
-    assert len(lessons) == n_whole > 0
+    assert len(measurements) == n_whole > 0
 
 
 KERNELS = """

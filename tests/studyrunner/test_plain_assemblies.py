@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.fe_models.elements.solid_mesh import Material
+from studies.finite_element.elements.solid_mesh import Material
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study

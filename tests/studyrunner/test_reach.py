@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from studyrunner.plan.places import describe_reach
+from studyrunner.plan.point_text import describe_reach
 
 
 @pytest.mark.parametrize(

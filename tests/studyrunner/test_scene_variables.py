@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studies.finite_element.joint.reduction import GluedStructureError, Reduction
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import dovetail_sector, scene_mesh
-from studies.scenes.finite_element.reduction import GluedSectorError, SectorReduction
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.output import parts_folder
@@ -134,13 +134,13 @@ def test_a_sector_that_spins_too_fast_is_bad_input(
     monkeypatch.chdir(tmp_path)
 
     def unstable(*_: object) -> None:
-        raise GluedSectorError("the glued sector is unstable: spin softening exceeds its stiffness")
+        raise GluedStructureError(unstable=True)
 
-    monkeypatch.setattr(SectorReduction, "frequencies", unstable)
+    monkeypatch.setattr(Reduction, "frequencies", unstable)
     overrides = (*COARSE, "outputs.variables=['natural_frequency']")
     assert main(["dovetail", "-o", "out.nc", *(part for text in overrides for part in ("--set", text))]) == 2
     said = capsys.readouterr().err.splitlines()
-    assert "scene.rotation_speed = 3000.0: reduce it" in said[-1]
+    assert "scene.rotation_speed = 3000: reduce it" in said[-1]
     assert list(tmp_path.iterdir()) == []
 
 

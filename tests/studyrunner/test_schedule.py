@@ -13,8 +13,8 @@ import pytest
 from studyrunner.mpi.dispatch import Assignment
 from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
 from studyrunner.mpi.ranks import Alone, start_ranks
-from studyrunner.mpi.schedule import _Delivery, serve_tasks
-from studyrunner.plan.costs import LearnedCosts
+from studyrunner.mpi.schedule import Handlers, _Delivery, serve_tasks
+from studyrunner.plan.cost_model import CostModel
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Job:
         return self.cost / self.n_results
 
     @property
-    def kin(self) -> tuple[tuple[str, ...], ...]:
+    def cost_keys(self) -> tuple[tuple[str, ...], ...]:
         return (("job", self.name),)
 
 
@@ -41,9 +41,9 @@ def serve(
     tasks: Iterable[Job],
     run: Callable[[Job], Iterable[object]],
     take: Callable[[Job, object], list[Job]] = take_nothing,
-) -> LearnedCosts:
-    costs = LearnedCosts()
-    serve_tasks(Alone(), tasks, lambda job, _: run(job), take, costs)
+) -> CostModel:
+    costs = CostModel()
+    serve_tasks(Alone(), tasks, lambda job, _: run(job), Handlers(take), costs)
     return costs
 
 
@@ -194,7 +194,7 @@ def test_tasks_of_a_lost_rank_are_given_to_others() -> None:
             yield "done"
 
     jobs = [Job(name, 1.0, 2) for name in "abcdef"]
-    serve_tasks(Losing(), jobs, run, take, LearnedCosts(), take_back=take_back)
+    serve_tasks(Losing(), jobs, run, Handlers(take, take_back=take_back), CostModel())
     ((rank, [(name, n_left)]),) = backs
     assert (rank, n_left) == (2, 2)
     assert sorted(taken) == sorted(

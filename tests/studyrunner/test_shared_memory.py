@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from studies import build_scene
-from studyrunner.mpi import hand_out
-from studyrunner.mpi.hand_out import HandOut, LostError, take_over
+from studyrunner.mpi import broadcast
+from studyrunner.mpi.broadcast import Broadcast, LostError, take_over
 from studyrunner.mpi.shared_memory import Address, SharedObject, open_shared
 from studyrunner.mpi.version_check import Machine
 from studyrunner.scene.scene import describe_scene
@@ -156,7 +156,7 @@ def hand_to_all(
         mapped.append(threading.current_thread().name)
         return open_shared(address)
 
-    monkeypatch.setattr(hand_out, "open_shared", open_here)
+    monkeypatch.setattr(broadcast, "open_shared", open_here)
 
     def follow(rank: int) -> None:
         ranks = Threads(rank, boxes, gone)
@@ -174,7 +174,7 @@ def hand_to_all(
         if rank not in lost:
             thread.start()
     ranks = Threads(0, boxes, gone)
-    handed = HandOut(ranks, machines, {"a": np.arange(5.0)})
+    handed = Broadcast(ranks, machines, {"a": np.arange(5.0)})
     handed.send()
     got[0] = handed.value
     for rank in range(1, size):
@@ -205,7 +205,7 @@ def test_without_shared_memory_every_rank_has_its_own(monkeypatch: pytest.Monkey
     def refuse(_: object) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr(hand_out, "SharedObject", refuse)
+    monkeypatch.setattr(broadcast, "SharedObject", refuse)
     got, mapped = hand_to_all(monkeypatch, "aabb")
     assert mapped == 0
     assert len(got) == 4
@@ -222,6 +222,6 @@ def test_a_rank_whose_leader_is_lost_on_the_way_says_so() -> None:
         (a, b): queue.SimpleQueue() for a in range(3) for b in range(3)
     }
     machines = {0: Machine("a", "", ""), 1: Machine("b", "", ""), 2: Machine("b", "", "")}
-    HandOut(Threads(0, boxes, set()), machines, {"a": np.arange(5.0)}).send()
+    Broadcast(Threads(0, boxes, set()), machines, {"a": np.arange(5.0)}).send()
     with pytest.raises(LostError):
         take_over(Threads(2, boxes, {1}))

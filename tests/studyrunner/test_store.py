@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from solver.packing import Packed
-from studyrunner.checkpoint import part_writer, stock
+from studyrunner.checkpoint import folder_contents, part_writer
 from studyrunner.checkpoint import store as store_module
 from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
-from studyrunner.checkpoint.shelf import FILES_A_MERGE
+from studyrunner.checkpoint.segment_index import FILES_A_MERGE
 from studyrunner.checkpoint.store import SECONDS_A_FILE, SECONDS_A_PROGRESS, Store
 from studyrunner.mpi.crashes import count_crashes, forget_crashes, read_tally
 from studyrunner.system import folder_lock
@@ -408,7 +408,7 @@ def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(
         raise OSError(5, "Input/output error")
 
     with monkeypatch.context() as broken:
-        broken.setattr(stock, "load_record_keys", fail)
+        broken.setattr(folder_contents, "load_record_keys", fail)
         with pytest.raises(StorageError, match="Input/output error"):
             Store(folder, KIND)
     store = Store(folder, KIND)

@@ -27,11 +27,11 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     marches = []
     for branch in plan.branches:
         for started in fake_branch(branch):
-            progress.costs.learn(branch.kin, branch.cost_of(first=False), 1.0)
+            progress.costs.learn(branch.cost_keys, branch.cost_of(first=False), 1.0)
             marches.extend(progress.take(branch, started))
     assert progress.n_starts_left == 0
     for number, task in enumerate(marches, start=1):
-        progress.costs.learn(task.kin, task.cost, 2.0 * task.cost)
+        progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
         progress.take(task, fake_march(task))
         left = 2.0 * sum(march.cost for march in marches[number:])
         if number > 8:

@@ -144,7 +144,7 @@ def test_marches_cost_little_and_go_last_where_nothing_moves() -> None:
     assert (long.start, long.step, short.step) == ("state", 100.0, 1000.0)
     assert all(0.0 < task.cost < short.cost for task in resting)
     assert [task.cost for task in planned] == [long.cost, short.cost]
-    assert {task.kin[0] for task in moving} != {task.kin[0] for task in resting}
+    assert {task.cost_keys[0] for task in moving} != {task.cost_keys[0] for task in resting}
 
 
 def test_a_march_costs_what_the_harmonics_of_its_start_state_say() -> None:

@@ -15,10 +15,10 @@ from studyrunner import UserError, open_result, run_study
 from studyrunner.accessor import join_results
 from studyrunner.netcdf.attributes import attributes, coordinate_entry
 from studyrunner.plan.identity import Identities
-from studyrunner.plan.printed import format_plan
+from studyrunner.plan.plan_text import format_plan
 from studyrunner.plan.tasks import build_tasks
-from studyrunner.report.reading.door import check_numbers
 from studyrunner.report.reading.result import open_for_report
+from studyrunner.report.reading.schema_check import check_numbers
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.reference import coarser
 from solver.clock import computing_time
 from solver.model import FloatArray, ReducedModel
@@ -26,7 +26,7 @@ from solver.wear.final_state.cooperation import failure
 from solver.wear.history import integrate_wear
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
-from solver.wear.solutions import SlowTime
+from solver.wear.solutions import SlowTime, begin_reference
 from solver.wear.state import Failure, WearState
 from solver.wear.wearing_joint import WearingJoint
 
@@ -140,10 +140,7 @@ def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share
     """Final depths (n_contact,), m, of the reference solution, which starts from the state of the reference sweep with
     fewer harmonics; NaN if not found.
     """
-    begin = start.coarse or start.state
-    assert begin is not None
-    limit = found.unworn.step_limit
-    first = work.begin(begin, start.resolution, NOTHING, accurate=True, step_limit=limit)
+    first = begin_reference(work, start, found.unworn.step_limit)
     state = with_harmonics(work, first, coarser(found.final.state.resolution))
     if state is None:
         return np.full(first.depth.size, np.nan)

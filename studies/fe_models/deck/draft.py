@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from studies.fe_models.deck.mesh import FloatArray, IntArray
 from studies.fe_models.deck.sets import PART, Reference, SetDefinitions
 from studies.fe_models.text.keyword_lines import Block
-from studies.fe_models.text.places import Place
+from studies.fe_models.text.read_errors import Place
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from studies.fe_models.deck.mesh import (
     Tie,
 )
 from studies.fe_models.deck.sets import PART, Reference, Resolver, SetDefinitions
-from studies.fe_models.text.places import Place, shown
+from studies.fe_models.text.read_errors import Place, shown
 from studies.scene_error import SceneError
 
 FACES_OF_CORNERS = {4: 4, 10: 4, 6: 5, 15: 5, 8: 6, 20: 6}

@@ -9,7 +9,7 @@ from studies.fe_models.deck.mesh import NODES_OF_KIND, FloatArray
 from studies.fe_models.deck.sets import PART, read_reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields, read_floats, read_points, read_records
-from studies.fe_models.text.places import shown
+from studies.fe_models.text.read_errors import shown
 
 
 def read_node(draft: Draft, block: Block) -> None:

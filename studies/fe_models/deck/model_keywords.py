@@ -8,7 +8,7 @@ from studies.fe_models.deck.draft import Draft, DraftMaterial, DraftPair
 from studies.fe_models.deck.sets import read_reference
 from studies.fe_models.text.keyword_lines import Block, read_name
 from studies.fe_models.text.numbers import is_integer, read_fields, read_float, read_floats
-from studies.fe_models.text.places import shown
+from studies.fe_models.text.read_errors import shown
 
 _MOST_SECTORS = 100_000
 

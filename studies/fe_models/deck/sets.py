@@ -10,7 +10,7 @@ import numpy as np
 from studies.fe_models.deck.mesh import IntArray
 from studies.fe_models.text.keyword_lines import Block, read_name
 from studies.fe_models.text.numbers import is_integer, read_fields, read_integer
-from studies.fe_models.text.places import Place, shown
+from studies.fe_models.text.read_errors import Place, shown
 
 PART = "part"
 """The scope of names inside of *PART and *INSTANCE; the other one is ""."""

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver.model import FloatArray, LinearModel, ReducedModel
-from studies.fe_models.fe_model import MatrixModel
-from studies.fe_models.fe_scene import FeScene, Progress, glued_frequencies, prepare_model, silent
 from studies.fe_models.from_files.model import LoadedModel
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
+from studies.finite_element.joint_model import MatrixModel
+from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""

@@ -19,9 +19,6 @@ from studies.fe_models.checks import (
     omega_squared_of,
 )
 from studies.fe_models.deck.mesh import Deck
-from studies.fe_models.elements.solid_mesh import Rotation, SolidMesh
-from studies.fe_models.fe_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
-from studies.fe_models.fe_scene import Progress, silent
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import build_solid_mesh
@@ -33,6 +30,9 @@ from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles
 from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.fe_models.units import Units, find_units
+from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
+from studies.finite_element.reduced_joint import Progress, silent
 from studies.scene_error import SceneError
 
 _SPEED_AGREES = 1e-3  # relative difference of the speed of a study from that of its matrices

@@ -7,13 +7,13 @@ from importlib import metadata
 from pydantic import BaseModel
 
 from solver.model import ReducedModel
-from studies.fe_models.fe_model import ReductionOptions
-from studies.fe_models.fe_scene import FeScene, Progress, build_fe_scene, silent
 from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.joint.surfaces import describe_mesh
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles, file_digest
+from studies.finite_element.joint.surfaces import describe_mesh
+from studies.finite_element.joint_model import ReductionOptions
+from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.scene_answers import SurfaceMesh
 
 

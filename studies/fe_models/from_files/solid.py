@@ -8,9 +8,9 @@ import numpy as np
 
 from solver.model import IntArray
 from studies.fe_models.deck.mesh import Deck
-from studies.fe_models.elements.solid_mesh import ElementGroup, Material, SolidMesh
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.fe_models.units import Units
+from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
 from studies.scene_error import SceneError
 
 _NONE = Material(0.0, 0.0, 0.0)  # of a mesh whose matrices come from elsewhere

@@ -7,11 +7,11 @@ import numpy as np
 from solver.model import BoolArray, FloatArray
 from studies.fe_models.checks import rotation_of_deck
 from studies.fe_models.deck.mesh import Boundary, Deck
-from studies.fe_models.elements.solid_mesh import Rotation
 from studies.fe_models.from_files.parameters import AxisTable, Parameters
 from studies.fe_models.from_files.selections import Selections
-from studies.fe_models.joint.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
 from studies.fe_models.units import Units
+from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
 from studies.scene_error import SceneError
 
 _LAST_DISPLACEMENT = 3  # further degrees of freedom of a boundary condition are rotations and temperatures

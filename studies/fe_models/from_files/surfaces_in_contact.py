@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.selections import Selections
-from studies.fe_models.joint.pairing import ContactSurfaces
 from studies.fe_models.units import Units
+from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.fe_models.text.places import check_file
+from studies.fe_models.text.read_errors import check_file
 from studies.guards.limited_process import REFUSED, run_limited
 from studies.scene_error import SceneError
 

@@ -12,7 +12,7 @@ import pandas as pd
 from pandas.io.parsers import TextFileReader
 
 from studies.fe_models.matrices.matrices import LARGEST_ENTRIES, LARGEST_FILE, wrong
-from studies.fe_models.text.places import check_file, shown
+from studies.fe_models.text.read_errors import check_file, shown
 from studies.scene_error import SceneError
 
 _ROWS_AT_ONCE = 1_000_000

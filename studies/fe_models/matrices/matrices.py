@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from studies.fe_models.text.places import shown
+from studies.fe_models.text.read_errors import shown
 from studies.scene_error import SceneError
 
 FloatArray = NDArray[np.float64]

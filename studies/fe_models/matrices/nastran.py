@@ -17,7 +17,7 @@ import numpy as np
 
 from studies.fe_models.matrices.labels import from_labels
 from studies.fe_models.matrices.matrices import LARGEST_ENTRIES, LARGEST_FILE, Matrices, sorted_dofs, symmetric, wrong
-from studies.fe_models.text.places import check_file, shown
+from studies.fe_models.text.read_errors import check_file, shown
 
 _LONGEST_LINE = 1000
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d{1,4})|[eEdD](\d{1,4}))?")

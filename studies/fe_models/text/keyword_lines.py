@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from studies.fe_models.text.places import LARGEST_DECK, Place, check_file, shown
+from studies.fe_models.text.read_errors import LARGEST_DECK, Place, check_file, shown
 
 _LONGEST_LINE = 10_000
 _MOST_INCLUDES = 1000

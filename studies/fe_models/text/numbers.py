@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.fe_models.text.keyword_lines import Block
-from studies.fe_models.text.places import Place, shown
+from studies.fe_models.text.read_errors import Place, shown
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

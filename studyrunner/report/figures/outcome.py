@@ -18,7 +18,7 @@ from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds
-from studyrunner.report.reading.reliance import settings_of, tell_ends, tell_volumes
+from studyrunner.report.reading.known_volumes import settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import show_cycles, show_number, show_power
 from studyrunner.system.progress import count

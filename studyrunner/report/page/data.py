@@ -21,7 +21,7 @@ from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.reading.reliance import advise_point, advise_volume, show_error
+from studyrunner.report.reading.known_volumes import advise_point, advise_volume, show_error
 from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
 from studyrunner.report.reading.units import scale_for, units_of
 from studyrunner.variables import CERTIFICATE

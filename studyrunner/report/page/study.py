@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studyrunner.report.reading.reliance import advise_ended, describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Ending, Result
 from studyrunner.report.reading.units import show_cycles, show_number, units_of
 from studyrunner.system.progress import count

@@ -1,1 +1,1 @@
-"""A result file as the report reads it: its door, its choice of points, its units."""
+"""Reading of a result file: schema check, choice of points, units."""

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.door import check_dataset, reading_errors, study_tables
+from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
 from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
@@ -371,7 +371,7 @@ def open_for_report(path: Path | str) -> Result:
 def open_vetted(path: Path | str) -> xr.Dataset:
     """Open a file as it is, once a process of its own has read it without harm. Raises UserError."""
     # the report itself knows nothing of studies and scenes
-    from studyrunner.study.archive import check_result_file
+    from studyrunner.study.study_of_result import check_result_file
 
     path, source = Path(path), str(path)
     if not path.is_file():

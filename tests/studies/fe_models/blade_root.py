@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
 from tests.studies.fe_models.solid_meshes import block
 
 DECK = Path(__file__).parents[3] / "studies" / "blade_root.inp"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.fe_models.elements.assembly import assemble_mass, assemble_stiffness
+from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
 from tests.studies.fe_models.matrix_files import System
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set
 

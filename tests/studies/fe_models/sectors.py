@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
-from studies.fe_models.elements.solid_mesh import Rotation, SolidMesh
-from studies.fe_models.fe_model import JointDefinition, MeshModel, SetMotion
-from studies.fe_models.joint.cut_faces import CyclicAxis, match_cut_faces
-from studies.fe_models.joint.pairing import ContactSurfaces
-from studies.fe_models.joint.surfaces import surface_of_faces
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.cut_faces import CyclicAxis, match_cut_faces
+from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.joint_model import JointDefinition, MeshModel, SetMotion
 from tests.studies.fe_models.solid_meshes import block, joined
 
 N_SECTORS = 12

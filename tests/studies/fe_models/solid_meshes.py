@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
-from studies.fe_models.elements.solid_mesh import ElementGroup, Material, SolidMesh
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
 
 STEEL = Material(210e9, 0.3, 7800.0)
 

@@ -10,7 +10,7 @@ import skfem
 from scipy.sparse.linalg import spsolve
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from studies.fe_models.elements.assembly import (
+from studies.finite_element.elements.assembly import (
     assemble_mass,
     assemble_stiffness,
     assemble_tangent_stiffness,
@@ -18,8 +18,8 @@ from studies.fe_models.elements.assembly import (
     check_elements,
     spin_softening,
 )
-from studies.fe_models.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
-from studies.fe_models.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.finite_element.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
+from studies.finite_element.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 from tests.studies.fe_models.solid_meshes import (
     EXPORT,

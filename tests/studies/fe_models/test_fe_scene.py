@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg, sparse
 
-from studies.fe_models.elements.assembly import (
+from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.finite_element.elements.assembly import (
     assemble_mass,
     assemble_stiffness,
     assemble_tangent_stiffness,
     centrifugal_load,
     spin_softening,
 )
-from studies.fe_models.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
-from studies.fe_models.fe_model import (
+from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint import ordering, reduction
+from studies.finite_element.joint.cut_faces import find_cut_faces
+from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.joint_model import (
     JointDefinition,
     MatrixModel,
     MeshModel,
@@ -22,16 +29,10 @@ from studies.fe_models.fe_model import (
     Retainer,
     SetMotion,
 )
-from studies.fe_models.fe_scene import build_fe_scene, natural_frequencies, prepare_model
-from studies.fe_models.joint import ordering, reduction
-from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces
-from studies.fe_models.joint.pairing import ContactSurfaces
-from studies.fe_models.joint.surfaces import surface_of_faces, surface_of_nodes
-from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scenes import dovetail_sector
-from studies.scenes.dovetail_mesh import build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_sector import Parameters
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z, faces_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -97,6 +98,7 @@ CASES = {
 @pytest.mark.parametrize("largest_kept_cut", [0, 900])
 def test_reduction_against_dense_constraints(name, nodal_diameter, largest_kept_cut, monkeypatch):
     # cut faces are kept to the last, or eliminated with their images at each nodal diameter
+    monkeypatch.setattr(ordering, "_FEWEST_REUSES", 3)
     monkeypatch.setattr(ordering, "_LARGEST_KEPT_CUT", largest_kept_cut)
     if name == "plane of symmetry":
         sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
@@ -104,7 +106,7 @@ def test_reduction_against_dense_constraints(name, nodal_diameter, largest_kept_
     else:
         sector, changes = CASES[name]()
         joint = sector.joint(**changes)
-    prepared = prepare_model(sector.model(), joint)
+    prepared = prepare_model(sector.model(), joint, n_reductions=3)
     pairs, forms = prepared.pairs, prepared.reduction.forms
     load = np.stack([prepared.static_load, joint.load.row(sector.mesh.n_nodes)], axis=1)
     n_modes = 5
@@ -173,42 +175,19 @@ def test_prestress_is_that_of_the_glued_sector():
     assert forms.keys() <= prepared.reduction.forms.keys()
 
 
-def dovetail(parameters):
-    """The bundled sector as a foreign model: an unstructured mesh, and sets of nodes."""
-    mesh = build_dovetail_mesh(parameters)
-    material = Material(parameters.young_modulus, parameters.poisson_ratio, parameters.density)
-    elements, numbers = mesh.mesh.elements, np.arange(len(mesh.mesh.elements)) + 1
-    parts = (("blade", mesh.blade_elements), ("disk", ~mesh.blade_elements))
-    groups = tuple(ElementGroup("C3D8I", elements[own], numbers[own], material, part) for part, own in parts)
-    solid = SolidMesh(mesh.mesh.nodes, np.arange(len(mesh.mesh.nodes)) + 1, groups)
-    n_across, n_axial = mesh.tip_nodes.shape
-    middle = mesh.tip_nodes[n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
-    tip = SetMotion(middle, 3.0 * chord_directions(parameters.tip_stagger)[1])
-    held = np.zeros((solid.n_nodes, 3), dtype=bool)
-    held[mesh.bore_nodes] = True
-    surfaces = [
-        (surface_of_nodes(solid, f"{name}-root", blade.ravel()), surface_of_nodes(solid, f"{name}-slot", disk.ravel()))
-        for name, blade, disk in zip(("intrados", "extrados"), mesh.blade_flanks, mesh.disk_flanks, strict=True)
-    ]
-    joint = JointDefinition(
-        contacts=tuple(ContactSurfaces(*each, tolerance=1e-6) for each in surfaces),
-        held=held,
-        load=tip,
-        responses={"tip": tip},
-        cut=find_cut_faces(
-            solid.coordinates, solid.numbers, solid.bodies, CyclicAxis(parameters.n_sectors, np.zeros(3), Z)
-        ),
-        retainer=Retainer(parameters.retainer, Z),
-    )
-    return MeshModel(solid, Rotation(parameters.angular_speed**2, np.zeros(3), Z)), joint
+def as_foreign_model(parameters):
+    """The bundled sector as a deck gives it: pairs, cut faces and layers are found, not known."""
+    model, joint = dovetail_sector.define_sector(parameters)
+    cut = find_cut_faces(model.coordinates, model.numbers, model.mesh.bodies, joint.cut.axis)
+    return replace(model, layers=None), replace(joint, pairs=None, cut=cut)
 
 
 @pytest.mark.parametrize("nodal_diameter", [0, 3])
-def test_bundled_dovetail_through_the_unstructured_core(nodal_diameter):
+def test_bundled_dovetail_as_a_foreign_model(nodal_diameter):
     parameters = Parameters(mesh=1, nodal_diameter=nodal_diameter)
     expected = dovetail_sector.build(parameters, 2)
     options = ReductionOptions(nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    model = build_fe_scene(*dovetail(parameters), options, 2).model
+    model = build_fe_scene(*as_foreign_model(parameters), options, 2).model
     check_model(model, 2)
     assert model.linear.keys() == expected.linear.keys()
     # pairs by their places, relative displacements by their frames
@@ -217,8 +196,8 @@ def test_bundled_dovetail_through_the_unstructured_core(nodal_diameter):
     place = apart.argmin(axis=1)
     assert apart.min(axis=1).max() < 1e-9
     assert np.allclose(ours.area[place], theirs.area, rtol=1e-10)
-    frames = dovetail_sector.build_pairs(build_dovetail_mesh(parameters)).frames
-    own_frames = build_fe_scene(*dovetail(parameters), options, 0).pairs.frames
+    frames = dovetail_sector.define_sector(parameters)[1].pairs.frames
+    own_frames = build_fe_scene(*as_foreign_model(parameters), options, 0).pairs.frames
     n = 3 * theirs.n_contact
     size = n + parameters.stuck_modes
     turn = np.zeros((size, size))

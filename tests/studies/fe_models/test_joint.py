@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from studies.fe_models.elements.kinds import ELEMENT_KINDS
-from studies.fe_models.joint.closest_point import closest_points
-from studies.fe_models.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
-from studies.fe_models.joint.pairing import ContactSurfaces, build_contact_pairs, local_frames
-from studies.fe_models.joint.surfaces import describe_mesh, outer_faces, surface_of_faces, surface_of_nodes
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.joint.closest_point import closest_points
+from studies.finite_element.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
+from studies.finite_element.joint.pairing import ContactSurfaces, build_contact_pairs, local_frames
+from studies.finite_element.joint.surfaces import describe_mesh, outer_faces, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where
 from tests.studies.fe_models.solid_meshes import block, joined

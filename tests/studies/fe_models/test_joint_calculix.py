@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from studies.fe_models.elements.assembly import assemble_mass, assemble_stiffness
-from studies.fe_models.elements.solid_mesh import Rotation
-from studies.fe_models.fe_model import ReductionOptions
-from studies.fe_models.fe_scene import build_fe_scene, glued_frequencies, prepare_model
 from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
+from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint_model import ReductionOptions
+from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from tests.studies.calculix_deck import read_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import (

@@ -8,7 +8,7 @@ from matplotlib.collections import QuadMesh
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawing, Table
-from studyrunner.report.gallery import draw_report
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 
 

@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_answers import SurfaceMesh
-from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from studies.scenes.dovetail_parameters import Parameters
-from studies.scenes.dovetail_sector import build_pairs, describe_mesh
-from studies.scenes.finite_element.contact_pairs import ContactPairs
+from studies.scenes.dovetail_sector import define_sector, describe_mesh
 from tests.studyrunner.report.page_cases import build_file
 
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "dovetail_sector"\nn_sectors = 47\n'
@@ -23,7 +22,9 @@ def parameters(density: int = 1) -> Parameters:
 
 
 def dovetail_pairs(density: int = 1) -> ContactPairs:
-    return build_pairs(build_dovetail_mesh(parameters(density)))
+    pairs = define_sector(parameters(density))[1].pairs
+    assert pairs is not None
+    return pairs
 
 
 def with_mesh(dataset: xr.Dataset, mesh: SurfaceMesh) -> xr.Dataset:

@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, Table, line_style
-from studyrunner.report.gallery import draw_report
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import (
     make_result,
@@ -238,7 +238,7 @@ def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
 @pytest.mark.slow
 def test_neither_pyplot_nor_the_solver_is_imported() -> None:
     code = (
-        "import sys, studyrunner.report.gallery;"
+        "import sys, studyrunner.report.page_contents;"
         "print([name for name in ('matplotlib.pyplot', 'solver', 'studies', 'numba', 'mpi4py') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

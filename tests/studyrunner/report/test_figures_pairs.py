@@ -10,7 +10,7 @@ from matplotlib.collections import PathCollection, QuadMesh
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.gallery import draw_report
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_loops, with_variables
 from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, add_legend, new_panels, set_in_column, style
-from studyrunner.report.gallery import draw_report
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_loops, with_sector
 from tests.studyrunner.report.test_precision import finest_file

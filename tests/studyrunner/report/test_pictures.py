@@ -1,8 +1,8 @@
 """The pictures of the bundled study are those of this solver, this study and this report.
 
-Which numbers the artists of a figure hold is compared with the file in `test_figures_values.py`, `test_reliance.py` and
-`test_figures_pairs.py`; here, of the root; and what `tests.benchmarks.pictures` writes down of them, and that this is
-not old.
+Which numbers the artists of a figure hold is compared with the file in `test_figures_values.py`,
+`test_known_volumes.py` and `test_figures_pairs.py`; here, of the root; and what `tests.benchmarks.pictures` writes down
+of them, and that this is not old.
 """
 
 from __future__ import annotations

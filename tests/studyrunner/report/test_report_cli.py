@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from studyrunner.report import gallery
+from studyrunner.report import page_contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main, parse_options
 from studyrunner.report.drawing import Missing, Table
 from tests.studyrunner.report.page_cases import build_file
@@ -25,7 +25,7 @@ def short_report(_result: object) -> Iterator[Missing | Table]:
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A folder to work in, with a result file; a report has no figures."""
-    monkeypatch.setattr(gallery, "draw_report", short_report)
+    monkeypatch.setattr(page_contents, "draw_report", short_report)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
     build_file().to_netcdf(tmp_path / "results" / "worn.x.nc")
@@ -87,7 +87,7 @@ def test_an_unexpected_failure_has_a_traceback(
     def fail(_result: object) -> Iterator[Missing]:
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr(gallery, "draw_report", fail)
+    monkeypatch.setattr(page_contents, "draw_report", fail)
     assert main(["results/worn.x.nc"]) == UNEXPECTED
     said = capsys.readouterr().err
     assert "unexpected failure" in said
@@ -101,7 +101,7 @@ def test_an_interrupt_is_one_line(
     def interrupt(_result: object) -> Iterator[Missing]:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gallery, "draw_report", interrupt)
+    monkeypatch.setattr(page_contents, "draw_report", interrupt)
     assert main(["results/worn.x.nc"]) == INTERRUPTED
     assert capsys.readouterr().err == "study-report: interrupted\n"
 
@@ -110,9 +110,9 @@ APART = """
 import ctypes, os, signal, sys, time
 # in the background of a shell it is ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from studyrunner.report import gallery
+from studyrunner.report import page_contents
 from studyrunner.report.cli import main
-gallery.draw_report = lambda _: {}
+page_contents.draw_report = lambda _: {}
 sys.exit(main())
 """
 

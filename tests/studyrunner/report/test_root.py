@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.fe_models.joint.pairing import build_contact_pairs
-from studies.fe_models.joint.surfaces import describe_mesh as describe_fe_mesh
+from studies.finite_element.joint.pairing import build_contact_pairs
+from studies.finite_element.joint.surfaces import describe_mesh as describe_fe_mesh
 from studyrunner.report.reading.result import Result
 from studyrunner.report.root.contact_faces import face_normals, find_contact_faces
 from studyrunner.report.root.figures import draw_root

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.collections import QuadMesh
 
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.gallery import draw_report
 from studyrunner.report.page.trends import build_trend_numbers
+from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from studyrunner.report.trends.figures import draw_trends
 from studyrunner.report.trends.quantities import find_error, find_peak, find_quantities

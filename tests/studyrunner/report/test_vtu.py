@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report import gallery
+from studyrunner.report import page_contents
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.report.root import vtu
 from tests.studyrunner.report.page_cases import as_result, build_file
@@ -100,7 +100,7 @@ def test_a_point_that_ended_early_has_files_up_to_there(tmp_path: Path) -> None:
 def test_the_command_writes_the_series_beside_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], dataset: xr.Dataset
 ) -> None:
-    monkeypatch.setattr(gallery, "draw_report", lambda _: iter(()))
+    monkeypatch.setattr(page_contents, "draw_report", lambda _: iter(()))
     monkeypatch.chdir(tmp_path)
     dataset.to_netcdf("some.nc")
     assert main(["some.nc", "--vtu"]) == WRITTEN

@@ -1,0 +1,170 @@
+"""One step of a loading path: from a stable state to a stable state at another frequency or excitation.
+
+`LoadingPath.solve` solves one balance, from the line through the last states. Where Newton's method fails or the state
+is unstable, `LoadingPath.step` searches: by smaller natural steps, by arc length through folds, and in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.contact.coulomb import STICK
+from solver.continuation.arc_length import follow_arc
+from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
+from solver.continuation.transient import relax_to_periodic
+from solver.harmonic_balance.converged import PathPoint, final_history, history_at_rest, vibration_change
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.options import LOADING
+from solver.model import FloatArray
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Effort, solve_balance
+from solver.outcome import Outcome
+from solver.packing import packable
+from solver.stability.hill import is_stable
+from solver.structure.joint import Case, Joint
+
+
+@packable
+@dataclass(frozen=True)
+class Step:
+    """A state reached by a step and the folds that were jumped over in it (values of the parameter)."""
+
+    point: PathPoint
+    folds: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class LoadingPath:
+    """The unworn joint along its frequency (parameter: rad/s; omega: None) or, at a frequency omega, rad/s, along its
+    excitation (parameter: load factor, of excitation_amplitude, N).
+    """
+
+    case: Case
+    excitation_amplitude: float
+    omega: float | None = None
+
+    def joint_at(self, parameter: float) -> Joint:
+        """Joint at a value of the parameter."""
+        if self.omega is None:
+            return self.case.joint(parameter, self.excitation_amplitude)
+        return self.case.joint(self.omega, parameter * self.excitation_amplitude)
+
+    def balance_at(self, parameter: float, history: FloatArray) -> Balance:
+        """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
+        unworn = np.zeros(self.case.model.contact.n_contact)
+        return Balance.frozen(self.joint_at(parameter), history, unworn)
+
+    def scale(self, parameter: float) -> float:
+        """What lengths of steps are relative to."""
+        return abs(parameter) if self.omega is None else 1.0
+
+    def solve(
+        self,
+        nodes: tuple[PathPoint, ...],
+        target: float,
+        solver: JacobianSolver,
+        effort: Effort,
+        tolerance: float | None = None,
+    ) -> PathPoint | None:
+        """Stable state at a value of the parameter, by Newton's method alone; None where there is none so near.
+
+        Parameters
+        ----------
+        nodes : tuple of PathPoint
+            One or two states of the branch with the same harmonics: Newton's method begins on the line through them.
+            The pairs have the tangential history of the last one.
+        target : float
+            Value of the parameter.
+        solver, effort
+            As in `solve_balance`.
+        tolerance : float, optional
+            Of the scaled residual; that of the settings by default.
+        """
+        start = nodes[-1]
+        joint, begin = self.joint_at(target), start.evaluation.predicted_h
+        balance = Balance.frozen(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
+        if len(nodes) > 1:
+            ratio = (target - start.parameter) / (start.parameter - nodes[0].parameter)
+            begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
+        limit = self.case.settings.tolerance if tolerance is None else tolerance
+        result = solve_balance(balance, begin, solver, limit, effort, CONTINUATION.near_iterations)
+        if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
+            return None
+        return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
+
+    def reach(
+        self,
+        nodes: tuple[PathPoint, ...],
+        target: float,
+        solver: JacobianSolver,
+        effort: Effort,
+        tolerance: float | None = None,
+    ) -> Step | Outcome:
+        """Stable state at a target from the last of some nodes, by `solve` or else by `step`; or why there is none."""
+        point = self.solve(nodes, target, solver, effort, tolerance)
+        return self.step(nodes[-1], target, solver, effort) if point is None else Step(point)
+
+    def step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | Outcome:
+        """Stable state at a target from a state of the same harmonics and samples, or why there is none."""
+        tolerance = self.case.settings.tolerance
+        start = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
+        scale = self.scale(target)
+        folds: list[float] = []
+
+        def stays(point: PathPoint) -> bool:
+            balance = self.balance_at(point.parameter, point.evaluation.history)
+            return is_stable(balance.linearise(point.evaluation), solver)
+
+        for _ in range(LOADING.most_folds):
+            if effort.exhausted:
+                break
+            point, arrived = follow_naturally(
+                self.balance_at, start, target, solver, tolerance, effort, fine=LOADING.free_step * scale
+            )
+            if arrived and stays(point):
+                return Step(point, tuple(folds))
+            # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
+            end = start if arrived else point
+            span = LOADING.arc_span * scale
+            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, effort, stays, beyond=False)
+            if arc.point is not None:
+                return Step(arc.point, (*folds, *arc.jumps))
+            if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
+                # a shorter step leads nearer to where the branch loses its stability without a fold
+                return Outcome.UNSTABLE
+            landed = self._settled(end, target, arc.folds, solver, effort)
+            if isinstance(landed, Outcome):
+                return landed
+            folds.extend(landed.folds)
+            if landed.point.parameter == target:
+                return Step(landed.point, tuple(folds))
+            start = landed.point
+        return Outcome.BRANCH_LOST
+
+    def describe(self, point: PathPoint) -> str:
+        """Where a state lies, and how much of the joint moves in it."""
+        at = f"{point.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {point.parameter:.3g}"
+        moving = int(np.count_nonzero((point.evaluation.status_t != STICK).any(axis=1)))
+        return f"at {at}, {moving} of {len(point.evaluation.status_t)} pairs slip or open"
+
+    def _settled(
+        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
+    ) -> Step | Outcome:
+        """State that the structure settles to from the end of a branch, a little beyond it towards the target."""
+        fine = LOADING.free_step * self.scale(end.parameter)
+        beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
+        joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
+        unworn = np.zeros(self.case.model.contact.n_contact)
+        why, found = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, solver, effort)
+        if found is None:
+            return why
+        landed = PathPoint(beyond, found.evaluation, found.history)
+        if vibration_change(end.evaluation, found.evaluation) <= CONTINUATION.smooth_change:
+            return Step(landed)
+        # an arc that broke off behind the fold has found it all the same
+        return Step(
+            landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (target - end.parameter)),)
+        )

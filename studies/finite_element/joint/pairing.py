@@ -1,0 +1,204 @@
+"""Contact pairs of two surfaces: nodes of one surface, and points of the other; the meshes need not match."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import BoolArray, FloatArray, IntArray
+from studies.finite_element.joint.closest_point import closest_points
+from studies.finite_element.joint.surfaces import Surface
+from studies.scene_error import SceneError
+
+_TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, where none is given
+
+
+@dataclass(frozen=True)
+class ContactSurfaces:
+    """Two surfaces in contact.
+
+    first, second: the nodes of the finer surface move, those of the first one where both are alike. Where one surface
+        alone is covered by the other, its nodes move.
+    tolerance: largest distance of a node that is paired, m; None for a share of the size of a facet.
+    friction_coefficient: of these surfaces; None where all pairs have the same.
+    with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
+        surfaces, and the pairs touch.
+    label: of the pairs; the names of both surfaces if empty.
+    """
+
+    first: Surface
+    second: Surface
+    tolerance: float | None = None
+    friction_coefficient: float | None = None
+    with_gaps: bool = False
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Label of the pairs."""
+        return self.label or f"{self.first.name}-{self.second.name}"
+
+
+@dataclass(frozen=True)
+class ContactPairs:
+    """Contact pairs, `n_contact` of them.
+
+    moving (n_contact,): nodes. The relative displacement is that of the node minus that of the opposite point.
+    opposite (n_contact, n_nodes): interpolation weights of the opposite points; rows sum to 1.
+    frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
+        pair), first tangent, second tangent.
+    present (n_contact, 3): whether a relative displacement exists; the others are held.
+    area (n_contact,): m2.
+    position (n_contact, 3): of the moving node, m.
+    distance (n_contact,): along the normal, positive where the pair is open, m.
+    gap (n_contact,): initial gap, m.
+    surface (n_contact,): number of the pair of surfaces.
+    moving_name, opposite_name: names of the surfaces, for each pair of surfaces.
+    """
+
+    moving: IntArray
+    opposite: sparse.csr_matrix
+    frames: FloatArray
+    present: BoolArray
+    area: FloatArray
+    position: FloatArray
+    distance: FloatArray
+    gap: FloatArray
+    surface: IntArray
+    moving_name: tuple[str, ...]
+    opposite_name: tuple[str, ...]
+
+    @property
+    def n_contact(self) -> int:
+        """Number of pairs."""
+        return len(self.moving)
+
+    def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
+        """Some of the pairs."""
+        parts = ("moving", "opposite", "frames", "present", "area", "position", "distance", "gap", "surface")
+        return replace(self, **{name: getattr(self, name)[which] for name in parts})
+
+
+def build_contact_pairs(
+    coordinates: FloatArray, numbers: IntArray, contacts: Sequence[ContactSurfaces], along: FloatArray
+) -> ContactPairs:
+    """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
+
+    Parameters
+    ----------
+    coordinates
+        (n_nodes, 3), m.
+    numbers
+        (n_nodes,): of the nodes in the file, for messages.
+    contacts
+        At least one.
+    along
+        (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
+        of the axis of coordinates that lies flattest on it.
+
+    Raises
+    ------
+    SceneError
+        Where nodes find no point of the other surface, or belong to two pairs.
+    """
+    parts = [_pair(coordinates, contact, place, along) for place, contact in enumerate(contacts)]
+    joined = _joined(parts)
+    unique, count = np.unique(joined.moving, return_counts=True)
+    if (count > 1).any():
+        twice = unique[count > 1]
+        both = joined.surface[joined.moving == twice[0]]
+        names = " and ".join(joined.moving_name[place] for place in both)
+        raise SceneError(
+            "contact",
+            f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}",
+            "take them out of one of the surfaces",
+        )
+    return joined
+
+
+def _joined(parts: Sequence[ContactPairs]) -> ContactPairs:
+    """Pairs of several surfaces, one after the other."""
+    return ContactPairs(
+        moving=np.concatenate([part.moving for part in parts]),
+        opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
+        frames=np.concatenate([part.frames for part in parts]),
+        present=np.concatenate([part.present for part in parts]),
+        area=np.concatenate([part.area for part in parts]),
+        position=np.concatenate([part.position for part in parts]),
+        distance=np.concatenate([part.distance for part in parts]),
+        gap=np.concatenate([part.gap for part in parts]),
+        surface=np.concatenate([part.surface for part in parts]),
+        moving_name=tuple(name for part in parts for name in part.moving_name),
+        opposite_name=tuple(name for part in parts for name in part.opposite_name),
+    )
+
+
+def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
+    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent near `along`, second tangent."""
+    candidates = [along / np.linalg.norm(along), *np.eye(3)]
+    steepest = [np.abs(normals @ each).max(initial=0.0) for each in candidates]
+    # one direction for the whole surface, so that neighbouring frames are alike
+    direction = candidates[0] if steepest[0] < 0.9 else candidates[1 + int(np.argmin(steepest[1:]))]
+    first = direction - (normals @ direction)[:, None] * normals
+    flat = np.linalg.norm(first, axis=1) < 0.1
+    for place in np.flatnonzero(flat):  # on a closed surface no direction lies on it everywhere
+        axis = np.eye(3)[np.argmin(np.abs(normals[place]))]
+        first[place] = axis - (normals[place] @ axis) * normals[place]
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+
+
+def _pair(coordinates: FloatArray, contact: ContactSurfaces, place: int, along: FloatArray) -> ContactPairs:
+    first, second = contact.first, contact.second
+    shared = np.intersect1d(first.nodes, second.nodes)
+    if len(shared):
+        raise SceneError(
+            "contact",
+            f"{first.name} and {second.name} share {len(shared)} nodes",
+            "give the two bodies nodes of their own where they touch",
+        )
+    sizes = first.facet_size(coordinates), second.facet_size(coordinates)
+    moving, opposite = (second, first) if sizes[1] < (1.0 - 1e-6) * sizes[0] else (first, second)
+    tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
+    found = closest_points(coordinates[moving.nodes], opposite, coordinates)
+    far = found.distance > tolerance
+    if far.any():
+        # a coarse surface may lie inside a finer one that goes on
+        other = closest_points(coordinates[opposite.nodes], moving, coordinates)
+        if (other.distance > tolerance).any():
+            raise SceneError(
+                "contact",
+                f"{np.count_nonzero(far)} of {len(far)} nodes of {moving.name} are farther than {tolerance:g} m"
+                f" from {opposite.name}",
+                f"give a larger tolerance (the farthest is at {found.distance.max():.3g} m), or surfaces of which one"
+                " covers the other",
+            )
+        moving, opposite, found = opposite, moving, other
+    nodes = moving.nodes
+    area, normals = moving.areas_and_normals(coordinates)
+    n, n_nodes = len(nodes), len(coordinates)
+    point, corner = np.nonzero(found.weights)
+    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
+    weights = sparse.csr_matrix(entries, shape=(n, n_nodes))
+    facing = np.zeros_like(coordinates)
+    facing[opposite.nodes] = opposite.areas_and_normals(coordinates)[1]
+    if np.einsum("ij,ij->", weights @ facing, normals * area[:, None]) > 0.0:
+        raise SceneError("contact", f"{moving.name} and {opposite.name} face the same way", "give faces that touch")
+    offset = weights @ coordinates - coordinates[nodes]
+    distance = np.einsum("ij,ij->i", offset, normals)
+    return ContactPairs(
+        moving=nodes,
+        opposite=weights,
+        frames=local_frames(normals, along),
+        present=np.ones((n, 3), dtype=np.bool_),
+        area=area,
+        position=coordinates[nodes],
+        distance=distance,
+        gap=distance if contact.with_gaps else np.zeros(n),
+        surface=np.full(n, place),
+        moving_name=(moving.name,),
+        opposite_name=(opposite.name,),
+    )

@@ -1,0 +1,153 @@
+"""A finite-element model of a joint, and what is done with it, as arrays in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import BoolArray, FloatArray, IntArray
+from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
+
+
+@dataclass(frozen=True)
+class MeshModel:
+    """A model whose matrices are assembled here.
+
+    mesh: the mesh.
+    rotation: None for a model at rest.
+    prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
+        centrifugal load, and spin softening.
+    preload (3 n_nodes,): constant forces beside the centrifugal ones, N. They are no part of the prestress: forces that
+        press on gaps and flanks act otherwise on a glued structure.
+    layers (n_nodes, n_directions): place of each node in a structured grid, for the order of elimination; None to use
+        the coordinates.
+    """
+
+    mesh: SolidMesh
+    rotation: Rotation | None = None
+    prestress: bool = True
+    preload: FloatArray | None = None
+    layers: IntArray | None = None
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """Nodes (n_nodes, 3), m."""
+        return self.mesh.coordinates
+
+    @property
+    def numbers(self) -> IntArray:
+        """Numbers (n_nodes,) of the nodes in the file."""
+        return self.mesh.numbers
+
+
+@dataclass(frozen=True)
+class MatrixModel:
+    """A model with matrices of another program.
+
+    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element.
+    numbers (n_nodes,): of the nodes in the file.
+    stiffness, mass (3 n_nodes, 3 n_nodes): N/m and kg, symmetric, unconstrained, displacements node by node in x, y, z.
+        Prestress and spin softening of the other program stay in them.
+    rotation: for the centrifugal load, which follows from the mass; None for a model at rest.
+    preload (3 n_nodes,): constant forces beside the centrifugal ones, N.
+    """
+
+    coordinates: FloatArray
+    numbers: IntArray
+    stiffness: sparse.csr_matrix
+    mass: sparse.csr_matrix
+    rotation: Rotation | None = None
+    preload: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class SetMotion:
+    """Mean displacement of nodes (n,), rows of the coordinates, along a direction (3,) of any length.
+
+    As a load: a force of 1 N along the direction, shared evenly.
+    """
+
+    nodes: IntArray
+    direction: FloatArray
+
+    def row(self, n_nodes: int) -> FloatArray:
+        """Row (3 n_nodes,) that gives it from the nodal displacements."""
+        row = np.zeros((n_nodes, 3))
+        np.add.at(row, self.nodes, self.direction / (np.linalg.norm(self.direction) * len(self.nodes)))
+        return row.ravel()
+
+
+@dataclass(frozen=True)
+class Retainer:
+    """A spring on the mean relative displacement of all pairs, weighted by area.
+
+    stiffness: N/m.
+    direction (3,): of any length.
+
+    The spring keeps a joint from walking that friction alone holds; without it there may be no periodic state.
+    """
+
+    stiffness: float
+    direction: FloatArray
+
+
+@dataclass(frozen=True)
+class JointDefinition:
+    """What is done with a model.
+
+    contacts: pairs of surfaces, at least one.
+    held (n_nodes, 3): displacements that are 0.
+    load: harmonic load of 1 N.
+    responses: by name.
+    cut: cut faces; None where the structure is no cyclic sector.
+    along (3,): direction near the first tangents. None for the axis of rotation or of the cyclic structure, else z.
+    retainer: None for none.
+    ties: surfaces that are always glued.
+    pairs: pairs of the contacts in another order or with other frames than `build_contact_pairs` gives them.
+    """
+
+    contacts: tuple[ContactSurfaces, ...]
+    held: BoolArray
+    load: SetMotion
+    responses: Mapping[str, SetMotion]
+    cut: CutFaces | None = None
+    along: FloatArray | None = None
+    retainer: Retainer | None = None
+    ties: tuple[ContactSurfaces, ...] = ()
+    pairs: ContactPairs | None = None
+
+
+@dataclass(frozen=True)
+class ReductionOptions:
+    """Options of a reduction.
+
+    nodal_diameter: of the travelling wave that excites.
+    n_modes: number of stuck modes.
+    loss_factor: exact at the first glued frequency of this nodal diameter.
+    """
+
+    nodal_diameter: int = 0
+    n_modes: int = 20
+    loss_factor: float = 1e-3
+
+
+@dataclass(frozen=True)
+class ModelSummary:
+    """Values for a user to check.
+
+    mass: kg.
+    centre (3,), extent (3,): m.
+    n_dofs: number of displacements that are not held.
+    glued_frequencies: of the glued structure, Hz, by nodal diameter.
+    """
+
+    mass: float
+    centre: FloatArray
+    extent: FloatArray
+    n_dofs: int
+    glued_frequencies: Mapping[int, FloatArray] = field(default_factory=dict)

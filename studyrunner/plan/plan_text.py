@@ -1,0 +1,127 @@
+"""Text of `--plan`: tasks, shared histories with reasons, estimated time and memory."""
+
+from __future__ import annotations
+
+import math
+
+from studyrunner.plan.estimate import (
+    ADAPTIVE_STEPS,
+    AUTOMATIC_HARMONICS,
+    COMPILE_SECONDS,
+    ITERATIONS_A_STEP,
+    ITERATIONS_AN_ADAPTIVE_STEP,
+    ITERATIONS_TO_A_FINAL_STATE,
+    memory_a_rank,
+    seconds_an_iteration,
+)
+from studyrunner.plan.tasks import TaskPlan
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.variables import loop_numbers
+from studyrunner.study.study import AUTO, Study
+from studyrunner.system.progress import count, format_seconds
+from studyrunner.user_error import show_text
+from studyrunner.variables import ASKED, KEPT, SCENE
+
+
+def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float = 0.0) -> str:
+    """The plan of a study in lines.
+
+    built_with: memory for building the scene, bytes. prepared_in: CPU time from the start of the process until the
+    scene is built, s; a run needs this time, too.
+    """
+    marches = [task for line in plan.marches for task in line]
+    n_tasks = len(plan.branches) + len(marches)
+    n_values = _result_values(study, facts, plan.n_points)
+    shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
+    contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
+    n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
+    n_along = len(plan.branches) - n_ramps
+    ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
+    ways += [f"{count(n_ramps, 'ramp')} of the excitation"] if n_ramps else []
+    branches = " and ".join(ways)
+    left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or [
+        "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
+    ]
+    size = n_values * 8 / 1e6
+    memory = memory_a_rank(plan.n_unknowns, n_values, AUTO in study.harmonics, built_with) / 1e9
+    rows = [
+        ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
+        ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
+        ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
+        ("cycles", _cycles(study)),
+        ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
+        ("solver", _solver(study, facts)),
+        ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
+        *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
+        ("time", f"{_about(plan, prepared_in)}, to a factor of two, if every point wears;"),
+        ("", _range(plan)),
+        ("assumed", _assumed(study, plan)),
+        ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
+    ]
+    return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
+
+
+def _cycles(study: Study) -> str:
+    if study.to_the_end:
+        kept = f"{len(study.cycles_kept)} states are kept, spaced evenly in worn volume and cycles"
+        return f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest; {kept}"
+    return f"{study.cycles_kept[-1]:g}, of which {count(len(study.cycles_kept), 'count is', 'counts are')} kept"
+
+
+def _assumed(study: Study, plan: TaskPlan) -> str:
+    """Assumptions of the estimated time."""
+    milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
+    said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
+    if "final" in study.axes.scheme:
+        said += f", final {ITERATIONS_TO_A_FINAL_STATE} in all where it needs no march"
+    if "adaptive" in study.axes.scheme:
+        said += f", adaptive {ADAPTIVE_STEPS} steps of {ITERATIONS_AN_ADAPTIVE_STEP}"
+    return f"{said}, none where nothing slips; a first run compiles for {COMPILE_SECONDS} s more"
+
+
+def _solver(study: Study, facts: SceneFacts) -> str:
+    """Settings of the solver, and the largest number of automatic harmonics in this scene."""
+    values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
+    if AUTO in (*study.harmonics, *study.samples) or {"adaptive", "final"} & set(study.axes.scheme):
+        values["rtol"] = study.rtol
+    shown = [f"{key} {' or '.join(map(_setting, items))}" for key, items in values.items()]
+    if AUTO in study.harmonics and facts.largest_harmonics is not None:
+        shown[0] += f" (at most {facts.largest_harmonics}, for which the scene holds the nodal diameters)"
+    return ", ".join(shown)
+
+
+def _setting(value: float | str) -> str:
+    return "automatic" if value == AUTO else f"{value:g}"
+
+
+def _if_automatic(study: Study) -> str:
+    return f", with {AUTOMATIC_HARMONICS} for automatic harmonics" if AUTO in study.harmonics else ""
+
+
+def _range(plan: TaskPlan) -> str:
+    """What makes the time uncertain: how many points wear, and how often the joint jumps."""
+    starts = format_seconds(sum(branch.cost for branch in plan.branches))
+    return (
+        f"{starts} of it for the start states; a history in which nothing slips takes none, one in which the joint"
+        " jumps up to five times as long"
+    )
+
+
+def _about(plan: TaskPlan, prepared_in: float) -> str:
+    """Estimated time on one rank and on two; a branch and a history from it cannot be computed at the same time."""
+    longest = max(
+        branch.cost + max((task.cost for task in line), default=0.0)
+        for branch, line in zip(plan.branches, plan.marches, strict=True)
+    )
+    one, two = (format_seconds(prepared_in + seconds) for seconds in (plan.cost, max(longest, plan.cost / 2.0)))
+    return f"about {one} on one rank, {two} on two"
+
+
+def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
+    """Number of values in the result, without coordinates, natural frequencies and mesh."""
+    sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    names = study.outputs.variables
+    asked = [ASKED[name] for name in names if name in ASKED]
+    asked.extend(SCENE["exact"].values() if "exact" in names else ())
+    each = sum(math.prod(sizes[name] for name in entry.dimensions) for entry in asked)
+    return n_points * (len(KEPT) + each + loop_numbers(study))

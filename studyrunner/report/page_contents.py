@@ -1,0 +1,56 @@
+"""Figures and tables of the report, in the order of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from studyrunner.report.drawing import Drawing, Missing, Table, style
+from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.figures.loops import draw_loops
+from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
+from studyrunner.report.figures.response import draw_responses
+from studyrunner.report.figures.sector import draw_sector
+from studyrunner.report.figures.volume import draw_volumes
+from studyrunner.report.precision.comparison import study_precision
+from studyrunner.report.precision.figures import draw_precision
+from studyrunner.report.reading.result import Result
+from studyrunner.report.root.figures import draw_root
+from studyrunner.report.trends.figures import draw_trends
+
+Item = Drawing | Missing | Table
+_Part = Callable[[Result], Iterator[Item]]
+
+
+def draw_report(result: Result) -> Iterator[Item]:
+    """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
+
+    Where no point holds a state, the results are left out with a single sentence.
+    """
+    of_results: tuple[_Part, ...] = (draw_trends, draw_responses, draw_volumes, draw_root, draw_flanks, draw_loops)
+    if not result.held.any():
+        of_results = (_tell_nothing,)
+    parts = (
+        draw_outcomes,
+        draw_sector,
+        *of_results,
+        list_branches,
+        list_stability,
+        draw_certificates,
+        _draw_precision,
+    )
+    for part in parts:
+        # The style is that of the whole process: it is not left on while the caller has the word.
+        with style():
+            items = list(part(result))
+        yield from items
+
+
+def _draw_precision(result: Result) -> Iterator[Item]:
+    """Error against run time, where the axes of the study are settings of the solver."""
+    precision = study_precision(result)
+    if precision is not None:
+        yield from draw_precision(precision)
+
+
+def _tell_nothing(_result: Result) -> Iterator[Missing]:
+    yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")

@@ -1,0 +1,282 @@
+"""Schema check of the result file that the report reads: known variables of the right shape and type, nothing else.
+
+Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
+at most the length of a label. Variables that the report does not draw are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import xarray as xr
+
+from studyrunner.study.toml_text import NoTomlError, read_toml
+from studyrunner.user_error import UserError, Verbatim, show_text
+from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, COUNTS, KEPT, LOOPS, SCENE, Variable
+
+MOST_POINTS = 10**6
+"""Largest number of points of a study."""
+
+_MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
+_LARGEST_READ = 2**24  # bytes
+_LARGEST_NUMBER = 1e30
+_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "cycle_count", *CERTIFICATE)
+_MOST_NAMES = 2**20  # values along any dimension
+_LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
+_DEEPEST = 3  # of what is nested in a study
+_INTEGERS = 2.0**63
+_REMEDY = "give a result file of run-study that is whole"
+
+_WITHOUT_AXES = {name: entry for table in ("mesh", "natural_frequency") for name, entry in SCENE[table].items()}
+_WITH_AXES = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
+_OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
+_ATTRIBUTES = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": _LONGEST_TEXT}
+_TEXTS = ("scheme", "sweep", "response", "component")
+_NEEDED = ("outcome", "cycle", "contact")
+
+
+def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
+    """Variables of a file that the report knows. Only coordinates, texts and the mesh are read.
+
+    Parameters
+    ----------
+    dataset
+        The opened file.
+    source
+        Name of the file for the user.
+
+    Raises
+    ------
+    UserError
+        Where a needed variable is missing or has a wrong shape or type.
+    """
+    lacking = [name for name in _NEEDED if name not in dataset.variables]
+    if lacking:
+        raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
+    axes = tuple(map(str, dataset["outcome"].dims))
+    if not math.prod(dataset["outcome"].shape):
+        raise UserError(source, "OUT.nc", None, f"holds no point; {_REMEDY}")
+    try:
+        _check_sizes(dataset, axes)
+        kept = {name: _check_coordinate(dataset, name) for name in _coordinates(dataset, axes)}
+        for name, entry in _WITH_AXES.items():
+            if name in dataset.variables:
+                kept[name] = _check_variable(dataset, name, entry, (*axes, *entry.dimensions))
+        for name, entry in (_WITHOUT_AXES | _OF_CONTACTS).items():
+            if name in dataset.variables:
+                kept[name] = _check_variable(dataset, name, entry, entry.dimensions)
+        _check_values(kept)
+    except _WrongError as wrong:
+        raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
+    names = set(_OF_CONTACTS) | set(_coordinates(dataset, axes))
+    checked = xr.Dataset(
+        {name: variable for name, variable in kept.items() if name not in names},
+        {name: variable for name, variable in kept.items() if name in names},
+        {str(name): _clean(value, _limit(str(name))) for name, value in dataset.attrs.items()},
+    )
+    checked.set_close(dataset.close)
+    study_tables(checked.attrs, source)
+    return checked
+
+
+def check_numbers(dataset: xr.Dataset, source: str) -> None:
+    """Looks for numbers that are too large to be drawn. NaN is allowed.
+
+    Variables that are too large to be read as a whole are not tested.
+
+    Raises
+    ------
+    UserError
+        Where there is such a number.
+    """
+    # a final state that was found without slow time comes after any number of cycles
+    infinite = (*_INFINITE, "last_cycle") if "cycle_count" in dataset.variables else _INFINITE
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
+            sizes = np.abs(variable.values)
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (name not in infinite))]
+            if wrong.size:
+                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
+
+
+@contextmanager
+def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
+    """Turns errors of the libraries about a damaged file into UserError. source: name of the file for the user.
+
+    every: whether all errors are turned; for blocks that only read.
+    """
+    try:
+        yield
+    except UserError:
+        raise
+    except Exception as error:
+        if every or (isinstance(error, OSError | RuntimeError) and "NetCDF:" in str(error)):
+            raise UserError(source, "the file", Verbatim("damaged"), _REMEDY) from error
+        raise
+
+
+def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
+    """The effective study of a file, by table; empty where it is no TOML.
+
+    Numbers are limited, texts are cleaned, and deeply nested values are left out.
+
+    Raises
+    ------
+    UserError
+        Where reading the study would do harm.
+    """
+    text = str(attributes.get("study", ""))
+    try:
+        tables = read_toml(text.encode("utf-8", "replace"), source)
+    except NoTomlError:
+        return {}
+    except UserError as error:
+        raise UserError(source, "the attribute study", None, error.remedy) from None
+    plain = {name: _plain(table, _DEEPEST) for name, table in tables.items()}
+    return {name: table for name, table in plain.items() if isinstance(table, dict)}
+
+
+class _WrongError(Exception):
+    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
+
+    def __init__(self, name: str, found: str) -> None:
+        super().__init__(name, found)
+        self.name = name
+        self.found = found
+
+
+def _coordinates(dataset: xr.Dataset, axes: Sequence[str]) -> list[str]:
+    """Names of the coordinates of the dimensions."""
+    others = (name for name, entry in COORDINATES.items() if not entry.dimensions and name not in axes)
+    return [*axes, *(name for name in others if name in dataset.variables and name in dataset.dims)]
+
+
+def _check_sizes(dataset: xr.Dataset, axes: Sequence[str]) -> None:
+    if not all(name.isidentifier() and len(name) <= _LONGEST_NAME for name in axes):
+        raise _WrongError("outcome", "axes with unusual names")
+    sizes = {str(name): size for name, size in dataset.sizes.items()}
+    for name in (*axes, "cycle", "contact"):
+        if not sizes.get(name, 0):
+            raise _WrongError(name, "no values")
+    for name in sizes:
+        if (name in COORDINATES or name in axes) and sizes[name] > _MOST_NAMES:
+            raise _WrongError(name, f"{sizes[name]} values")
+    n_points = math.prod(sizes[name] for name in axes)
+    n_values = n_points * sizes["cycle"] * sizes.get("response", 1)
+    if n_points > MOST_POINTS or n_values > _MOST_VALUES:
+        raise _WrongError("outcome", f"{n_points} points, {sizes['cycle']} cycle counts")
+
+
+def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
+    """Values along the dimension of this name: finite numbers, or texts."""
+    if name not in dataset.variables:
+        raise _WrongError(name, "no values")
+    variable = dataset.variables[name]
+    if variable.dims != (name,):
+        raise _WrongError(name, f"dimensions {variable.dims}")
+    if variable.dtype.kind not in "iuf":
+        texts = _texts(variable, name)
+        if name in COORDINATES and name not in _TEXTS and not all(map(_is_choice, texts.values.tolist())):
+            raise _WrongError(name, "texts in place of numbers")
+        return texts
+    if name in ("scheme", "sweep"):
+        raise _WrongError(name, "numbers in place of words")
+    if not np.isfinite(variable.values).all():
+        raise _WrongError(name, "a value that is no finite number")
+    return xr.Variable((name,), variable.values, _attributes(variable))
+
+
+def _is_choice(text: str) -> bool:
+    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
+    try:
+        return text == "auto" or math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:
+    """The variable, unread but for texts."""
+    variable = dataset.variables[name]
+    if variable.dims != dimensions:
+        raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
+    if entry.is_text or entry.dtype == "str" or name == "contact_surface":
+        return _texts(variable, name)
+    if variable.dtype.kind not in ("iuf" if entry.dtype.startswith("float") else "iu"):
+        raise _WrongError(name, f"type {variable.dtype}")
+    variable = variable.copy(deep=False)
+    variable.attrs = _attributes(variable)
+    return variable
+
+
+def _check_values(kept: Mapping[str, xr.Variable]) -> None:
+    """Tests the values that lead to other values: cycles, pairs, flags and mesh."""
+    cycles = kept["cycle"].values
+    if cycles.dtype.kind not in "iuf" or cycles[0] < 0 or (np.diff(cycles) <= 0).any():
+        raise _WrongError("cycle", "no counts in ascending order")
+    pairs = kept["contact"].values
+    if pairs.dtype.kind not in "iu" or len(set(pairs.tolist())) < pairs.size:
+        raise _WrongError("contact", "no whole numbers that differ")
+    flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
+    if flags.dtype.kind not in "iu":
+        raise _WrongError("outcome:flag_values", "no whole numbers")
+    if not all(np.isfinite(kept[name].values).all() for name in kept if name in ("mesh_x", "mesh_y", "mesh_z")):
+        raise _WrongError("mesh_x", "no finite number, here or beside it")
+    if "mesh_quad" in kept:
+        n_nodes = min((kept[f"mesh_{axis}"].size for axis in "xyz" if f"mesh_{axis}" in kept), default=0)
+        quad = kept["mesh_quad"]
+        if quad.size > _MOST_VALUES or ((quad.values < 0) | (quad.values >= n_nodes)).any():
+            raise _WrongError("mesh_quad", "nodes that there are not")
+
+
+def _texts(variable: xr.Variable, name: str) -> xr.Variable:
+    if variable.dtype.kind not in "OSU" or variable.size > _MOST_NAMES:
+        raise _WrongError(name, f"type {variable.dtype} of shape {variable.shape}")
+    texts = [_clean(each, _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME) for each in variable.values.flat]
+    values = np.array(texts, dtype=np.str_).reshape(variable.shape)
+    return xr.Variable(variable.dims, values, _attributes(variable))
+
+
+def _attributes(variable: xr.Variable) -> dict[str, object]:
+    """Attributes that the report reads."""
+    kept: dict[str, object] = {}
+    for name, longest in _ATTRIBUTES.items():
+        if name in variable.attrs:
+            kept[name] = _clean(variable.attrs[name], longest)
+    if "sentences" in variable.attrs:
+        lines = str(variable.attrs["sentences"])[:_LONGEST_TEXT].splitlines()
+        kept["sentences"] = "\n".join(_clean(line, _LONGEST_SENTENCE) for line in lines)
+    if "flag_values" in variable.attrs:
+        kept["flag_values"] = variable.attrs["flag_values"]
+    return kept
+
+
+def _limit(name: str) -> int | None:
+    """Largest number of characters of an attribute; None where the attribute has several lines."""
+    return None if name in ("study", "certificate_summary") else _LONGEST_SENTENCE
+
+
+def _clean(value: object, longest: int | None) -> str:
+    """Text without markup and control characters. longest: number of characters; None for a text of many lines."""
+    text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
+    if longest is None:
+        return show_text(text)
+    text = show_text(" ".join(text[: 2 * longest].split()))
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def _plain(value: object, deepest: int) -> object:
+    """A value of a study for text and arithmetic; None where it is nested too deeply."""
+    if isinstance(value, bool | float):
+        return value
+    if isinstance(value, int):
+        return value if abs(value) < _INTEGERS else math.copysign(math.inf, value)
+    if isinstance(value, dict | list) and deepest == 0:
+        return None
+    if isinstance(value, dict):
+        return {_clean(name, _LONGEST_NAME): _plain(item, deepest - 1) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item, deepest - 1) for item in value]
+    return _clean(value, _LONGEST_NAME)

@@ -1,0 +1,106 @@
+"""The study of a result file, with the information that a repeated run needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.sandboxed_read import check_result_readable, check_scene_readable, is_hdf5
+from studies.scene_error import SceneError
+from studies.scene_layout import ORIGIN
+from studyrunner.user_error import UserError, Verbatim
+
+if TYPE_CHECKING:
+    import h5py
+
+SCENE_GROUP = "scene"
+"""Group of a result file with the contents of a scene file."""
+
+_ATTRIBUTES = ("study", "scene_sha256", "solver_digest", "versions")
+
+
+@dataclass(frozen=True)
+class Archived:
+    """Attributes of a result file.
+
+    study: the effective study, TOML.
+    scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of packages; empty where unknown.
+    holds_scene: whether the scene is in the group SCENE_GROUP.
+    scene: the table [scene] of the study.
+    """
+
+    study: str
+    scene_sha256: str
+    solver_digest: str
+    versions: str
+    holds_scene: bool
+    scene: Mapping[str, object] = field(default_factory=dict)
+
+    def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
+        """Reasons why a result that is computed now may have other numbers, as lines."""
+        lines = []
+        if self.scene_sha256 != scene_sha256:
+            lines.append(
+                f"its scene_sha256 is {self.scene_sha256[:12] or 'missing'}, that of the scene built now"
+                f" {scene_sha256[:12]}: another scene, whose results differ"
+            )
+        if self.solver_digest != solver_digest:
+            lines.append(
+                f"computed by another solver ({self.versions or 'unknown'}; now {versions}): numbers may differ"
+            )
+        return tuple(lines)
+
+
+@contextmanager
+def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
+    """What is wrong with a result file, called `name` by the user, becomes UserError. prefix: of the key at fault."""
+    try:
+        yield
+    except SceneError as error:
+        where = "the file" if error.key == "model" else prefix + error.key
+        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
+        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+
+
+def read_archived(path: Path, name: str) -> Archived:
+    """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
+    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
+
+    with _user_errors(name, "the attribute "):
+        check_scene_readable(path, SCENE_GROUP, (*_ATTRIBUTES, *ORIGIN))
+        with open_hdf5(path, LARGEST_RESULT) as file:
+            found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
+            if not found["study"]:
+                remedy = "missing: give a study file (TOML) or a result file of run-study"
+                raise UserError(name, "the attribute study", None, remedy)
+            study, scene_sha256, solver_digest, versions = found.values()
+            return Archived(study, scene_sha256, solver_digest, versions, holds_scene=SCENE_GROUP in file)
+
+
+def check_result_file(path: Path, name: str) -> None:
+    """Raises UserError where a file that the user calls `name` is no result file or could do harm."""
+    with _user_errors(name):
+        if not path.exists():
+            raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
+        if not path.is_file() or not is_hdf5(path):
+            raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
+        check_result_readable(path)
+
+
+def _read_text(file: h5py.File, name: str) -> str:
+    from studies.guards.hdf5_guard import read_attribute
+
+    value = read_attribute(file, name)
+    if value is None:
+        return ""
+    text = value.item()
+    if isinstance(text, bytes):
+        text = text.decode("utf-8")
+    if not isinstance(text, str):
+        raise SceneError(name, str(value), "give a text")
+    return text

@@ -1,0 +1,225 @@
+"""Result files that were made to do harm: one sentence and status 2, or a report that shows text as text."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+import pytest
+
+from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
+from studyrunner.report.reading.result import open_for_report
+from studyrunner.report.reading.schema_check import check_numbers
+from studyrunner.user_error import UserError
+from tests.studyrunner.own_time import Stopwatch
+from tests.studyrunner.reading_process import ReadingProcess
+from tests.studyrunner.report.page_cases import build_file
+
+pytestmark = pytest.mark.usefixtures("reader")
+
+SECONDS = 10.0
+MARKUP = "$\\bad{$ <b>bold</b> [red]&amp;"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "whole.nc"
+    build_file(loops=(0,)).to_netcdf(path)
+    return path
+
+
+@pytest.fixture
+def folder(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copy(whole, tmp_path / "out.nc")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def attribute(name: str, value: object, variable: str = "") -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        (file[variable] if variable else file).attrs[name] = value
+
+    return change
+
+
+def study(text: str) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file.attrs["study"]
+        file.create_dataset("text", data=0).attrs["x"] = 0
+        del file["text"]
+        file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
+
+    return change
+
+
+def dimension_list(value: object) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file["worn_volume"].attrs["DIMENSION_LIST"]
+        if value is not None:
+            file["worn_volume"].attrs["DIMENSION_LIST"] = value
+
+    return change
+
+
+def short_dimension_list(file: h5py.File) -> None:
+    attributes = file["worn_volume"].attrs
+    rows = attributes["DIMENSION_LIST"][:2]
+    del attributes["DIMENSION_LIST"]
+    attributes.create("DIMENSION_LIST", rows, dtype=h5py.vlen_dtype(h5py.ref_dtype))
+
+
+def dimension_of_no_scale(file: h5py.File) -> None:
+    attributes = file["worn_volume"].attrs
+    rows = attributes["DIMENSION_LIST"]
+    rows[0] = np.array([file["worn_volume"].ref], dtype=h5py.ref_dtype)
+    attributes["DIMENSION_LIST"] = rows
+
+
+def values(name: str, place: object, value: float) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file[name][place] = value
+
+    return change
+
+
+def other_kind(name: str, content: object) -> Callable[[h5py.File], None]:
+    """A variable of another type, its dimensions as before."""
+
+    def change(file: h5py.File) -> None:
+        old = file[name]
+        scales = [dict(dimension.items()) for dimension in old.dims]
+        attributes = {key: old.attrs[key] for key in ("_Netcdf4Coordinates",) if key in old.attrs}
+        shape = old.shape
+        del file[name]
+        new = file.create_dataset(name, data=np.broadcast_to(np.asarray(content), shape))
+        new.attrs.update(attributes)
+        for number, found in enumerate(scales):
+            for scale in found.values():
+                new.dims[number].attach_scale(scale)
+
+    return change
+
+
+REFUSED = {
+    "study of a hundred thousand parts": study(".".join(["a"] * 100_000) + " = 1"),
+    "study that is nested deeply": study("a = " + "[" * 50_000),
+    "study with a number of 6000 digits": study("a = " + "9" * 6000),
+    "dimension list of a number": dimension_list(1),
+    "dimension list of text": dimension_list("frequency"),
+    "short dimension list": short_dimension_list,
+    "dimension without a scale": dimension_of_no_scale,
+    "number of a dimension as text": attribute("_Netcdf4Dimid", "first", "frequency"),
+    "coordinates as text": attribute("_Netcdf4Coordinates", "first", "worn_volume"),
+    "scale as text": attribute("scale_factor", "x", "worn_volume"),
+    "flags as text": attribute("flag_values", "0 1", "outcome"),
+    "cycles that do not rise": values("cycle", 1, 1e9),
+    "a frequency that is none": values("frequency", 0, np.nan),
+    "a worn volume of 1e308": values("worn_volume", ..., 1e308),
+    "an infinite pressure": values("mean_pressure", ..., np.inf),
+    "an infinite last cycle": values("last_cycle", ..., np.inf),
+    "outcome of floating numbers": other_kind("outcome", 0.5),
+    "worn volume of complex numbers": other_kind("worn_volume", 1j),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_in_a_sentence(
+    case: str, folder: Path, capsys: pytest.CaptureFixture[str], reader: ReadingProcess
+) -> None:
+    with h5py.File("out.nc", "r+") as file:
+        REFUSED[case](file)
+    watch, waited = Stopwatch(), reader.waited
+    assert main(["out.nc"]) == BAD_INPUT
+    assert watch.seconds(reader.waited - waited) < SECONDS
+    said = capsys.readouterr()
+    assert said.out == ""
+    (line,) = said.err.splitlines()
+    assert line.startswith("study-report: out.nc: ")
+    assert line.isprintable()
+    assert len(line) < 1000
+    assert not (folder / "out-report").exists()
+    with pytest.raises(UserError, match="give"):
+        check_numbers(open_for_report("out.nc").dataset, "out.nc")
+
+
+@pytest.mark.slow
+def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of responses and surfaces, in figures, in the page, and where the picture is text as well."""
+    monkeypatch.chdir(tmp_path)
+    made = build_file(responses=(MARKUP, "_hidden"), surfaces=[MARKUP] * 12 + ["\x1b[2J\x01 b"] * 12, loops=(0,))
+    made.attrs["title"] = MARKUP + "\x07"
+    made["worn_volume"].attrs["long_name"] = MARKUP
+    made.to_netcdf("out.nc")
+    assert main(["out.nc"]) == WRITTEN
+    pictures = list(Path("out-report").glob("*.svg"))
+    assert len(pictures) > 5
+    drawn = "".join(" ".join(ElementTree.parse(path).getroot().itertext()) for path in pictures)
+    assert "\\bad{$ <b>bold</b>" in drawn
+    assert "\\x1b[2J\\x01 b" in drawn
+    page = Path("out-report/index.html").read_text(encoding="utf-8")
+    page = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+    assert "<b>bold" not in page
+    assert not set("\x1b\x07\x01") & set(page)
+
+
+@pytest.mark.parametrize("text", ["1.5.2", "1e999", "-", "nan"])
+def test_choices_are_numbers_or_auto(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    build_file(axes={"frequency": (190.0, 191.0), "harmonics": ("auto", "3", text)}).to_netcdf("out.nc")
+    assert main(["out.nc"]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("study-report: out.nc: harmonics = texts in place of numbers")
+
+
+@pytest.mark.slow
+def test_long_names_are_cut(folder: Path) -> None:
+    with h5py.File("out.nc", "r+") as file:
+        file["response"][0] = "x" * 1_000_000
+        file.attrs["title"] = "y" * 60_000
+    watch = Stopwatch()
+    assert main(["out.nc"]) == WRITTEN
+    assert watch.seconds(0.0) < 60.0
+    assert "x" * 1000 not in Path("out-report/index.html").read_text(encoding="utf-8")
+
+
+def test_what_is_not_known_stays_outside(folder: Path) -> None:
+    with h5py.File("out.nc", "r+") as file:
+        file.create_dataset("evil", data=np.ones(3))
+    result = open_for_report("out.nc")
+    with result.dataset:
+        assert "evil" not in result.dataset.variables
+        assert "worn_volume" in result.dataset.variables
+
+
+@pytest.mark.slow
+def test_the_name_of_the_file_is_text(folder: Path) -> None:
+    name = "\x1b[2J<b>.nc"
+    (folder / "out.nc").rename(name)
+    assert main([name, "-o", "report"]) == WRITTEN
+    assert "\\x1b[2J&lt;b&gt;.nc" in Path("report/index.html").read_text(encoding="utf-8")
+
+
+def test_numbers_that_are_damaged_where_they_are_large(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is not read beforehand shows its damage while it is drawn."""
+    made = build_file(
+        axes={"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}, cycles=range(160)
+    )
+    shape = made["wear_depth"].shape
+    encoding = {"wear_depth": {"zlib": True, "chunksizes": shape}}
+    made.to_netcdf("large.nc", encoding=encoding)
+    with h5py.File("large.nc") as file:
+        place = file["wear_depth"].id.get_chunk_info(0)
+        assert file["wear_depth"].size * 8 > 2**23
+    content = bytearray(Path("large.nc").read_bytes())
+    content[place.byte_offset + 100 : place.byte_offset + 200] = bytes(100)
+    Path("large.nc").write_bytes(content)
+    assert main(["large.nc"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "study-report: large.nc: the file = damaged: give a result file of run-study that is whole"
