@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
 
-from solver.accuracy.error_estimate import euler_error
+from solver.accuracy.error_estimate import Estimate, euler_error
+from solver.accuracy.period_events import left_out
 from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
-from solver.settings import Scheme
+from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.bdf2 import ZERO_STABLE
+from solver.wear.check import chosen_for_another
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps, ListedSteps
 from solver.wear.euler import euler_balance
 from solver.wear.options import WEAR as OPTIONS
-from solver.wear.state import Failure, WearState
+from solver.wear.state import Choice, Failure, WearState
 from solver.wear.step import Step
 from tests.solver.worn_slider import AREA, END, WEAR, begun
 
@@ -207,3 +210,30 @@ def test_the_next_state_is_extrapolated_where_that_is_nearer() -> None:
     astray = replace(first.state, change=(length, -100.0 * change))
     assert np.array_equal(work.predicted(astray, balance, 2000.0), now)
     assert np.array_equal(work.predicted(replace(astray, change=None), balance, 2000.0), now)
+
+
+@pytest.mark.parametrize(
+    ("harmonics", "share", "error", "anew"),
+    [
+        ("auto", 1.0, 0.8e-2, False),
+        # so much more is left out that the error may be above rtol
+        ("auto", 0.4, 0.8e-2, True),
+        ("auto", 0.4, 1e-4, False),
+        # so little that fewer harmonics may do
+        ("auto", 100.0, 0.8e-2, True),
+        # chosen for a joint in which nothing slips
+        ("auto", 1.0, 0.0, True),
+        # given ones stay
+        (5, 0.01, 0.8e-2, False),
+    ],
+)
+def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(
+    harmonics: int | Literal["auto"], share: float, error: float, anew: bool
+) -> None:
+    """share: what was left out of the force when harmonics were chosen, over what is now."""
+    work, state = begun()
+    work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
+    now = left_out(state.resolution.orders, state.point.evaluation)
+    assert 1e-4 < now < 0.5
+    choice = Choice(share * now, Estimate(error, error), accurate=True)
+    assert chosen_for_another(work, replace(state, choice=choice)) is anew
