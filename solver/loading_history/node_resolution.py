@@ -37,7 +37,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, effort: Effort)
     error = Level(case, joint, point).difference(better).times(ACCURACY.two_levels_safety).largest
     settings = case.settings
     least = 0.0 if fewest else ACCURACY.spare_fraction * ACCURACY.kept_fraction * settings.rtol
-    return bool(least <= error <= ACCURACY.aim * settings.rtol)
+    return bool(least <= error <= settings.rtol)
 
 
 def _moved(

@@ -62,9 +62,9 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="half of the width of all strips, m; default: somewhat more than the half-width of the worn
-                                              contact," " with an edge of strips at the edge of the stick zone; for a sliding stroke a study chooses it by the expected"
-        " wear, and without a study it is 1.5 times the half-width of the unworn contact",
+        description="half of the width of all strips, m; default: somewhat more than the half-width of the worn"
+        " contact, with an edge of strips at the edge of the stick zone; for a sliding stroke a study chooses it by the"
+        " expected wear, and without a study it is 1.5 times the half-width of the unworn contact",
     )
     depth: float | None = Field(
         None,
