@@ -33,7 +33,8 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
         return Outcome.SENSITIVE, "; ".join((_two_volumes(history, last, error, rtol), *remarks))
-    if history.cycles[last] >= history.inaccurate_from:
+    # the count of a final state is inf, which is what never comes, too
+    if math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
         said = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
         return Outcome.INACCURATE, "; ".join((said, *remarks))
@@ -55,9 +56,9 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
 
 def _remarks(history: WearHistory, count: float, slower: float) -> list[str]:
     """What else is to be said of a history that was computed up to a count of its own."""
-    if not count >= history.held_from:
-        return []
-    return [describe_hold(history.held_from / slower)]
+    if math.inf > history.held_from <= count:
+        return [describe_hold(history.held_from / slower)]
+    return []
 
 
 def describe_hold(cycle: float) -> str:

@@ -143,7 +143,9 @@ class Solutions:
         assert start.state is not None
         estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
         first = start.state
-        ended = self._run(integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate))
+        ended = self._run(
+            integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate), asked.end
+        )
         if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
             return ended
         state = ended.state
@@ -157,18 +159,19 @@ class Solutions:
         assert self.start.state is not None
         work, smooth = self._joint(), self.asked.scheme == "adaptive"
         ends = np.array(every_second(course.ends))
+        end = float(ends[-1]) if ends.size else 0.0
         resolutions = tuple((count, coarser(resolution)) for count, resolution in course.resolutions)
         integration = Integration(
             ListedSteps(ends, smooth),
             PlainCheck(resolutions),
-            AtCount(float(ends[-1]) if ends.size else 0.0),
+            AtCount(end),
             DenseOutput(work.area, self._compared(fine), smooth=smooth),
             lambda progress: self._save(integration, work, progress, fine),
             bounded=False,
             most_iterations=fine.iterations + WEAR.history_iterations,
         )
         limit = fine.state.step_limit
-        return self._run(integration, work, lambda: begin_reference(work, self.start, limit))
+        return self._run(integration, work, lambda: begin_reference(work, self.start, limit), end)
 
     def counts(self, fine: Ended) -> FloatArray:
         """Counts (n_output,) at which the history is read."""
@@ -197,8 +200,8 @@ class Solutions:
         work.effort.deadline = self.began + self.case.settings.time_limit
         return work
 
-    def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState]) -> Ended:
-        """An integration from its first state, or from where it was saved."""
+    def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
+        """An integration from its first state, or from where it was saved, to the count `end`; inf where this is open."""
         progress: Progress | Failure
         if self.saved is not None:
             work.effort.iterations, integration.output.taken = self.saved.iterations, self.saved.output
@@ -208,8 +211,8 @@ class Solutions:
         if isinstance(progress, Failure):
             return Ended(None, progress, integration.output.taken, work.effort.iterations)
         state, failure = integration.run(work, progress)
-        last, end = integration.output.last, self.asked.end
-        if failure.outcome is Outcome.CONVERGED and last is not None and math.isfinite(end) and not work.wears(state):
+        last, over = integration.output.last, state.cycle < end < math.inf and not work.wears(state)
+        if failure.outcome is Outcome.CONVERGED and last is not None and over:
             # nothing wears any more: the state holds for all later counts
             integration.output.add(end, last.report, last.rate, 0.0)
         return Ended(state, failure, integration.output.taken, work.effort.iterations)

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from solver.results.recorder import CERTIFIED
 
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.wear.output import CERTIFIED
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import march_wear
 

@@ -1,4 +1,4 @@
-"""What a Newton iteration, a slow-time step, a whole trajectory and a larger joint cost, as ratios in one process.
+"""What a Newton iteration, a slow-time step, a whole history and a larger joint cost, as ratios in one process.
 
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [sizes] [ranks] [start]
 

@@ -21,6 +21,7 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings, ToTheEnd
 from solver.wear.final_state.find import find_final_state
+from solver.wear.solutions import SlowTime
 from studies import build_scene
 from studies.scenes.closed_forms.hertz import (
     line_half_width,
@@ -157,7 +158,8 @@ def final_states(settings: SolverSettings) -> None:
         for direct in (True, True, False):
             began = time.process_time()
             if direct:
-                found.append(find_final_state(model, friction, start, per_pressure, end, settings))
+                asked = SlowTime(per_pressure, "adaptive", end)
+                found.append(find_final_state(model, friction, settings, start, asked))
             else:
                 found.append(march_from_start(model, friction, start, per_pressure, 1.0, "adaptive", end, settings))
             # the first one compiles

@@ -225,6 +225,7 @@ def march_wear(
     scheme: Scheme,
     cycles: FloatArray | ToTheEnd,
     settings: SolverSettings,
+    *,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
     **asked: Any,

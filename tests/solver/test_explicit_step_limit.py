@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from solver.results.oscillation import WearRates
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.packing import pack, unpack
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
+from solver.wear.rates import WearRates
 from tests.solver.models import branch_states, march_wear, scene
 
 STIFFNESS = 1e6  # N/m, of each pair towards the block
@@ -113,32 +114,32 @@ def test_the_limit_of_the_slider_is_that_of_differences_of_its_wear_rate() -> No
     ],
 )
 def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscillates: bool) -> None:
-    followed = WearRates(2)
+    followed = WearRates.none(2)
     for rate in rates:
-        followed.add(np.array([1.0, rate]))
+        followed = followed.after(np.array([1.0, rate]))
     assert followed.oscillate() is oscillates is oscillation_of_all(rates)
     assert not followed.oscillate(10.0)
 
 
 @pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
 def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, oscillates: bool) -> None:
-    followed = WearRates(3)
+    followed = WearRates.none(3)
     for step in range(8):
         pair = share * (1.0 + step % 2)
-        followed.add(np.array([pair, 2.0, 2.0 + pair]))
+        followed = followed.after(np.array([pair, 2.0, 2.0 + pair]))
     assert followed.oscillate() is oscillates
 
 
 @settings(max_examples=200)
 @given(st.lists(st.sampled_from([0.0, 1.0, 1.0005, 1.5, 1.99, 2.0, 3.0, 1e4]), max_size=14), st.integers(0, 14))
-def test_oscillation_is_that_of_all_rates_together_also_when_carried_on(rates: list[float], cut: int) -> None:
-    followed = WearRates(1)
+def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates: list[float], cut: int) -> None:
+    followed = WearRates.none(1)
     for place, rate in enumerate(rates):
         if place == cut:
-            state, followed = followed.state_dict(), WearRates(1)
-            followed.load_state(state)
-        followed.add(np.array([rate]))
+            followed = unpack(pack(followed))
+        followed = followed.after(np.array([rate]))
     assert followed.oscillate() is oscillation_of_all(rates)
+    assert followed.largest[0] == max(rates, default=0.0)
 
 
 def oscillation_of_all(rates: Sequence[float]) -> bool:

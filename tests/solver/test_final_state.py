@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from solver.wear.trajectory import Trajectory
 
 from solver import march_wear
-from solver.contact.wear_law import WearLaw
+from solver.accuracy.error_estimate import NOTHING
+from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
@@ -21,10 +21,13 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.final_state.active_set import NoActiveSetError, wear_off
+from solver.wear.final_state.active_set import NoActiveSetError, WornOff, wear_off
 from solver.wear.final_state.cooperation import failure, work_slopes
 from solver.wear.final_state.find import find_final_state
 from solver.wear.options import WEAR
+from solver.wear.solutions import SlowTime
+from solver.wear.state import WearState
+from solver.wear.wearing_joint import WearingJoint
 from studies import build_scene
 from tests.solver.models import march_wear as march_from_start
 from tests.studies.half_space_twin import limit_depth
@@ -56,8 +59,18 @@ def unworn(case: str) -> tuple[ReducedModel, StartState]:
 
 @cache
 def found(case: str) -> WearHistory:
-    model, start = unworn(case)
-    return find_final_state(model, CASES[case][2], start, CASES[case][5], END, COARSE)
+    return directly(*unworn(case), CASES[case][2], CASES[case][5])
+
+
+def directly(
+    model: ReducedModel,
+    start: StartState,
+    friction: float,
+    wear: float,
+    law: WearLaw = ARCHARD,
+    settings: SolverSettings = COARSE,
+) -> WearHistory:
+    return find_final_state(model, friction, settings, start, SlowTime(wear, "adaptive", END, law=law))
 
 
 @cache
@@ -66,12 +79,17 @@ def marched(case: str) -> WearHistory:
     return march_from_start(model, CASES[case][2], start, CASES[case][5], 1.0, "adaptive", END, COARSE)
 
 
-def trajectory_of(case: str) -> Trajectory:
+def begun(case: str) -> tuple[WearingJoint, WearState]:
+    """The joint and its unworn state."""
     model, start = unworn(case)
+    assert start.state is not None
     built = build_case(model, CASES[case][2], start.penalty_omega, COARSE, start.resolution)
-    trajectory = Trajectory(built, start, CASES[case][5], "implicit")
-    assert trajectory.begin() is Outcome.CONVERGED
-    return trajectory
+    work = WearingJoint.of(built, start.state, CASES[case][5])
+    return work, work.begin(start.state, start.resolution, NOTHING, accurate=True)
+
+
+def worn_off(work: WearingJoint, state: WearState) -> WornOff:
+    return wear_off(work, state, state.depth, np.zeros(state.depth.size, bool), 1e-4)
 
 
 @pytest.mark.parametrize("case", ["cylinder", "slider", *SLOW])
@@ -109,7 +127,7 @@ def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing() -> None
     """Worn volume and outcome say the same, and no harmonics are added to find out what round-off wears."""
     model = build_scene("cylinder_on_flat", strips=60)
     ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", SolverSettings())
-    direct = find_final_state(model, 0.6, start, 1e-13, END, SolverSettings())
+    direct = directly(model, start, 0.6, 1e-13, settings=SolverSettings())
     assert direct.outcome is Outcome.CONVERGED
     assert direct.message == ""
     assert direct.wear_rate[-1] < 1e-9 * direct.wear_rate[0]
@@ -125,7 +143,7 @@ def test_a_spring_that_presses_is_relaxed_to_round_off() -> None:
 
 def test_no_wear_law_matters() -> None:
     model, start = unworn("cylinder")
-    other = find_final_state(model, 0.6, start, 3e-14, END, COARSE, law=WearLaw("energy"))
+    other = directly(model, start, 0.6, 3e-14, WearLaw("energy"))
     assert other.wear_depth[-1] == pytest.approx(found("cylinder").wear_depth[-1], rel=1e-6, abs=1e-15)
     assert other.wear_rate[0] == pytest.approx(0.6 * 0.3 * found("cylinder").wear_rate[0])
 
@@ -153,12 +171,10 @@ def test_where_residual_shear_matters_the_march_is_taken() -> None:
     direct = found("some slip")
     assert direct.final_method == "march"
     assert "residual shear makes the depths depend on the way" in direct.message
-    trajectory = trajectory_of("some slip")
-    unworn_depth = trajectory.point.evaluation.wear_depth
-    final = wear_off(trajectory, unworn_depth, np.zeros(unworn_depth.size, bool), 1e-4)
+    final = worn_off(*begun("some slip"))
     worn = direct.wear_depth[-1]
     assert np.array_equal(final.off, worn > 1e-2 * worn.max())
-    apart = np.abs(final.point.evaluation.wear_depth - worn).max() / worn.max()
+    apart = np.abs(final.state.depth - worn).max() / worn.max()
     assert 1e-3 < apart < 5e-2
 
 
@@ -167,17 +183,16 @@ def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:
     assert endless.outcome is Outcome.NO_FINAL_STATE
     assert endless.final_method == "march"
     assert "no active set: pairs slip whose normal force no wear changes" in endless.message
-    trajectory = trajectory_of("constant load")
     with pytest.raises(NoActiveSetError):
-        wear_off(trajectory, np.zeros(1), np.zeros(1, bool), 1e-4)
+        worn_off(*begun("constant load"))
 
 
 @pytest.mark.parametrize("case", ["cylinder", pytest.param("beside resonance", marks=pytest.mark.slow)])
 def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -> None:
-    trajectory = trajectory_of(case)
-    joint, at = trajectory.joint, trajectory.point.evaluation
+    work, state = begun(case)
+    joint, at = work.at(state), state.point.evaluation
     pairs = np.argsort(-at.slip_work)[:3]
-    slopes = work_slopes(joint, at, trajectory.wearing, JacobianSolver(), pairs)
+    slopes = work_slopes(joint, at, work.wearing, JacobianSolver(), pairs)
     step = 1e-5 * float(at.slip_work.max() / np.abs(slopes).max())
     for place, pair in enumerate(pairs):
         works = []
@@ -192,32 +207,29 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -
 
 
 def test_the_tests_of_cooperation_refuse_other_final_states() -> None:
-    trajectory = trajectory_of("cylinder")
-    before = trajectory.point
-    none = np.zeros(before.evaluation.wear_depth.size, bool)
-    final = wear_off(trajectory, before.evaluation.wear_depth, none, 1e-4)
-    assert failure(trajectory, before, final, 1e-4) == ""
+    work, before = begun("cylinder")
+    final = worn_off(work, before)
+    assert failure(work, before, final, 1e-4) == ""
     # pairs that slip are left out of the set
     fewer = final.off.copy()
     fewer[np.flatnonzero(final.off)[0]] = False
-    assert "wear that do not in the end" in failure(trajectory, before, replace(final, off=fewer), 1e-4)
+    assert "wear that do not in the end" in failure(work, before, replace(final, off=fewer), 1e-4)
     # pairs that stick are taken off
     more = np.ones_like(final.off)
-    assert "stick under pressure" in failure(trajectory, before, replace(final, off=more), 1e-4)
+    assert "stick under pressure" in failure(work, before, replace(final, off=more), 1e-4)
     # it stops short of the end
-    half = replace(final.point.evaluation, wear_depth=0.5 * final.point.evaluation.wear_depth)
-    short = replace(final, point=PathPoint(0.0, half, final.point.history))
-    assert "still wear" in failure(trajectory, before, short, 1e-4)
+    point = final.state.point
+    half = replace(point.evaluation, wear_depth=0.5 * point.evaluation.wear_depth)
+    short = replace(final, state=replace(final.state, point=PathPoint(0.0, half, point.history)))
+    assert "still wear" in failure(work, before, short, 1e-4)
 
 
 def test_what_others_take_of_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    trajectory = trajectory_of("cylinder")
-    before = trajectory.point
-    none = np.zeros(before.evaluation.wear_depth.size, bool)
-    final = wear_off(trajectory, before.evaluation.wear_depth, none, 1e-4)
+    work, before = begun("cylinder")
+    final = worn_off(work, before)
     # at least so much they would have to add
     monkeypatch.setattr("solver.wear.final_state.cooperation.WEAR", replace(WEAR, loss_of_rate=-10.0))
-    assert "takes that of others" in failure(trajectory, before, final, 1e-4)
+    assert "takes that of others" in failure(work, before, final, 1e-4)
 
 
 def test_the_front_door_takes_it_to_the_end_only() -> None:

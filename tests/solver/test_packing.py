@@ -1,4 +1,4 @@
-"""What a march and a sweep carry on survives being kept, and what is taken up again ends with the same numbers."""
+"""The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings
-from solver.wear import march
+from solver.wear import integrate
+from solver.wear.solutions import Saved
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
@@ -90,41 +91,48 @@ def from_every_stop(
     scheme: Scheme,
     end: float,
     settings: SolverSettings,
-) -> tuple[WearHistory, list[Packed]]:
-    """History, and the places at which it was kept: from each of them it has to end the same way."""
+) -> tuple[WearHistory, list[Saved]]:
+    """History, and the progress that was kept: from some of them it has to end the same way."""
     cycles = np.linspace(0.0, end, 5)
     kept: list[Packed] = []
     whole = march_wear(model, friction, start, wear, step, scheme, cycles, settings, keep=kept.append)
-    for progress in kept[:: max(1, len(kept) // MOST_STOPS)]:
-        again = march_wear(model, friction, start, wear, step, scheme, cycles, settings, resume=progress)
-        assert_same(again, whole)
-    return whole, kept
+    places = [unpack(progress) for progress in kept]
+    # within the history itself, and within its reference solution
+    own, reference = ([n for n, at in enumerate(places) if (at.fine is None) is alone] for alone in (True, False))
+    for found in (own, reference):
+        for n in found[:: max(1, len(found) // MOST_STOPS)]:
+            again = march_wear(model, friction, start, wear, step, scheme, cycles, settings, resume=kept[n])
+            assert_same(again, whole)
+    return whole, places
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("explicit", 800.0), ("adaptive", 1.0)])
-def test_a_march_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=8))
+def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=8))
     (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
     whole, kept = from_every_stop(dovetail(7), 0.5, start, 1.1e-11, step, scheme, 8e3, AUTO)
     assert whole.outcome is Outcome.CONVERGED
     assert whole.worn_volume[-1] > 0.0
-    assert len(kept) >= 3
+    assert sum(at.fine is None for at in kept) >= 3
+    assert sum(at.fine is not None for at in kept) >= 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
-def test_a_march_goes_on_before_and_behind_a_jump(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=30))
+def test_a_history_goes_on_before_and_behind_a_jump(
+    scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=30))
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, step, scheme, 1000.0, settings)
-    cycles = [unpack(progress)[2]["progress"]["cycle"] for progress in kept]
+    cycles = [at.progress.state.cycle for at in kept if at.fine is None]
     assert min(cycles) < whole.jump_cycle < max(cycles)
 
 
 @pytest.mark.slow
 def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(march, "WEAR", replace(march.WEAR, iterations_per_save=1))
+    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=1))
     monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 100)
     (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
     step = 1.2 * exact_limit()
@@ -132,7 +140,7 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
         seesaw(), 1e-4, start, SEESAW_WEAR, step, "explicit", 20.0 * step, SolverSettings(3, 128)
     )
     assert whole.oscillates
-    assert any(unpack(progress)[2]["rates"]["n_alternating"].max() in (1, 2) for progress in kept)
+    assert any(at.fine is None and at.progress.state.rates.n_alternating.max() in (1, 2) for at in kept)
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
-"""Marches that end at a wear: the count at which it is reached."""
+"""Histories that end at a wear: the count at which it is reached."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -10,16 +12,19 @@ from scipy.optimize import brentq
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import Scheme, WearTarget
-from tests.solver.models import march_wear
-from tests.solver.test_march import AREA, COARSE, END, FRICTION, WEAR, march, slider_start
+from tests.solver.worn_slider import AREA, CYCLES, END, march, rate_of_depth
 
-CYCLES = np.linspace(0.0, END, 9)
+STEP = 4000.0
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
 
 
-def march_until(target: WearTarget, scheme: Scheme = "adaptive", cycles: np.ndarray = CYCLES) -> WearHistory:
-    model, start = slider_start(COARSE)
-    return march_wear(model, FRICTION, start, WEAR, 1000.0, scheme, cycles, COARSE, until=target)
+def march_until(target: WearTarget, scheme: Scheme = "adaptive") -> WearHistory:
+    return march(STEP, scheme, until=target)
+
+
+@lru_cache
+def whole_history(scheme: Scheme = "adaptive") -> WearHistory:
+    return march(STEP, scheme)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -30,13 +35,11 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(quantity: str, sche
     found = march_until(target, scheme)
     assert found.outcome is Outcome.CONVERGED
     assert found.message == ""
-    # the same march, read at that very count
-    model, start = slider_start(COARSE)
-    counts = np.array([0.0, found.cycles_to_target, END])
-    read = march_wear(model, FRICTION, start, WEAR, 1000.0, scheme, counts, COARSE)
+    # the same history, read at that very count
+    read = march(STEP, scheme, np.array([0.0, found.cycles_to_target, END]))
     assert read.wear_depth[1, 0] == pytest.approx(depth, rel=1e-9)
     # it ends there, and what there is of it is that of the whole one
-    whole = march_wear(model, FRICTION, start, WEAR, 1000.0, scheme, CYCLES, COARSE)
+    whole = whole_history(scheme)
     reached = np.isfinite(found.worn_volume)
     assert 0 < reached.sum() < CYCLES.size
     assert reached[found.cycles_to_target >= CYCLES].all()
@@ -45,23 +48,21 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(quantity: str, sche
     assert found.newton_iterations < whole.newton_iterations
 
 
+@pytest.mark.slow
 def test_the_count_is_that_of_the_differential_equation() -> None:
-    fine = march(250.0, "implicit", np.linspace(0.0, END, 401))
-    depths = fine.wear_depth[:, 0]
-    rate = CubicSpline(depths, fine.wear_rate / AREA)
-    fine_depths = np.linspace(0.0, depths[-1], 4001)
+    rate = rate_of_depth()
+    fine_depths = np.linspace(0.0, rate.x[-1], 4001)
     # cycles over depth: the integral of 1 / rate
     spent = CubicSpline(fine_depths, 1.0 / rate(fine_depths)).antiderivative()
     target = 3.1e-5
     assert march_until(WearTarget("wear_depth", target)).cycles_to_target == pytest.approx(spent(target), rel=1e-2)
-    by_depth = brentq(lambda w: spent(w) - 0.5 * END, 0.0, depths[-1])
+    by_depth = brentq(lambda w: spent(w) - 0.5 * END, 0.0, rate.x[-1])
     assert march_until(WearTarget("wear_depth", by_depth)).cycles_to_target == pytest.approx(0.5 * END, rel=1e-2)
 
 
 def test_a_wear_that_is_not_reached_changes_nothing() -> None:
     far, none = march_until(WearTarget("wear_depth", 1.0)), march_until(WearTarget("worn_volume", 1e3))
-    model, start = slider_start(COARSE)
-    whole = march_wear(model, FRICTION, start, WEAR, 1000.0, "adaptive", CYCLES, COARSE)
+    whole = whole_history()
     for found in (far, none):
         assert np.isnan(found.cycles_to_target)
         assert np.array_equal(found.wear_depth, whole.wear_depth)
@@ -69,7 +70,6 @@ def test_a_wear_that_is_not_reached_changes_nothing() -> None:
 
 
 def test_adaptive_steps_beyond_the_end_do_not_count() -> None:
-    whole = march_until(WearTarget("wear_depth", 1.0))
-    just_beyond = 1.0001 * float(whole.wear_depth[-1, 0])
+    just_beyond = 1.0001 * float(whole_history().wear_depth[-1, 0])
     found = march_until(WearTarget("wear_depth", just_beyond))
     assert np.isnan(found.cycles_to_target)

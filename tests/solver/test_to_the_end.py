@@ -1,8 +1,7 @@
-"""Marches until nothing wears any more: where they end, what they keep, and joints that wear without end."""
+"""Histories until nothing wears any more: where they end, what they keep, and joints that wear without end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -10,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from solver.results.trail import TrailRecorder
 
 from solver import march_wear as march_from_model
 from solver.loading_history.start_states import follow_branch
@@ -21,6 +19,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
 from solver.wear.final_state.find import find_final_state
 from solver.wear.options import WEAR
+from solver.wear.solutions import SlowTime
 from studies import build_scene
 from tests.solver.models import march_wear
 from tests.studies.half_space_twin import limit_depth
@@ -92,29 +91,9 @@ def test_a_smaller_share_goes_nearer_to_the_end() -> None:
     assert left[0] < 0.1
 
 
-def test_what_is_left_out_of_many_steps_changes_little(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = worn(ToTheEnd(9))
-    monkeypatch.setattr(TrailRecorder, "_most", 24)
-    lengths: list[int] = []
-    thin: Callable[[TrailRecorder], None] = TrailRecorder._thin
-
-    def count(recorder: TrailRecorder) -> None:
-        thin(recorder)
-        lengths.append(len(recorder.steps))
-
-    monkeypatch.setattr(TrailRecorder, "_thin", count)
-    thinned = worn(ToTheEnd(9))
-    assert lengths
-    assert max(lengths) < 24
-    assert thinned.cycles[-1] == whole.cycles[-1]
-    assert thinned.cycles[1:] == pytest.approx(whole.cycles[1:], rel=1e-2)
-    assert thinned.wear_depth == pytest.approx(whole.wear_depth, abs=2e-3 * whole.wear_depth.max())
-    assert thinned.worn_volume_error == pytest.approx(whole.worn_volume_error, rel=0.5, abs=2e-3)
-
-
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
 def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.wear.march.WEAR", replace(WEAR, iterations_per_save=30))
+    monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR, iterations_per_save=30))
     kept: list[Packed] = []
     whole = worn(ToTheEnd(9), scheme, keep=kept.append)
     assert kept
@@ -187,7 +166,7 @@ def test_without_a_start_state_there_is_nothing() -> None:
     failed = replace(start, outcome=Outcome.START_FAILED, state=None)
     for found in (
         march_wear(model, 0.6, failed, PER_PRESSURE, 1000.0, "adaptive", ToTheEnd(3), COARSE),
-        find_final_state(model, 0.6, failed, PER_PRESSURE, ToTheEnd(3), COARSE),
+        find_final_state(model, 0.6, COARSE, failed, SlowTime(PER_PRESSURE, "adaptive", ToTheEnd(3))),
     ):
         assert found.outcome is Outcome.START_FAILED
         assert found.worn_volume.shape == (3,)

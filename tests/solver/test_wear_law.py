@@ -17,9 +17,9 @@ from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
-from tests.solver.test_march import AREA as PAIR_AREA
-from tests.solver.test_march import COARSE, END, FRICTION, march, slider_start
-from tests.solver.test_march import WEAR as COEFFICIENT
+from tests.solver.worn_slider import AREA as PAIR_AREA
+from tests.solver.worn_slider import COARSE, END, FRICTION, march, slider_start
+from tests.solver.worn_slider import WEAR as COEFFICIENT
 
 WEAR, AREA, WORK = 1.1e-11, np.array([1e-6, 2e-6, 4e-6]), np.array([0.1, 0.0, 0.3])
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")

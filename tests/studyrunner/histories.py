@@ -41,6 +41,7 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np
         stable=np.arange(n) < 2,
         worn_volume_error=0.03 * line,
         wear_depth_error=0.1 * pair,
+        reference_volume=1.5 * line,
         last_cycle=float(cycles[-1]),
         branch=2,
         fold_frequency=101.5,

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import xarray as xr
@@ -95,19 +96,19 @@ def test_what_the_solver_says_of_an_error_tells_which_it_was() -> None:
 
 
 def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the solver itself, whose march breaks off in its midst."""
-    from solver.wear import march
+    """With the solver itself, whose histories break off in their midst."""
+    from solver.wear.wearing_joint import WearingJoint
 
-    own, n_calls = march.Trajectory.check, 0
+    own, n_calls = WearingJoint.noted, 0
 
-    def check(self: march.Trajectory) -> object:
+    def noted(self: WearingJoint, *given: Any) -> object:
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
             raise MemoryError("no room for an array")
-        return own(self)
+        return own(self, *given)
 
-    monkeypatch.setattr(march.Trajectory, "check", check)
+    monkeypatch.setattr(WearingJoint, "noted", noted)
     assert main([*SMALL, "--set", "solver.harmonics=3", "--set", "solver.samples=32"]) == 0
     assert n_calls > 30
     assert (load().outcome == 0).all()

@@ -19,7 +19,9 @@ from solver.packing import pack
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution
-from studyrunner.evaluate import build_result, march
+from solver.wear.solutions import SlowTime
+from studyrunner.evaluate import integrate
+from studyrunner.history_result import build_result
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import ScaledHistory, march_counts, share_histories
 from studyrunner.plan.tasks import MarchTask, build_tasks
@@ -255,32 +257,25 @@ def test_histories_of_a_march_that_ended_early_are_results_all_the_same(
 
 
 @pytest.mark.parametrize(
-    ("above", "ended", "harmonics", "expected"),
+    ("first", "ended", "expected"),
     [
-        ([False, False, False, False, False], Outcome.INACCURATE, "auto", [6, 0, 0]),
-        ([False, False, False, False, True], Outcome.INACCURATE, "auto", [6, 0, 0]),
-        ([False, False, True, False, False], Outcome.INACCURATE, "auto", [6, 6, 0]),
-        ([True, False, False, False, False], Outcome.INACCURATE, "auto", [6, 6, 6]),
-        ([False, True, False, False, False], Outcome.MARCH_FAILED, "auto", [4, 0, 6]),
-        ([True, True, True, True, True], Outcome.CONVERGED, "auto", [0, 0, 0]),
-        ([True, True, True, True, True], Outcome.MARCH_FAILED, "3", [4, 0, 0]),
+        (10.0, Outcome.INACCURATE, [6, 0, 0]),
+        (5.0, Outcome.INACCURATE, [6, 0, 0]),
+        (4.0, Outcome.INACCURATE, [6, 6, 0]),
+        (0.0, Outcome.INACCURATE, [6, 6, 6]),
+        (3.0, Outcome.MARCH_FAILED, [4, 6, 0]),
+        (np.inf, Outcome.MARCH_FAILED, [4, 0, 0]),
     ],
 )
-def test_a_scaled_history_is_above_rtol_by_its_own_states(
-    above: list[bool], ended: Outcome, harmonics: str, expected: list[int]
-) -> None:
-    rates = np.where(above, 0.02, 0.005)
-    found = replace(history(COUNTS, ended), wear_rate_error=rates, response_error=np.full(5, np.nan))
-    task = shared_task(f"solver.harmonics={harmonics}", "solver.samples=64")
-    assert [build_result(task, found, place).outcome for place in range(3)] == expected
-
-
-def test_a_scaled_history_says_from_which_of_its_own_cycles_on() -> None:
-    rates = np.array([0.005, 0.005, 0.04, 0.04, 0.03])
-    found = replace(history(COUNTS, Outcome.INACCURATE), wear_rate_error=rates, message="of the march")
-    messages = [build_result(shared_task(), found, place).message for place in range(3)]
-    # 4 cycles of the march are 10 of the scaled history
-    assert messages == ["of the march", "from cycle 10 on the wear rate is known to 4 % only", ""]
+def test_a_scaled_history_is_inaccurate_by_its_own_counts(first: float, ended: Outcome, expected: list[int]) -> None:
+    found = replace(history(COUNTS, ended), inaccurate_from=first, inaccurate_in="wear rate", inaccurate_error=0.04)
+    results = [build_result(shared_task(), replace(found, message="of it"), place) for place in range(3)]
+    assert [result.outcome for result in results] == expected
+    assert results[0].message == "of it"
+    # 4 cycles of the integrated history are 10 of the second, 2 of them 10 of the third
+    for result, slower in zip(results[1:], (0.4, 0.2), strict=True):
+        said = f"from cycle {first / slower:.0f} on the wear rate is known to 4 % only"
+        assert result.message == (said if result.outcome else "")
 
 
 @pytest.mark.parametrize(
@@ -304,37 +299,27 @@ def test_a_scaled_history_is_sensitive_by_its_own_last_count() -> None:
     found = replace(history(COUNTS, Outcome.SENSITIVE), worn_volume_error=errors, message="of the march")
     results = [build_result(shared_task(), found, place) for place in range(3)]
     assert [result.outcome for result in results] == [15, 15, 0]
-    assert [result.message for result in results] == ["of the march", "the worn volume is known to 70 % only", ""]
+    said = "worn volume 2e+09 mm3, but 3e+09 mm3 with steps twice as long, fewer harmonics and a coarser sweep: "
+    assert [result.message for result in results] == ["of the march", said + "known to 70 % only", ""]
 
 
-def marched(
+def integrated(
     monkeypatch: pytest.MonkeyPatch, change: Callable[[WearHistory, float], WearHistory]
 ) -> tuple[list[MarchResult], list[tuple[float, list[float]]]]:
-    """Results of the shared task with a stand-in for the march; and wear coefficient and counts of all marches."""
+    """Results of the shared task with a stand-in for the solver; wear coefficient and counts of all integrations."""
     calls = []
 
-    def fake(
-        *arguments: object,
-        largest_depth: float | None,
-        loops: tuple[int, ...],
-        keep: object,
-        resume: object,
-        law: object,
-        until: object,
-    ) -> WearHistory:
-        wear, cycles = arguments[3], arguments[6]
-        assert isinstance(wear, float)
-        assert isinstance(cycles, np.ndarray)
-        calls.append((wear, cycles.tolist()))
-        return change(history(cycles.tolist()), wear)
+    def fake(model: object, friction: object, settings: object, start: object, asked: SlowTime, *_: object) -> object:
+        assert isinstance(asked.cycles, np.ndarray)
+        calls.append((asked.wear_coefficient, asked.cycles.tolist()))
+        return change(history(asked.cycles.tolist()), asked.wear_coefficient)
 
-    monkeypatch.setattr("solver.wear.march.march_wear", fake)
-    task = shared_task()
-    return list(march(None, 0.5, task, no_keep)), calls  # type: ignore[arg-type]
+    monkeypatch.setattr("solver.wear.history.integrate_wear", fake)
+    return list(integrate(None, 0.5, shared_task(), no_keep)), calls  # type: ignore[arg-type]
 
 
 def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, calls = marched(monkeypatch, lambda at, _: replace(at, oscillates=False))
+    found, calls = integrated(monkeypatch, lambda at, _: replace(at, oscillates=False))
     assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
     assert [result.values["worn_volume"][-1] for result in found] == [3.0, 2.0, 1.0]
 
@@ -343,7 +328,7 @@ def test_a_march_that_fails_is_not_done_again_for_its_histories(monkeypatch: pyt
     def fail_late(at: WearHistory, wear: float) -> WearHistory:
         return replace(at, outcome=Outcome.MARCH_FAILED, last_cycle=3.0, oscillates=False)
 
-    found, calls = marched(monkeypatch, fail_late)
+    found, calls = integrated(monkeypatch, fail_late)
     assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
     assert [result.outcome for result in found] == [4, 4, 0]
 
@@ -352,7 +337,7 @@ def test_what_oscillates_late_does_not_where_it_ends_before(monkeypatch: pytest.
     def oscillate_late(at: WearHistory, wear: float) -> WearHistory:
         return replace(at, oscillates=wear >= 1e-11)
 
-    found, calls = marched(monkeypatch, oscillate_late)
+    found, calls = integrated(monkeypatch, oscillate_late)
     assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0]), (4e-12, [0.0, 10.0]), (2e-12, [0.0, 10.0])]
     assert [result.values["oscillates"] for result in found] == [True, False, False]
     assert [result.place for result in found] == [0, 1, 2]

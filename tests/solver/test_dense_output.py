@@ -1,0 +1,184 @@
+"""What is kept of the steps of a wear history, and what is read between their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.accuracy.certificate import Certificate
+from solver.packing import pack, unpack
+from solver.results.state_report import StateReport
+from solver.settings import Resolution, WearTarget
+from solver.wear import output as output_module
+from solver.wear.options import WEAR
+from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput, no_output
+
+AREA = np.array([1.0, 3.0])
+LOOP = np.ones((1, 128, 3))
+RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
+
+
+def report(depth: Sequence[float], value: float, resolution: Resolution = RESOLUTIONS[0], **more: Any) -> StateReport:
+    """All numbers of a state but its depths are `value`."""
+    pairs = np.full(2, value)
+    return StateReport(
+        wear_depth=np.array(depth, float),
+        mean_pressure=pairs,
+        slip_range=pairs,
+        open_fraction=pairs,
+        response=np.full(1, value * 1j),
+        response_peak=np.full(1, value),
+        loop_displacement=value * LOOP,
+        loop_force=value * LOOP,
+        certificate=Certificate(*([value] * 8), stable=value < 2.5),
+        resolution=resolution,
+        **more,
+    )
+
+
+def taken(counts: Any, smooth: bool = False, n_steps: int = 3, **more: Any) -> DenseOutput:
+    """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
+    output = DenseOutput(AREA, None if counts is None else np.array(counts, float), smooth=smooth, **more)
+    for n in range(n_steps + 1):
+        at = 10.0 * n
+        output.add(at, report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2]), np.array([2.0 * at, 0.0]), 0.5)
+    return output
+
+
+def test_between_the_ends_of_a_given_step_all_is_linear() -> None:
+    found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
+    assert found["wear_depth"][:, 0] == pytest.approx([0.0, 40.0, 100.0, 650.0])
+    assert found["wear_rate"] == pytest.approx([0.0, 8.0, 20.0, 50.0])
+    for name in INTERPOLATED:
+        if name != "wear_depth":
+            values = np.abs(found[name].reshape(4, -1))
+            assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
+
+
+def test_what_holds_at_both_ends_of_a_step_holds_between() -> None:
+    found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
+    for name in CERTIFIED:
+        assert found[name].tolist() == [0.0, 1.0, 1.0, 3.0], name
+    # and what has no value between those of both ends is that of the later one
+    assert found["harmonics_used"].tolist() == [3, 3, 3, 5]
+    assert found["samples_used"].tolist() == [64, 64, 64, 128]
+    assert found["stable"].tolist() == [True, True, True, False]
+    # local errors add up from step to step
+    assert found["local"].tolist() == [0.5, 1.0, 1.0, 2.0]
+
+
+def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume() -> None:
+    found = taken([5.0, 14.0], smooth=True).read(np.array([5.0, 14.0]))
+    # t^2 is a cubic
+    assert found["wear_depth"] == pytest.approx(np.array([[25.0, 0.0], [196.0, 0.0]]))
+    shares = np.array([0.25, 1.0 + 96.0 / 300.0])
+    assert found["response_peak"][:, 0] == pytest.approx(shares)
+    assert found["wear_rate"] == pytest.approx(20.0 * shares)
+
+
+def test_a_cubic_never_falls_however_steep_its_ends_are() -> None:
+    output = DenseOutput(AREA, np.array([10.0]), smooth=True)
+    output.add(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
+    output.add(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
+    depth = output.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
+    assert (np.diff(depth, axis=0) >= 0.0).all()
+    assert depth[-1].tolist() == [1.0, 1.0]
+
+
+def test_steps_that_nothing_is_read_of_are_not_kept() -> None:
+    counts = [0.0, 31.0, 40.0, 72.0]
+    output, whole = taken(counts, n_steps=9), taken(None, n_steps=9)
+    # the ends of the steps with a count, and the last one, which the next step begins at
+    assert [node.cycle for node in output.taken.nodes] == [0.0, 30.0, 40.0, 70.0, 80.0, 90.0]
+    one, other = (each.read(np.array(counts)) for each in (output, whole))
+    for name, values in one.items():
+        assert np.array_equal(values, other[name]), name
+    # the course is that of all steps
+    assert output.taken.course.ends == whole.taken.course.ends == tuple(np.arange(10) * 10.0)
+
+
+def test_what_is_not_reached_is_nan_or_0() -> None:
+    found = taken([0.0, 30.0, 31.0]).read(np.array([0.0, 30.0, 31.0]))
+    nothing = no_output(3, 2, 1, 1)
+    assert found.keys() == nothing.keys()
+    for name, values in found.items():
+        assert values.dtype == nothing[name].dtype, name
+        assert values.shape == nothing[name].shape, name
+        assert np.isnan(values[2]).all() if values.dtype.kind in "fc" else not values[2], name
+        assert np.isfinite(values[:2]).all(), name
+
+
+def test_an_output_that_was_kept_goes_on() -> None:
+    whole, half = taken([0.0, 25.0, 30.0]), taken([0.0, 25.0, 30.0], n_steps=2)
+    again = DenseOutput(AREA, half.counts, smooth=False)
+    again.taken = unpack(pack(half.taken))
+    again.add(30.0, report([900.0, 0.0], 3.0, RESOLUTIONS[1]), np.array([60.0, 0.0]), 0.5)
+    one, other = (pack(each.taken) for each in (whole, again))
+    assert one.text == other.text
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one.arrays, other.arrays, strict=True))
+
+
+def test_the_course_names_the_count_of_every_change_of_harmonics() -> None:
+    course = taken([0.0], n_steps=5).taken.course
+    assert course.resolutions == ((0.0, RESOLUTIONS[0]), (20.0, RESOLUTIONS[1]), (40.0, RESOLUTIONS[0]))
+    assert course.cycles == course.ends
+    assert [depth[0] for depth in course.depths] == [at**2 for at in course.cycles]
+    assert course.rates == tuple(2.0 * at for at in course.cycles)
+
+
+def test_the_course_of_many_steps_is_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, course_steps=8))
+    course = taken([0.0], n_steps=100).taken.course
+    assert len(course.ends) == 101
+    assert len(course.cycles) == len(course.depths) == len(course.rates) <= 9
+    assert (np.diff(course.cycles) > 0.0).all()
+    assert course.cycles[-1] == 1000.0
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize(("quantity", "wanted"), [("wear_depth", 500.0), ("worn_volume", 500.0)])
+def test_a_target_is_found_within_the_step_that_reaches_it(quantity: str, wanted: float, smooth: bool) -> None:
+    output = taken(None, smooth, target=WearTarget(quantity, wanted))
+    assert output.reached_target
+    exact = np.sqrt(500.0) if smooth else 20.0 + 10.0 * (500.0 - 400.0) / 500.0
+    assert output.taken.reached == pytest.approx(exact, rel=1e-9)
+    # later steps do not move it
+    assert taken(None, smooth, 6, target=WearTarget(quantity, wanted)).taken.reached == output.taken.reached
+    assert not taken(None, smooth, target=WearTarget(quantity, 1e4)).reached_target
+
+
+def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume() -> None:
+    output = DenseOutput(AREA, None, smooth=False, target=WearTarget("frequency_shift", 0.02))
+    for n, resonance in enumerate((100.0, 101.0, 97.0)):
+        output.add(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
+    # by 1 % up, then by 3 % down
+    assert output.taken.reached == pytest.approx(15.0)
+
+
+def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together() -> None:
+    for smooth in (False, True):
+        output = taken(None, smooth)
+        counts = output.even_counts(7)
+        assert counts[0] == 0.0
+        assert counts[-1] == 30.0
+        volumes = output.read(counts)["wear_depth"] @ AREA
+        assert np.diff(counts / 30.0 + volumes / volumes[-1]) == pytest.approx(np.full(6, 2.0 / 6.0), rel=1e-9)
+    to_target = taken(None, target=WearTarget("wear_depth", 500.0))
+    assert to_target.even_counts(3)[-1] == to_target.taken.reached < 30.0
+    assert taken(None, n_steps=0).even_counts(3).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_of_many_steps_those_that_go_far_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, kept_steps=20))
+    output = taken(None, n_steps=200)
+    monkeypatch.setattr(output_module, "WEAR", WEAR)
+    whole = taken(None, n_steps=200)
+    assert len(output.taken.nodes) <= 20
+    assert [output.taken.nodes[place].cycle for place in (0, -1)] == [0.0, 2000.0]
+    counts = np.linspace(0.0, 2000.0, 11)
+    one, other = (each.read(counts)["wear_depth"] for each in (output, whole))
+    assert np.abs(one - other).max() < 0.02 * other.max()

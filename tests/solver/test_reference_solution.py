@@ -1,0 +1,272 @@
+"""The reference solution, and the error of a worn volume against what the volume is wrong by."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.accuracy.history_error import Met, history_error
+from solver.accuracy.options import ACCURACY
+from solver.accuracy.reference import coarser, every_second
+from solver.model import ReducedModel
+from solver.outcome import Outcome
+from solver.results.history import StartState, WearHistory
+from solver.settings import Resolution, Scheme, SolverSettings, all_orders
+from solver.wear.check import Checked, FullCheck
+from solver.wear.control import ListedSteps
+from solver.wear.state import Failure, WearState
+from solver.wear.step import Step
+from solver.wear.wearing_joint import WearingJoint
+from tests.references import slider_amplitude, slider_wear_depth
+from tests.solver.models import branch_states, dovetail, march_wear, scene
+
+WEAR = 1.1e-11  # 1/Pa
+GIVEN = SolverSettings(harmonics=5, samples=64)
+CYCLES = np.linspace(0.0, 4e4, 9)
+BESIDE = 213.0  # Hz: the coarse sector wears there, and stops
+SCHEMES: list[tuple[Scheme, float]] = [
+    ("implicit", 4000.0),
+    ("implicit", 1000.0),
+    ("explicit", 4000.0),
+    ("explicit", 1000.0),
+    ("adaptive", 1e-2),
+]
+
+
+@lru_cache
+def start(frequency: float = BESIDE) -> tuple[ReducedModel, StartState]:
+    model = dovetail(9)
+    (found,) = branch_states(model, 0.5, 0.5, [2 * np.pi * frequency], GIVEN)
+    return model, found
+
+
+@lru_cache
+def worn(scheme: Scheme, step: float, wear: float = WEAR, frequency: float = BESIDE) -> WearHistory:
+    """step: cycles, or rtol of the adaptive scheme."""
+    model, found = start(frequency)
+    settings = SolverSettings(5, 64, rtol=step) if scheme == "adaptive" else GIVEN
+    return march_wear(model, 0.5, found, wear, step, scheme, CYCLES, settings)
+
+
+def errors(history: WearHistory, truth: WearHistory) -> np.ndarray:
+    """Estimated over true errors of the volume at all counts but the first, m3."""
+    true = np.abs(history.worn_volume - truth.worn_volume)[1:]
+    return (history.worn_volume_error * history.worn_volume)[1:] / true
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "step"), SCHEMES)
+def test_the_error_of_the_dovetail_holds_that_of_its_steps(scheme: Scheme, step: float) -> None:
+    truth = worn("implicit", 50.0)
+    history = worn(scheme, step)
+    assert history.outcome is Outcome.CONVERGED
+    ratio = errors(history, truth)
+    assert ratio.min() > 0.5
+    assert history.error_estimate < 0.5
+    # of the pairs, together: what one is wrong by may cross zero
+    of_pairs = np.abs(history.wear_depth - truth.wear_depth)[-1]
+    assert history.wear_depth_error[-1].sum() > 0.5 * of_pairs.sum()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["implicit", "explicit"])
+def test_the_error_falls_with_the_step(scheme: Scheme) -> None:
+    steps = np.array([4000.0, 2000.0, 1000.0])
+    model = scene("sdof_slider", 9)
+    settings = SolverSettings(9, 256)
+    (found,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    sizes = [march_wear(model, 0.5, found, WEAR, step, scheme, CYCLES, settings).error_estimate for step in steps]
+    # what harmonics and samples leave wrong stays
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "step"), SCHEMES)
+def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: float) -> None:
+    model = scene("sdof_slider", 21)
+    settings = SolverSettings(21, 256, rtol=step) if scheme == "adaptive" else SolverSettings(21, 256)
+    (found,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    cycles = np.linspace(0.0, 8e4, 5)
+    history = march_wear(model, 0.5, found, WEAR, step, scheme, cycles, settings)
+    assert history.outcome is Outcome.CONVERGED
+    exact = slider_wear_depth(
+        cycles,
+        wear_coefficient=WEAR,
+        area=1e-4,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda friction_force: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, friction_force, 2 * np.pi * 160.0),
+    )
+    true = np.abs(history.wear_depth[:, 0] - exact)[1:]
+    assert (history.wear_depth_error[1:, 0] > 0.5 * true).all()
+    apart = np.abs(history.worn_volume - history.reference_volume)[1:]
+    assert (apart > 0.0).all()
+    least = ACCURACY.history_safety(scheme) * apart / history.worn_volume[1:]
+    assert (history.worn_volume_error[1:] >= least * (1.0 - 1e-12)).all()
+    assert history.error_estimate < 0.3
+
+
+@pytest.mark.slow
+def test_nothing_that_wears_nothing_has_an_error() -> None:
+    history = worn("implicit", 1000.0, frequency=205.0)
+    assert history.outcome is Outcome.CONVERGED
+    assert not history.worn_volume.any()
+    assert not history.worn_volume_error.any()
+    assert history.error_estimate == 0.0
+
+
+@pytest.mark.slow
+def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, own = worn("implicit", 1000.0), FullCheck.__call__
+
+    def give_up(self: FullCheck, work: WearingJoint, state: WearState) -> Checked | Failure:
+        return own(self, work, state) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
+
+    monkeypatch.setattr(FullCheck, "__call__", give_up)
+    model, found = start()
+    ended = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+    assert ended.outcome is Outcome.CERTIFICATE_FAILED
+    assert ended.last_cycle == 12_000.0
+    known = CYCLES <= 12_000.0
+    assert np.array_equal(ended.worn_volume[known], whole.worn_volume[known])
+    assert np.isnan(ended.worn_volume[~known]).all()
+    assert np.isnan(ended.worn_volume_error[~known]).all()
+    assert (ended.harmonics_used[~known] == 0).all()
+    assert ended.error_estimate == ended.worn_volume_error[known][-1] > 0.0
+
+
+@pytest.mark.slow
+def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the volume at all counts beyond its end; the history itself and its errors before are the same."""
+    usual, own = worn("implicit", 1000.0), ListedSteps.step
+
+    def go_astray(self: ListedSteps, work: WearingJoint, state: WearState) -> Step | Failure:
+        return own(self, work, state) if state.cycle < 12_000.0 else Failure(Outcome.MARCH_FAILED)
+
+    monkeypatch.setattr(ListedSteps, "step", go_astray)
+    model, found = start()
+    history = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
+    assert np.array_equal(history.worn_volume, usual.worn_volume)
+    known = CYCLES <= 12_000.0
+    assert np.array_equal(history.worn_volume_error[known], usual.worn_volume_error[known])
+    assert np.isinf(history.worn_volume_error[~known]).all()
+    assert np.isinf(history.wear_depth_error[-1][history.wear_depth[-1] > 0.0]).all()
+    assert history.outcome is Outcome.SENSITIVE
+    assert history.message.startswith(f"worn volume {1e9 * history.worn_volume[-1]:.3g} mm3, not known: ")
+    assert history.message.endswith("the history does not go so far")
+
+
+@pytest.mark.parametrize(
+    ("ends", "chosen"),
+    [
+        ((0.0,), ()),
+        ((0.0, 1.0), (1.0,)),
+        ((0.0, 1.0, 3.0), (3.0,)),
+        ((0.0, 1.0, 3.0, 4.0), (3.0, 4.0)),
+        ((0.0, 1.0, 3.0, 4.0, 9.0), (3.0, 9.0)),
+    ],
+)
+def test_its_steps_are_two_of_the_history_and_end_with_it(ends: tuple[float, ...], chosen: tuple[float, ...]) -> None:
+    assert every_second(ends) == chosen
+
+
+@pytest.mark.parametrize("highest", [3, 5, 9, 39])
+def test_its_harmonics_are_others_but_of_the_same_kind(highest: int) -> None:
+    for orders in (all_orders(highest), tuple(range(1, highest + 1, 2))):
+        other = coarser(Resolution(orders, 256))
+        assert other.highest != highest
+        assert other.orders[:2] == orders[:2] or len(other.orders) == 1
+        assert other.highest < highest or highest <= 3
+
+
+def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
+    counts, at = np.linspace(0.0, 10.0, 11), np.arange(0.5, 8.0, 0.5)
+    differences = np.abs(at - 6.0)
+    error = Met(at, differences).largest_before(counts)
+    assert error[0] == 0.0
+    assert error[6] == 3.0
+    assert error[10] == 1.5
+    # what comes later changes nothing
+    assert np.array_equal(Met(at[:10], differences[:10]).largest_before(counts[:6]), error[:6])
+    # and where nothing is known there is no difference
+    assert not Met(at, np.full(at.size, np.nan)).largest_before(counts).any()
+    assert not Met(at[:0], at[:0]).largest_before(counts).any()
+
+
+AREA = np.array([1.0, 2.0])
+COUNTS = np.array([0.0, 1.0, 2.0])
+NOWHERE = Met(np.zeros(0), np.zeros(0))
+
+
+def read(depth: Any, rate: Any = ((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other: Any) -> dict[str, np.ndarray]:
+    """What a dense output gives at `COUNTS`, as far as errors are made of."""
+    rates = np.array(rate, float)
+    values: dict[str, Any] = {
+        "wear_depth": depth,
+        "depth_rate": rates,
+        "wear_rate": rates @ AREA,
+        "local": np.zeros(3),
+        "response": np.ones((3, 1), complex),
+        "response_peak": np.ones((3, 1)),
+        "response_error": np.full(3, 1e-3),
+        "wear_rate_error": np.full(3, np.nan),
+    }
+    return {name: np.array(value) for name, value in (values | other).items()}
+
+
+DEPTH = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
+
+
+def test_an_error_adds_up_what_differs_at_each_pair() -> None:
+    # volumes agree by chance: what the first pair wears less the second one wears more
+    other = [[0.0, 0.0], [1.2, 0.9], [2.4, 1.8]]
+    found = history_error(COUNTS, read(DEPTH), read(other), NOWHERE, AREA, "implicit")
+    safety = ACCURACY.implicit_safety
+    assert found.worn_volume == pytest.approx([0.0, safety * 0.4 / 3.0, safety * 0.8 / 6.0])
+    assert found.wear_depth == pytest.approx(safety * np.abs(np.subtract(DEPTH, other)))
+    assert found.response == pytest.approx(np.full(3, 1e-3))
+    assert found.wear_rate == pytest.approx(np.zeros(3))
+
+
+def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing() -> None:
+    fine = read(DEPTH, local=[0.0, 0.3, 0.6])
+    found = history_error(COUNTS, fine, read(DEPTH), NOWHERE, AREA, "adaptive")
+    assert found.worn_volume == pytest.approx([0.0, 0.1, 0.1])
+    # it falls to the pairs as they are worn
+    assert found.wear_depth == pytest.approx(0.1 * np.array(DEPTH))
+    crossing = history_error(COUNTS, fine, read(DEPTH), Met(np.array([1.5]), np.array([6.0])), AREA, "adaptive")
+    assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.adaptive_safety])
+
+
+def test_a_volume_is_known_no_better_than_the_wear_rates_of_the_start_state() -> None:
+    other = read(DEPTH, rate=((1.3, 0.9), (1.0, 1.0), (1.0, 1.0)))
+    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "adaptive")
+    # pair by pair, though later states are the same
+    assert (found.worn_volume[1:] >= 0.5 / 3.0).all()
+    assert found.wear_rate == pytest.approx([0.1 / 3.0, 0.0, 0.0])
+
+
+def test_what_nothing_confirms_is_not_known() -> None:
+    lost = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]])
+    found = history_error(COUNTS, read(DEPTH), lost, NOWHERE, AREA, "explicit")
+    assert found.worn_volume.tolist() == [0.0, 0.0, np.inf]
+    assert found.wear_depth[2].tolist() == [np.inf, np.inf]
+    # and what was not reached has no error
+    ended = history_error(COUNTS, lost, lost, NOWHERE, AREA, "explicit")
+    assert ended.worn_volume[:2].tolist() == [0.0, 0.0]
+    assert np.isnan(ended.worn_volume[2])
+    # a joint that has worn nothing is known to have worn nothing, with or without
+    still = history_error(COUNTS, read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), NOWHERE, AREA, "explicit")
+    assert not still.worn_volume.any()
+    assert not still.wear_depth.any()
+
+
+def test_response_and_wear_rate_are_known_no_better_than_the_reference_solution_says() -> None:
+    other = read(DEPTH, 1.25 * np.ones((3, 2)), response_peak=[[1.0], [1.5], [1.0]], response=[[1.0], [1.0], [1.0j]])
+    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "implicit")
+    assert found.response == pytest.approx([1e-3, 0.5, np.sqrt(2.0)])
+    assert found.wear_rate == pytest.approx(np.full(3, 0.25))

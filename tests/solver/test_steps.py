@@ -1,0 +1,239 @@
+"""Single steps on the slow time scale, their control, and the state that they take and give."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from solver.accuracy.error_estimate import Estimate, euler_error
+from solver.accuracy.period_events import left_out
+from solver.outcome import Outcome
+from solver.packing import in_rows, pack, unpack
+from solver.settings import Scheme, SolverSettings
+from solver.wear import control
+from solver.wear.bdf2 import ZERO_STABLE
+from solver.wear.check import chosen_for_another
+from solver.wear.control import AdaptiveSteps, Control, GivenSteps, ListedSteps
+from solver.wear.euler import euler_balance
+from solver.wear.options import WEAR as OPTIONS
+from solver.wear.state import Choice, Failure, WearState
+from solver.wear.step import Step
+from tests.solver.worn_slider import AREA, END, WEAR, begun
+
+SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
+
+
+def steps_of(plan: Control, n_steps: int, wear: float = WEAR) -> tuple[list[WearState], list[Step]]:
+    """The unworn state and those behind each of the first steps, and the steps."""
+    work, state = begun(wear)
+    states, steps = [plan.begin(work, state)], []
+    for _ in range(n_steps):
+        step = plan.step(work, states[-1])
+        assert isinstance(step, Step)
+        assert step.arrived
+        steps.append(step)
+        states.append(step.state)
+    return states, steps
+
+
+def depths(states: list[WearState]) -> np.ndarray:
+    return np.array([state.depth[0] for state in states])
+
+
+def rates(states: list[WearState]) -> np.ndarray:
+    """m per cycle."""
+    return np.array([state.rates.value[-1] for state in states]) / AREA
+
+
+def counts(states: list[WearState]) -> np.ndarray:
+    return np.array([state.cycle for state in states])
+
+
+def bdf2_depth(length: float, before: float, grown: float, depth: float, rate: float) -> float:
+    """Depth behind a step; grown: in the step before, whose length is `before`. rate: at its end."""
+    w = length / before
+    return depth + w**2 / (1 + 2 * w) * grown + (1 + w) / (1 + 2 * w) * length * rate
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_given_step_follows_its_own_equation(scheme: Scheme) -> None:
+    states, steps = steps_of(GivenSteps(scheme, 4000.0, END), 3)
+    assert counts(states).tolist() == [0.0, 4000.0, 8000.0, 12000.0]
+    rate = rates(states)
+    # W + h g(W) if explicit, W_new = W + h g(W_new) if implicit
+    taken = rate[:-1] if scheme == "explicit" else rate[1:]
+    assert np.diff(depths(states)) == pytest.approx(4000.0 * taken, rel=1e-9)
+    expected = euler_error(4000.0, np.abs(np.diff(rate)) * AREA)
+    assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_last_given_step_is_shortened_and_a_remainder_of_round_off_is_none() -> None:
+    states, steps = steps_of(GivenSteps("implicit", 3000.0, 7000.0), 3)
+    assert counts(states).tolist() == [0.0, 3000.0, 6000.0, 7000.0]
+    assert [step.length for step in steps] == [3000.0, 3000.0, 1000.0]
+    almost = 6000.0 * (1.0 + 1e-13)
+    assert steps_of(GivenSteps("implicit", 3000.0, almost), 2)[0][-1].cycle == almost
+
+
+def test_by_the_largest_depth_every_explicit_step_wears_this_depth() -> None:
+    # Eq. (22): one pair, so each step wears just that depth
+    states, _ = steps_of(GivenSteps("explicit", 1.0, END, 2e-6), 4)
+    assert np.diff(depths(states)) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
+    # the bound is one of stability of the explicit scheme
+    assert counts(steps_of(GivenSteps("implicit", 1000.0, END, 1e-8), 1)[0]).tolist() == [0.0, 1000.0]
+
+
+def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twice_the_last() -> None:
+    states, steps = steps_of(GivenSteps("implicit", 2e4, np.inf), 12)
+    lengths, rate = np.array([step.length for step in steps]), rates(states)
+    slower = np.maximum.accumulate(rate) / rate
+    allowed = np.concatenate([[2e4], OPTIONS.largest_step_ratio * lengths[:-1]])
+    assert lengths == pytest.approx(np.minimum(allowed, 2e4 * slower[:-1]), rel=1e-12)
+    assert lengths[-1] > 2.0 * lengths[0]
+
+
+def test_a_step_that_moves_many_times_the_normal_forces_is_a_failure() -> None:
+    work, state = begun()
+    plan = GivenSteps("explicit", 1e9, 1e12)
+    failed = plan.step(work, plan.begin(work, state))
+    assert isinstance(failed, Failure)
+    assert failed.outcome is Outcome.STEP_TOO_LONG
+    assert "times the normal forces" in failed.message
+
+
+def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter() -> None:
+    rtol = 1e-2
+    states, steps = steps_of(AdaptiveSteps(rtol), 12)
+    at, worn = counts(states), depths(states) * AREA
+    lengths = np.array([step.length for step in steps])
+    for place, step in enumerate(steps):
+        at_mean_rate = worn[place + 1] * step.length / at[place + 1]
+        allowed = OPTIONS.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
+        assert step.error <= allowed
+    assert (lengths[1:] <= OPTIONS.largest_step_ratio * lengths[:-1] * (1.0 + 1e-12)).all()
+    assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
+
+
+def test_the_first_adaptive_step_wears_little_and_is_stable() -> None:
+    work, state = begun()
+    first = AdaptiveSteps(1e-2).begin(work, state).length
+    moved = float(np.abs(state.point.evaluation.displacement_h[:, :, 1:]).max())
+    by_depth = OPTIONS.first_depth * moved / float(work.rate(state.point.evaluation).max())
+    assert first == min(OPTIONS.first_step * state.step_limit, by_depth)
+
+
+def test_adaptive_steps_know_the_wear_coefficient_by_its_product_with_cycles_alone() -> None:
+    (once, _), (faster, _) = (steps_of(AdaptiveSteps(1e-2), 6, wear) for wear in (WEAR, 3.0 * WEAR))
+    assert counts(once) == pytest.approx(3.0 * counts(faster), rel=1e-9)
+    assert depths(once) == pytest.approx(depths(faster), rel=1e-9)
+
+
+def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = steps_of(AdaptiveSteps(1e-2), 0)[0][0].length
+    own, tried = control.bdf2_attempt, []
+
+    def lose(*given: object, most: int) -> object:
+        tried.append(given[2])
+        return None if len(tried) <= most else own(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(control, "bdf2_attempt", lambda *given: lose(*given, most=1))
+    _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
+    assert tried[:2] == [first, OPTIONS.smallest_step_ratio * first]
+    assert shorter.length == tried[-1]
+    monkeypatch.setattr(control, "bdf2_attempt", lambda *_: None)
+    states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)
+    assert euler.length == pytest.approx(OPTIONS.shortest_slow_step * first, rel=2e-3)
+    assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("plan", ["listed", "adaptive"])
+def test_a_step_of_second_order_solves_its_own_equation(plan: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if plan == "listed":
+        states, steps = steps_of(ListedSteps(np.array([1000.0, 3000.0, 4000.0]), second_order=True), 3)
+        assert counts(states).tolist() == [0.0, 1000.0, 3000.0, 4000.0]
+    else:
+        # no error is refused, so that steps grow as they may
+        monkeypatch.setattr(control, "WEAR", replace(OPTIONS, step_error_fraction=1e9))
+        states, steps = steps_of(AdaptiveSteps(1e-2), 3)
+    depth, rate, h = depths(states), rates(states), [step.length for step in steps]
+    assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
+    for n in (1, 2):
+        expected = bdf2_depth(h[n], h[n - 1], depth[n] - depth[n - 1], depth[n], rate[n + 1])
+        assert depth[n + 1] == pytest.approx(expected, rel=1e-9)
+
+
+def test_listed_steps_begin_anew_where_one_is_much_longer_than_the_last() -> None:
+    ends = np.array([1000.0, 1000.0 * (1.01 + ZERO_STABLE)])
+    states, _ = steps_of(ListedSteps(ends, second_order=True), 2)
+    assert counts(states)[1:].tolist() == ends.tolist()
+    assert np.diff(depths(states)) == pytest.approx(np.diff([0.0, *ends]) * rates(states)[1:], rel=1e-9)
+    euler, _ = steps_of(ListedSteps(ends / 2.0, second_order=False), 2)
+    assert np.diff(depths(euler)) == pytest.approx(np.diff([0.0, *ends]) / 2.0 * rates(euler)[1:], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [GivenSteps("explicit", 4000.0, END), GivenSteps("implicit", 4000.0, np.inf), AdaptiveSteps(1e-2)],
+    ids=["explicit", "implicit", "adaptive"],
+)
+def test_a_state_is_data_that_survives_being_kept(plan: Control) -> None:
+    """The step from an unpacked state is equal to the last bit, in a joint that has computed nothing before."""
+    kept = in_rows(steps_of(plan, 3)[0][-1])
+
+    def next_of(state: WearState) -> WearState:
+        work, _ = begun()
+        work.drop_factor()
+        step = plan.step(work, state)
+        assert isinstance(step, Step)
+        return step.state
+
+    one, other = (pack(next_of(state)) for state in (kept, unpack(pack(kept))))
+    assert one.text == other.text
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one.arrays, other.arrays, strict=True))
+
+
+def test_the_next_state_is_extrapolated_where_that_is_nearer() -> None:
+    work, state = begun()
+    first = GivenSteps("implicit", 4000.0, END).step(work, state)
+    assert isinstance(first, Step)
+    length, change = first.state.change or (0.0, np.zeros(0))
+    now = first.state.point.evaluation.predicted_h
+    assert length == 4000.0
+    assert np.array_equal(change, now - state.point.evaluation.predicted_h)
+    joint = work.at(first.state)
+    ahead = euler_balance(joint, "implicit", first.state.point.evaluation, 2000.0, WEAR, work.wearing)
+    balance = ahead(1.0, first.state.point.history)
+    assert np.array_equal(work.predicted(first.state, balance, 2000.0), now + 0.5 * change)
+    astray = replace(first.state, change=(length, -100.0 * change))
+    assert np.array_equal(work.predicted(astray, balance, 2000.0), now)
+    assert np.array_equal(work.predicted(replace(astray, change=None), balance, 2000.0), now)
+
+
+@pytest.mark.parametrize(
+    ("harmonics", "share", "error", "anew"),
+    [
+        ("auto", 1.0, 0.8e-2, False),
+        # so much more is left out that the error may be above rtol
+        ("auto", 0.4, 0.8e-2, True),
+        ("auto", 0.4, 1e-4, False),
+        # so little that fewer harmonics may do
+        ("auto", 100.0, 0.8e-2, True),
+        # chosen for a joint in which nothing slips
+        ("auto", 1.0, 0.0, True),
+        # given ones stay
+        (5, 0.01, 0.8e-2, False),
+    ],
+)
+def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(
+    harmonics: int | Literal["auto"], share: float, error: float, anew: bool
+) -> None:
+    """share: what was left out of the force when harmonics were chosen, over what is now."""
+    work, state = begun()
+    work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
+    now = left_out(state.resolution.orders, state.point.evaluation)
+    assert 1e-4 < now < 0.5
+    choice = Choice(share * now, Estimate(error, error), accurate=True)
+    assert chosen_for_another(work, replace(state, choice=choice)) is anew

@@ -1,0 +1,238 @@
+"""Wear histories of the slider under a spring against its differential equation and its exact motion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.outcome import Outcome
+from solver.results.history import StartState, WearHistory
+from solver.settings import Scheme, SolverSettings, first_resolution
+from solver.structure.joint import build_case
+from tests.references import slider_amplitude, slider_orbit, slider_wear_depth
+from tests.solver.models import branch_states, march_wear, random_model, scene
+from tests.solver.worn_slider import (
+    AREA,
+    COARSE,
+    CYCLES,
+    END,
+    FINE,
+    FORCE,
+    FRICTION,
+    OMEGA,
+    WEAR,
+    exact_depths,
+    march,
+    slider_start,
+)
+
+STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
+GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
+SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
+FINE_OUTPUT = np.linspace(0.0, END, 101)
+
+
+def adaptive(rtol: float, wear: float = WEAR, cycles: np.ndarray = FINE_OUTPUT) -> WearHistory:
+    model, start = slider_start()
+    settings = SolverSettings(COARSE.harmonics, COARSE.samples, COARSE.tolerance, rtol)
+    return march_wear(model, FRICTION, start, wear, 1.0, "adaptive", cycles, settings)
+
+
+@lru_cache
+def final_depth(step: float, scheme: Scheme) -> float:
+    history = march(step, scheme, np.array([0.0, END]))
+    assert history.outcome is Outcome.CONVERGED
+    return float(history.wear_depth[-1, 0])
+
+
+@pytest.mark.slow
+def test_the_error_of_the_depth_is_of_first_order_and_its_sign_that_of_the_scheme() -> None:
+    exact = exact_depths(CYCLES)[-1]
+    explicit, implicit = (np.array([final_depth(step, scheme) for step in STEPS]) - exact for scheme in GIVEN)
+    for errors in (explicit, -implicit, explicit - implicit):
+        assert (errors > 0).all()
+        assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
+        assert errors[-2] / errors[-1] == pytest.approx(2.0, rel=0.1, abs=0.0)
+    # both have the same limit
+    for errors in (explicit, implicit):
+        assert abs(2 * errors[-1] - errors[-2]) < 1e-4 * exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", GIVEN)
+def test_with_21_harmonics_the_depth_is_that_of_the_exact_motion(scheme: Scheme) -> None:
+    exact = slider_wear_depth(
+        CYCLES,
+        wear_coefficient=WEAR,
+        area=AREA,
+        friction_coefficient=FRICTION,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda friction_force: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, friction_force, OMEGA),
+    )
+    history = march(1000.0, scheme, settings=FINE)
+    # first order: half of h times the change of the rate, and the error of the motion itself, below 1 %
+    time_error = 0.5 * 1000.0 * (history.wear_rate[0] - history.wear_rate[-1]) / AREA
+    assert time_error < 0.005 * exact[-1]
+    assert np.abs(history.wear_depth[:, 0] - exact).max() < time_error + 0.01 * exact[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", GIVEN)
+def test_the_worn_slider_moves_as_its_friction_force_lets_it(scheme: Scheme) -> None:
+    history = march(4000.0, scheme, CYCLES[::2], FINE)
+    for depth, response in zip(history.wear_depth[:, 0], history.response[:, 0], strict=True):
+        friction_force = FRICTION * (10.0 - 1e5 * depth)
+        exact = slider_orbit(0.1, 0.0, 1.6e5, FORCE, friction_force, OMEGA).harmonic(0)
+        assert abs(response) == pytest.approx(abs(exact), rel=0.02, abs=0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_the_worn_volume_is_as_exact_as_asked_for(rtol: float) -> None:
+    history = adaptive(rtol)
+    assert history.outcome is Outcome.CONVERGED
+    exact = exact_depths(FINE_OUTPUT)
+    error = abs(history.wear_depth[-1, 0] - exact[-1]) / exact[-1]
+    assert error < 0.5 * rtol
+    # the estimate holds the error of the harmonics as well, which is not in `exact`
+    assert history.error_estimate > error
+    # and so is everything between the steps
+    assert np.abs(history.wear_depth[:, 0] - exact).max() < rtol * exact[-1]
+    rates = np.gradient(exact, FINE_OUTPUT, edge_order=2)
+    assert np.abs(history.wear_rate / AREA - rates).max() < max(2.0 * rtol, 2e-3) * rates.max()
+
+
+@pytest.mark.slow
+def test_adaptive_steps_are_of_second_order() -> None:
+    rtols = np.array([1e-3, 1e-4, 1e-5])
+    begin = slider_start()[1].newton_iterations
+    iterations = [adaptive(rtol, cycles=CYCLES).newton_iterations - begin for rtol in rtols]
+    # as many steps as rtol^(-1/2), with fewer iterations the shorter they are; a method of first order takes rtol^-1
+    slope = np.polyfit(np.log(rtols), np.log(iterations), 1)[0]
+    assert -0.5 < slope < -0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", GIVEN)
+@pytest.mark.parametrize("step", [8000.0, 2000.0])
+def test_the_error_estimate_holds_that_of_the_steps(scheme: Scheme, step: float) -> None:
+    exact = exact_depths(CYCLES)[-1]
+    error = abs(final_depth(step, scheme) - exact) / exact
+    # it holds the error of harmonics and samples as well
+    assert error < march(step, scheme).error_estimate < 10.0 * error
+
+
+def test_the_wear_rate_is_that_of_the_sliding_path() -> None:
+    # the slider moves to and fro between two turns: its path is twice the range of its slip
+    history = march(8000.0, "explicit", np.array([0.0, 8000.0]))
+    path = 2.0 * history.slip_range[0, 0]
+    # the range is that of the ends of the steps, the turn lies in between
+    assert history.wear_rate[0] == pytest.approx(WEAR * 10.0 * path, rel=(2 * np.pi / COARSE.samples) ** 2, abs=0.0)
+
+
+def test_the_normal_force_falls_with_the_depth() -> None:
+    history = march(4000.0, "implicit")
+    assert history.mean_pressure[:, 0] * AREA == pytest.approx(10.0 - 1e5 * history.wear_depth[:, 0], rel=1e-9, abs=0.0)
+    assert not history.open_fraction.any()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_wear_never_falls(scheme: Scheme) -> None:
+    history = march(8000.0, scheme, FINE_OUTPUT)
+    assert (np.diff(history.wear_depth, axis=0) > 0).all()
+    assert (np.diff(history.worn_volume) > 0).all()
+    assert history.worn_volume == pytest.approx(history.wear_depth[:, 0] * AREA, rel=1e-14, abs=0.0)
+    assert history.worn_volume[0] == 0.0
+    assert np.array_equal(history.cycles, FINE_OUTPUT)
+    assert np.isnan(history.jump_cycle)
+
+
+def test_the_end_is_not_seen_by_adaptive_steps() -> None:
+    whole, part = adaptive(1e-2), adaptive(1e-2, cycles=FINE_OUTPUT[:31])
+    assert part.newton_iterations < whole.newton_iterations
+    assert np.array_equal(part.wear_depth, whole.wear_depth[:31])
+    assert np.array_equal(part.wear_rate, whole.wear_rate[:31])
+
+
+@pytest.mark.slow
+def test_the_largest_depth_rule_is_of_first_order() -> None:
+    histories = [march(1.0, "explicit", np.array([0.0, END]), largest_depth=largest) for largest in (4e-6, 2e-6, 1e-6)]
+    errors = [history.wear_depth[-1, 0] - exact_depths(CYCLES)[-1] for history in histories]
+    assert np.polyfit(np.log([4.0, 2.0, 1.0]), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_without_a_wear_coefficient_nothing_changes(scheme: Scheme) -> None:
+    history = march(1000.0, scheme, wear=0.0)
+    assert history.outcome is Outcome.CONVERGED
+    for name in ("wear_depth", "wear_rate", "worn_volume", "worn_volume_error"):
+        assert not getattr(history, name).any(), name
+    for name in ("mean_pressure", "slip_range", "response", "response_peak", "open_fraction"):
+        values = getattr(history, name)
+        assert np.array_equal(values, np.repeat(values[:1], CYCLES.size, axis=0)), name
+    assert history.error_estimate == 0.0
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_state_without_slip_wears_exactly_nothing(scheme: Scheme) -> None:
+    model = random_model(1, ("3d", "constant_load"))
+    settings = SolverSettings(3, 64)
+    (start,) = branch_states(model, 100.0, 1.0, [300.0], settings)
+    history = march_wear(model, 100.0, start, 1e-6, 1e6, scheme, np.array([0.0, 1e8, 1e9]), settings)
+    assert history.outcome is Outcome.CONVERGED
+    assert not history.slip_range.any()
+    for name in ("wear_depth", "wear_rate", "worn_volume"):
+        assert not getattr(history, name).any(), name
+    assert np.array_equal(history.response, np.repeat(history.response[:1], 3, axis=0))
+
+
+@pytest.mark.parametrize(
+    "outcome", [Outcome.SINGULAR, Outcome.START_FAILED, Outcome.STATIC_FAILED, Outcome.BRANCH_LOST]
+)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_start_that_failed_is_a_history_of_nan_with_its_outcome(scheme: Scheme, outcome: Outcome) -> None:
+    model = scene("sdof_slider", 5)
+    failed = StartState(
+        outcome, None, OMEGA, first_resolution(COARSE), np.inf, np.inf, newton_iterations=17, run_time=0.25
+    )
+    history = march_wear(model, FRICTION, failed, WEAR, 1000.0, scheme, CYCLES, COARSE)
+    assert history.outcome is outcome
+    for name, width in (("wear_depth", 1), ("mean_pressure", 1), ("slip_range", 1), ("open_fraction", 1)):
+        values = getattr(history, name)
+        assert values.shape == (CYCLES.size, width)
+        assert np.isnan(values).all(), name
+    for name in ("wear_rate", "worn_volume", "response", "response_peak"):
+        assert np.isnan(getattr(history, name)).all(), name
+    assert np.isnan(history.error_estimate)
+    assert np.isnan(history.jump_cycle)
+    assert np.array_equal(history.cycles, CYCLES)
+    assert history.newton_iterations == 17
+    assert history.run_time == 0.25
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_only_the_product_of_wear_coefficient_and_cycles_matters(scheme: Scheme) -> None:
+    slow = march(8000.0, scheme)
+    fast = march(800.0, scheme, CYCLES / 10, wear=10 * WEAR)
+    for name in ("wear_depth", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
+        one, other = getattr(slow, name), getattr(fast, name)
+        assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
+    assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9, abs=0.0)
+
+
+def test_a_history_starts_from_the_state_it_is_given() -> None:
+    model, start = slider_start()
+    state = start.state
+    assert state is not None
+    history = march(1000.0, "implicit", np.array([0.0, 1.0]))
+    response_h = (
+        build_case(model, FRICTION, start.penalty_omega, COARSE)
+        .joint(OMEGA, FORCE)
+        .structure.response_h(state.displacement_h[0, :2])
+    )
+    assert history.response[0] == pytest.approx(response_h[:, 1] - 1j * response_h[:, 2], rel=1e-12, abs=0.0)
+    assert history.newton_iterations >= start.newton_iterations
+    assert history.run_time >= start.run_time
