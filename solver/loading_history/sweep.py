@@ -56,6 +56,8 @@ class SweepState:
         Their harmonics and samples.
     checked : PathPoint or None
         The node at which the harmonics were chosen.
+    at_limit : bool
+        Whether that node needs more harmonics than a sweep may have.
     length : float
         Of the next step, in the unit of the parameter.
     n_nodes : int
@@ -73,6 +75,7 @@ class SweepState:
     nodes: Nodes = ()
     reference: Nodes = ()
     checked: PathPoint | None = None
+    at_limit: bool = False
     length: float = 0.0
     n_nodes: int = 0
     branch: int = 0
@@ -263,7 +266,7 @@ class NodeSweep:
         old, new = self.state.checked.evaluation, step.point.evaluation
         if max(vibration_change(old, new), vibration_change(new, old)) > ACCURACY.vibration_recheck:
             joint = self.path.joint_at(step.point.parameter)
-            if resolution_holds(self.case, joint, step.point, self.effort):
+            if resolution_holds(self.case, joint, step.point, self.state.at_limit, self.effort):
                 self.state = replace(self.state, checked=step.point)
             else:
                 self._choose_resolution()
@@ -302,6 +305,7 @@ class NodeSweep:
         if not self.case.settings.automatic:
             return 0.0
         refined = choose_resolution(self.case, self.path.joint_at(here.parameter), here, self.effort)
+        self.state = replace(self.state, at_limit=not refined.accurate)
         point = replace(refined.point, parameter=here.parameter)
         if refined.case.resolution == self.case.resolution:
             self.state = replace(self.state, nodes=(*self.state.nodes[:-1], point), checked=point)
