@@ -114,7 +114,10 @@ def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
     slope = float(np.vdot(stiffness, damping)) / norm**2 if norm > 0.0 else 0.0
     drag = damping - slope * stiffness
     few = STRUCTURE.rough_directions
-    directions = [_leading(mass, few), _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0]]
+    directions = [
+        _leading(mass, few),
+        _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0],
+    ]
     directions += [_leading(part[rows[:, None], internal], internal.size) for part in parts]
     left, sizes, _ = np.linalg.svd(np.hstack(directions), full_matrices=False)
     basis = left[:, sizes > 1e-6]
