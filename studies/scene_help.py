@@ -14,10 +14,9 @@ from studies.scenes import BUNDLED, scene_parameters
 
 _PAGE = """# Bundled scenes
 
-What each of them is, and its parameters: keys of `[scene]` in a study file. This page is printed by
-`python -m studies.scene_help`; `run-study --scene-help dovetail_sector` prints one of them.
-
-A study of one's own may also name [a scene file or a finite-element model](OWN_MODEL.md)."""
+The bundled scenes with their parameters, which are keys of `[scene]` in a study file. `run-study --scene-help
+dovetail_sector` prints the section of one scene; `python -m studies.scene_help` prints this page. A study may also name
+[a scene file or a finite-element model](OWN_MODEL.md)."""
 
 
 def scene_help(model: str) -> str:

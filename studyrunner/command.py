@@ -95,9 +95,9 @@ def run_command(arguments: Sequence[str] | None) -> int:
 
 
 def _leave_to_rank_0(ranks: Ranks) -> bool:
-    """Waits for rank 0 to write what there is and to end all ranks; it is told, if the launcher has not told all.
+    """Waits for rank 0 to write the result and to end all ranks, after telling rank 0 of the end.
 
-    Whether it had come to its end already, with nothing left to do here.
+    Returns whether rank 0 had already finished.
     """
     from studyrunner.mpi.schedule import RankInterrupted
 

@@ -1,11 +1,14 @@
-"""A cylinder on a flat, the classic fretting test: plane strain, one material, without mass.
+"""A cylinder on a flat, the classic fretting test: plane strain, one material, no mass.
 
-Strips of half of the contact carry uniform tractions on two elastic half-planes; each stands for its mirror image, too
-(`half_space.influence`). A constant force presses; an oscillating tangential force Q, or a prescribed stroke, moves the
-cylinder. `excitation_amplitude` multiplies Q or the stroke, and the frequency has no influence. Unworn, the pressure is
-Hertz's and the stick zone Cattaneo's, and partial slip wears to a profile that is known (`closed_forms.hertz`). The
-depth of a pair is that of flat and cylinder together; areas, forces and volumes are of both halves. The strips stay
-where they are: a stroke is small beside the contact. Load or wear on the last strip shows that they are too few.
+A constant force presses. An oscillating tangential force Q, or a prescribed stroke, moves the cylinder.
+`excitation_amplitude` multiplies Q or the stroke; the frequency has no influence. Strips of half of the contact carry
+uniform tractions on two elastic half-planes; each strip also stands for its mirror image (`half_space.influence`).
+
+- Without wear the pressure is that of Hertz and the stick zone that of Cattaneo. Partial slip wears to a known profile
+  (`closed_forms.hertz`).
+- The depth of a pair is the sum of flat and cylinder. Areas, forces and volumes are of both halves.
+- The strips stay at their places: a stroke has to be small against the contact. Load or wear on the last strip shows
+  that there are too few strips.
 """
 
 from __future__ import annotations
@@ -35,10 +38,10 @@ _WIDEST = 0.45
 
 
 class Parameters(BaseModel):
-    """Bodies, loads and strips.
+    """Parameters of bodies, loads and strips.
 
-    The defaults are steel under 120 N/mm with half of the force that would slide: the half-width is 0.0913 mm, the
-    largest pressure 836 MPa, and half of the contact area sticks.
+    The defaults are steel under 120 N/mm with half of the force at which the cylinder slides: the half-width is 0.0913
+    mm, the largest pressure is 836 MPa, and half of the contact area sticks.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -59,14 +62,14 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="half of the width of all strips, m; if not given somewhat more than wear makes of the contact, so"
-        " that an edge of strips is at that of the stick zone; where a stroke slides a study chooses it by what it will"
-        " wear, and without a study it is 1.5 times that of the unworn contact",
+        description="half of the width of all strips, m; default: somewhat more than the half-width of the worn"
+        " contact, with an edge of strips at the edge of the stick zone; for a sliding stroke a study chooses it by the"
+        " expected wear, and without a study it is 1.5 times the half-width of the unworn contact",
     )
     depth: float | None = Field(
         None,
         gt=0,
-        description="depth that displacements refer to, m, above the width of all strips; R if not given",
+        description="depth that displacements refer to, m, larger than the width of all strips; default: R",
     )
 
     @model_validator(mode="after")

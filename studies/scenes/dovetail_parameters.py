@@ -14,7 +14,7 @@ TRAVELLING_RETAINER = 1e7
 
 
 class Parameters(BaseModel):
-    """One sector of a bladed disk with a dovetail root. SI units but for rotation speed and angles.
+    """One sector of a bladed disk with a dovetail root. SI units, except rotation speed and angles.
 
     The sector's centre line is x, the tangential direction y, the axis of rotation z (leading edge at negative z).
     Radii of the dovetail and of the blade are measured along the centre line.

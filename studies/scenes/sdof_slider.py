@@ -1,9 +1,9 @@
 """A spring-mounted mass that slides on a rigid support: the textbook case of dry friction.
 
-The mass moves along one tangent. Either a constant force presses it on the support, or a spring does, which wear
-relaxes: with the wear depth W the normal force is `N(W) = normal_load - normal_stiffness W` until the pair opens. The
-motion without wear has the closed form of Den Hartog, "Forced vibrations with combined Coulomb and viscous friction",
-Trans. ASME 53 (1931), as long as the mass never stops and has no viscous damping.
+The mass moves along one tangent. A constant force presses the mass on the support, or a spring that wear relaxes: with
+the wear depth W the normal force is `N(W) = normal_load - normal_stiffness W` until the pair opens. Without wear the
+motion has the closed form of Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Trans. ASME 53
+(1931), if the mass never stops and has no viscous damping.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from studies.scenes.closed_forms.den_hartog import DenHartogSlider, worn_normal_
 
 
 class Parameters(BaseModel):
-    """Mass, mount and support.
+    """Parameters of mass, mount and support.
 
-    The defaults resonate at 201.3 Hz without friction. Excited with 10 N at 160 Hz the mass never stops
-    and wears half of the normal force away within 1e5 cycles at a wear coefficient of 1.1e-11 1/Pa.
+    The defaults resonate at 201.3 Hz without friction. Excited with 10 N at 160 Hz the mass never stops, and half of
+    the normal force is lost by wear within 1e5 cycles at a wear coefficient of 1.1e-11 1/Pa.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

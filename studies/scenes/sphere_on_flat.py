@@ -1,12 +1,13 @@
-"""A sphere on a flat: two elastic half-spaces of one material, without mass.
+"""A sphere on a flat: two elastic half-spaces of one material, no mass.
 
-Square patches of a quarter of the contact carry uniform tractions; each stands for its mirror images, too
-(`half_space.influence`). A constant force presses; an oscillating tangential force Q along x, or a prescribed stroke,
-moves the sphere. `excitation_amplitude` multiplies Q or the stroke, and the frequency has no influence. Unworn, the
-pressure is Hertz's and the stick zone that of Cattaneo and Mindlin, whose tractions across the force are left out, and
-partial slip wears to a profile that is known (`closed_forms.hertz`). The depth of a pair is that of flat and sphere
-together; areas, forces and volumes are of all four quarters. Load or wear
-on a patch at the edge shows that the patched circle is too small.
+A constant force presses. An oscillating tangential force Q along x, or a prescribed stroke, moves the sphere.
+`excitation_amplitude` multiplies Q or the stroke; the frequency has no influence. Square patches of a quarter of the
+contact carry uniform tractions; each patch also stands for its mirror images (`half_space.influence`).
+
+- Without wear the pressure is that of Hertz and the stick zone that of Cattaneo and Mindlin, without tractions across
+  the force. Partial slip wears to a known profile (`closed_forms.hertz`).
+- The depth of a pair is the sum of flat and sphere. Areas, forces and volumes are of all four quarters.
+- Load or wear on a patch at the edge shows that the patched circle is too small.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ _WIDEST = 0.5
 
 
 class Parameters(BaseModel):
-    """Bodies, loads and patches.
+    """Parameters of bodies, loads and patches.
 
-    The defaults are steel under 100 N with half of the force that would slide: the radius of the contact is 0.190 mm,
-    the largest pressure 1.32 GPa, and the stick zone reaches to 0.79 of the radius.
+    The defaults are steel under 100 N with half of the force at which the sphere slides: the radius of the contact is
+    0.190 mm, the largest pressure is 1.32 GPa, and the stick zone has 0.79 of the radius.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -60,9 +61,9 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="radius of the patched circle, m; if not given somewhat more than wear makes of the contact, so"
-        " that the patches within the stick zone are as large as it is; where a stroke slides a study chooses it by"
-        " what it will wear, and without a study it is 1.4 times that of the unworn contact",
+        description="radius of the patched circle, m; default: somewhat more than the radius of the worn contact, with"
+        " patches within the stick zone that have the area of the zone; for a sliding stroke a study chooses it by the"
+        " expected wear, and without a study it is 1.4 times the radius of the unworn contact",
     )
 
     @model_validator(mode="after")

@@ -1,7 +1,7 @@
-"""A chain of two masses whose second one slides on a rigid support under a constant normal force.
+"""A chain of two masses; the second mass slides on a rigid support under a constant normal force.
 
-`ground - spring 1 - mass 1 - spring 2 - mass 2`, a damper beside each spring, the excitation on mass 1. Mass 2 may
-stick while mass 1 moves on.
+The chain is `ground - spring 1 - mass 1 - spring 2 - mass 2`, with a damper beside each spring. The excitation acts on
+mass 1. Mass 2 may stick while mass 1 moves.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 
 
 class Parameters(BaseModel):
-    """Chain and support.
+    """Parameters of chain and support.
 
-    The defaults resonate at 0.098 and 0.257 Hz without friction; the friction force is 7.2 N, made for excitations of
-    about 20 N.
+    The defaults resonate at 0.098 and 0.257 Hz without friction; the friction force is 7.2 N, suited to
+    excitations of about 20 N.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -1,9 +1,9 @@
 """A spring-mounted mass that hits an elastic wall behind a gap: a bilinear spring as a unilateral contact.
 
-The wall is a spring to ground whose massless tip stands `gap` away from the resting mass. The closing displacement of
-the pair is `u_N = x - y` with x of the mass and y of the tip, so that in the coordinates (u_N, x) the energy of the
-wall spring is `wall_stiffness (x - u_N)^2 / 2`. Open, the tip rests (`u_N = x`); closed, `u_N = gap` and the contact
-takes up `wall_stiffness (x - gap)`: exactly the bilinear spring.
+The wall is a spring to ground. Its massless tip stands `gap` away from the resting mass. The closing displacement of
+the pair is `u_N = x - y`, with x of the mass and y of the tip. In the coordinates (u_N, x) the energy of the wall
+spring is `wall_stiffness (x - u_N)^2 / 2`. Open, the tip rests (`u_N = x`). Closed, `u_N = gap`, and the contact force
+is `wall_stiffness (x - gap)`: exactly the bilinear spring.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from solver.model import ContactInterface, LinearModel, ReducedModel
 
 
 class Parameters(BaseModel):
-    """Mass, mount and wall.
+    """Parameters of mass, mount and wall.
 
-    The defaults resonate at 0.159 Hz without the wall; made for excitations of about 0.02 N. There the response has two
+    The defaults resonate at 0.159 Hz without the wall and suit excitations of about 0.02 N. There the response has two
     branches, with and without impacts, from 0.175 to 0.248 Hz.
     """
 

@@ -1,7 +1,7 @@
 """The ranks of a run: processes that a launcher has started together, or one process alone.
 
 Only this module imports mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All MPI
-    calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
+calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes of the file. They do not depend on time, place or number of ranks.
 
     Therefore there is no date_created without request: equal runs have equal files except for the run times. The id is
-        a hash of all inputs of the result.
+    a hash of all inputs of the result.
     """
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"

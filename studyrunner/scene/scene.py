@@ -130,7 +130,10 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
 
 
 def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
-    """Writes the scene of a study as a scene file, whole or not at all. Raises UserError where the scene is wrong."""
+    """Writes the scene of a study as a scene file, as a whole or not at all.
+
+    Raises UserError where the scene is wrong.
+    """
     from studies.scene_file import write_scene
 
     model = build_study_scene(study, progress)

@@ -82,7 +82,7 @@ def uninterrupted() -> Iterator[None]:
     """A block that is done as a whole: a signal during the block raises KeyboardInterrupt after the block.
 
     For steps of the main thread that an exception between two instructions would leave half done: a message whose
-        memory is freed before it is sent, or a lock that is never released.
+    memory is freed before it is sent, or a lock that is never released.
     """
     global _n_uninterrupted
     _n_uninterrupted += 1

@@ -62,7 +62,10 @@ class Supports:
 
     @property
     def turned(self) -> BoolArray:
-        """Nodes (n_nodes,) that are eliminated as `phase * rotation` times their images: the right cut face or none."""
+        """Nodes (n_nodes,) that are eliminated as `phase * rotation` times their images.
+
+        These are the nodes of the right cut face, or none.
+        """
         turned = np.zeros(self.n_nodes, dtype=np.bool_)
         if self.cut is not None and not self.keeps_cut:
             turned[self.cut.right] = True

@@ -22,9 +22,9 @@ _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
 
 def tell_volumes(result: Result) -> str:
-    """How many worn volumes are known to rtol, the worst with its place, and what would help there.
+    """Number of worn volumes known to rtol, the worst with its place, and advice.
 
-    Empty where the file says nothing of it.
+    Empty where the file has no errors.
     """
     if not result.tells_volumes:
         return ""
