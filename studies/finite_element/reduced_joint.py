@@ -109,11 +109,7 @@ def build_fe_scene(
     Raises SceneError where the model describes no possible joint.
     """
     excited, n_sectors = options.nodal_diameter, 0 if joint.cut is None else joint.cut.axis.n_sectors
-    if excited > n_sectors // 2:
-        remedy = (
-            f"use at most n_sectors // 2 = {n_sectors // 2}" if n_sectors else "only a cyclic sector has one: use 0"
-        )
-        raise SceneError("nodal_diameter", str(excited), remedy)
+    _check_wave(excited, n_sectors)
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepare_model(model, joint, progress, n_reductions=len({excited, *wanted}))
     pairs, n_nodes = prepared.pairs, len(model.numbers)
@@ -154,6 +150,14 @@ def build_fe_scene(
         pairs=pairs,
         summary=_summary(model, prepared, frequencies),
     )
+
+
+def _check_wave(nodal_diameter: int, n_sectors: int) -> None:
+    """Raises SceneError where a structure of so many sectors has no such nodal diameter."""
+    if nodal_diameter > n_sectors // 2:
+        most = f"use at most n_sectors // 2 = {n_sectors // 2}"
+        remedy = most if n_sectors else "only a cyclic sector has one: use 0"
+        raise SceneError("nodal_diameter", str(nodal_diameter), remedy)
 
 
 def prepare_model(

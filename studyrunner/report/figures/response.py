@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,9 +64,10 @@ def draw_response(result: Result, course: Course) -> Drawing:
                 if np.isnan(values).all():
                     continue
                 text = ", ".join(part for part in (told, result.cycle_label(end)) if part)
-                _draw_branch(
-                    result, panel, course, point, scale(values), line, end, text, told == "" and len(choice.points) > 1
-                )
+                style = course.line_style(line) | {"label": text}
+                if end == 0 and told == "" and len(choice.points) > 1:
+                    style["color"] = "0.2"
+                _draw_branch(result, panel, course, point, scale(values), end, style)
                 unstable_drawn |= _mark_unstable(result, panel, course, point, scale(values), end, not unstable_drawn)
                 if number == 0:
                     top = int(np.nanargmax(values))
@@ -118,22 +120,17 @@ def _draw_branch(
     course: Course,
     point: Point,
     values: NDArray[np.float64],
-    line: int,
     end: int,
-    text: str,
-    lone: bool,
+    style: dict[str, Any],
 ) -> None:
     """One line: the first cycle dashed with open markers, open where the sweep has jumped; the last one full."""
-    style = course.line_style(line)
     at = course.values
     if end == 0:
-        style |= {"markerfacecolor": "white", "linestyle": (0, (4, 2)), "linewidth": 1.2}
-        if lone:
-            style["color"] = "0.2"
+        style = style | {"markerfacecolor": "white", "linestyle": (0, (4, 2)), "linewidth": 1.2}
         if result.has("branch"):
             jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
             at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
-    panel.plot(at, values, label=text, **style)
+    panel.plot(at, values, **style)
 
 
 def _mark_unstable(
