@@ -38,10 +38,10 @@ def follow_branch(
     """Unworn periodic states at some frequencies: index and state, one by one.
 
     A state depends on its own frequency and on no other: the sweep to it begins at a frequency that is the same for
-    all points of a quarter octave (`sweep_start`) and has steps of its own (`sweep`). Where the branch ends at a fold it is
-    followed by arc length until it reaches the next node in a stable state, which is where a slow sweep of the machine
-    would land if the branch is one curve; where that fails, the structure is left to settle in time from the last
-    state, and at last the state is sought from the static one.
+    all points of a quarter octave (`sweep_start`) and has steps of its own (`sweep`). Where the branch ends at a fold
+    it is followed by arc length until it reaches the next node in a stable state, which is where a slow sweep of the
+    machine would land if the branch is one curve. Where that fails, the structure is left to settle in time from the
+    last state, and at last the state is sought from the static one.
 
     Parameters
     ----------
