@@ -37,7 +37,8 @@ class LoadingOptions:
     change_per_rtol: float = 20.0
     """Change of the vibration in a step over its size, over rtol: see above."""
     change_limits: tuple[float, float] = (0.05, 0.2)
-    """Limits of that change, see above."""
+    """Limits of that change, see above. Root of the deck `blade_root`, rtol 5e-2: with 0.2 the wear rate differs by
+    0.04 % from that with 0.03, for 620 iterations in place of 1680."""
     small_vibration: float = 0.3
     """Of the friction limits: a smaller vibration has the step of this one. With 1 the motion at 211 Hz is three times
     as wrong, with 0 there are a few nodes more."""

@@ -6,7 +6,8 @@ is unstable, `LoadingPath.step` searches: by smaller natural steps, by arc lengt
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -166,3 +167,12 @@ class LoadingPath:
         return Step(
             landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (target - end.parameter)),)
         )
+
+
+def in_rows(point: PathPoint) -> PathPoint:
+    """The same point with arrays that lie in memory as they do when they were kept: sums over them are the same."""
+    values: dict[str, Any] = {entry.name: getattr(point.evaluation, entry.name) for entry in fields(point.evaluation)}
+    lain: dict[str, Any] = {
+        name: np.array(value, order="C") for name, value in values.items() if isinstance(value, np.ndarray)
+    }
+    return replace(point, evaluation=replace(point.evaluation, **lain), history=np.array(point.history, order="C"))

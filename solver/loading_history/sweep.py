@@ -16,8 +16,7 @@ the finer one, and as a rule the error of the coarser one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, vibration_change, vibration_size
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
-from solver.loading_history.path_step import LoadingPath, Step
+from solver.loading_history.path_step import LoadingPath, Step, in_rows
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Effort, move_point
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -338,9 +337,9 @@ class NodeSweep:
         state = self.state
         self.state = replace(
             state,
-            nodes=tuple(map(_in_rows, state.nodes)),
-            reference=tuple(map(_in_rows, state.reference)),
-            checked=None if state.checked is None else _in_rows(state.checked),
+            nodes=tuple(map(in_rows, state.nodes)),
+            reference=tuple(map(in_rows, state.reference)),
+            checked=None if state.checked is None else in_rows(state.checked),
             iterations=self.effort.iterations,
         )
         self._forget()
@@ -349,12 +348,3 @@ class NodeSweep:
     def _forget(self) -> None:
         """Give up the factorisations that are kept from node to node, and the next node."""
         self.solver, self.reference_solver, self.ahead = JacobianSolver(), JacobianSolver(), None
-
-
-def _in_rows(point: PathPoint) -> PathPoint:
-    """The same point with arrays that lie in memory as they do when they were kept: sums over them are the same."""
-    values: dict[str, Any] = {entry.name: getattr(point.evaluation, entry.name) for entry in fields(point.evaluation)}
-    lain: dict[str, Any] = {
-        name: np.array(value, order="C") for name, value in values.items() if isinstance(value, np.ndarray)
-    }
-    return replace(point, evaluation=replace(point.evaluation, **lain), history=np.array(point.history, order="C"))

@@ -10,7 +10,7 @@ import pytest
 
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.loading_history import start_states
+from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.solve_balance import Effort
@@ -30,7 +30,7 @@ from tests.solver.random_orbits import Scene, drawn
 @pytest.fixture
 def presented(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unstable states are handed out, to be looked at here."""
-    monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
+    monkeypatch.setattr(frequency_sweep, "find_instability", lambda *_: None)
 
 
 def start_of(
@@ -285,7 +285,7 @@ def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.M
     frequency = scene.omega / (2.0 * np.pi)
     assert start_of(scene.model, 0.0, scene.excitation, frequency, settings).outcome is Outcome.PERIOD_DOUBLED
     with monkeypatch.context() as handed_out:
-        handed_out.setattr(start_states, "find_instability", lambda *_: None)
+        handed_out.setattr(frequency_sweep, "find_instability", lambda *_: None)
         start = start_of(scene.model, 0.0, scene.excitation, frequency, settings)
     assert start.outcome is Outcome.CONVERGED
     history = march_wear(scene.model, 0.0, start, 1.0, 1.0, "implicit", np.zeros(1), settings)

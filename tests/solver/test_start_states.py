@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.loading_history import start_states
+from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
@@ -266,7 +266,7 @@ def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch: pytest.Mon
         given[-1].iterations += 1000
         return Outcome.STATIC_FAILED, None
 
-    monkeypatch.setattr(start_states, "solve_first_state", in_vain)
+    monkeypatch.setattr(frequency_sweep, "solve_first_state", in_vain)
     kept: list[Packed] = []
     frequencies = np.array([150.0, 160.0, 170.0])
     found = dict(

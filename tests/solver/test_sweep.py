@@ -10,8 +10,9 @@ import pytest
 
 from solver.loading_history import start_states
 from solver.loading_history import sweep as sweep_module
+from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.options import LOADING
-from solver.loading_history.start_states import FrequencySweep, follow_branch
+from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import find_origin
 from solver.outcome import Outcome
 from solver.packing import Packed
