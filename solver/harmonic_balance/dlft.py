@@ -305,5 +305,6 @@ def hold_back(
                 held[row, k] = kept[i * m + k]
                 motion[row, k] = compliance * kept[i * m + k]
             if i == 0:
-                motion[row, 0] += np.dot(growth[pair], own)
+                for k in range(3 * m):
+                    motion[row, 0] += growth[pair, k] * own[k]
     return held, motion

@@ -149,7 +149,7 @@ def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: f
     projected[0] = norms[-1]
     k, lost = 0, False
     while k < most and not lost:
-        column, lost = extend_basis(basis, k, product(basis[k]), NEWTON.round_off)
+        column, lost = extend_basis(basis, k, np.ascontiguousarray(product(basis[k])), NEWTON.round_off)
         if not np.all(np.isfinite(column)) or not rotate_column(column, rotations, k):
             break
         triangle[: k + 1, k] = column[: k + 1]
@@ -193,7 +193,9 @@ def ritz_values(
     basis[0] = start / np.linalg.norm(start)
     values, residuals = np.empty(0, complex), np.empty(0)
     for k in range(1, size + 1):
-        projected[: k + 1, k - 1], lost = extend_basis(basis, k - 1, product(basis[k - 1]), NEWTON.round_off)
+        projected[: k + 1, k - 1], lost = extend_basis(
+            basis, k - 1, np.ascontiguousarray(product(basis[k - 1])), NEWTON.round_off
+        )
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)
         look = enough is not None and k >= NEWTON.sign_products and k % NEWTON.sign_check == 0

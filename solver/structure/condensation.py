@@ -64,7 +64,8 @@ class CondensedStructure:
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
         """The same to three digits at least, in less time: for directions of Newton's method."""
-        return multiply_roughly(self.static_stiffness, self.moving.rough, displacement_h)
+        static = np.ascontiguousarray(self.static_stiffness)
+        return multiply_roughly(static, self.moving.rough, np.ascontiguousarray(displacement_h))
 
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""

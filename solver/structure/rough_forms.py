@@ -49,7 +49,12 @@ def rough_of_each(dense: ComplexArray) -> RoughStiffness:
     """Form with a matrix for each harmonic, from these (H, n_rel, n_rel), N/m."""
     none = np.empty((0, 0), np.float32)
     return RoughStiffness(
-        dense.astype(np.complex64), none, np.empty(0, np.float32), none, none, np.empty((0, 0, 0), np.complex64)
+        np.ascontiguousarray(dense, np.complex64),
+        none,
+        np.empty(0, np.float32),
+        none,
+        none,
+        np.empty((0, 0, 0), np.complex64),
     )
 
 
@@ -73,14 +78,14 @@ def rough_of_shared(
     coupling = behind[0] - rate**2 * behind[1] + 1j * rate * behind[2]
     core = 1j * rate * common.drag - rate**2 * common.mass
     core = core - coupling @ held_compliance @ coupling.transpose(0, 2, 1)
-    basis = common.basis.astype(np.float32)
+    basis = np.ascontiguousarray(common.basis, np.float32)
     return RoughStiffness(
         np.empty((0, 0, 0), np.complex64),
         common.stiffness,
         (rates * common.slope).astype(np.float32),
         basis,
         np.ascontiguousarray(basis.T),
-        core.astype(np.complex64),
+        np.ascontiguousarray(core, np.complex64),
     )
 
 
@@ -123,7 +128,7 @@ def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
     basis = left[:, sizes > 1e-6]
     small_mass, small_drag = basis.T @ mass @ basis, basis.T @ drag @ basis
     return _CommonForm(
-        stiffness.astype(np.float32),
+        np.ascontiguousarray(stiffness, np.float32),
         slope,
         basis,
         small_mass,

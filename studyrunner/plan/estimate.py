@@ -32,8 +32,8 @@ ITERATIONS_TO_A_FINAL_STATE = 50
 """Newton iterations of the scheme "final" without integration (4 to 35 pairs: 15 to 60)."""
 
 ITERATIONS_AN_ADAPTIVE_STEP = 6
-"""Newton iterations of one adaptive step near the resonance (48 pairs: 4 to 8). Refused steps and the reference solution
-are included."""
+"""Newton iterations of one adaptive step near the resonance (48 pairs: 4 to 8), with refused steps and those of the
+reference solution."""
 
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""

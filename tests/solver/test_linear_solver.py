@@ -112,3 +112,11 @@ def test_a_newton_iteration_with_kept_factors_converges_like_one_with_fresh_ones
         fresh = oracle(balance, moved, -near.residual)
         assert error(kept, fresh) < 1e-2
         predicted = moved
+
+
+@pytest.mark.parametrize("wear", [False, True])
+def test_rough_products_are_those_of_the_jacobian_to_three_digits(wear: bool) -> None:
+    balance, predicted = large(14, wear)
+    tangent = balance.linearise(balance.evaluate(predicted))
+    step = np.random.default_rng(15).normal(size=predicted.shape)
+    assert error(tangent.apply_roughly(step), tangent.apply(step)) < 1e-5
