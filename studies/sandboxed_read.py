@@ -1,9 +1,8 @@
-"""Reads a file of unknown origin in a process of its own before this one does.
+"""Reads a file of unknown origin in a separate process before this process reads it.
 
-The HDF5 library was not made for bytes that somebody has tampered with: some crash it, some keep it busy for ever, and
-a few unpack to any size. The process that finds out has a limit of its time and memory, and its end is the answer:
-exit status 0 for a file that can be read, 3 with a reason for one that can not, anything else where it came to a bad
-end.
+The HDF5 library was not made for manipulated bytes: some crash it, some keep it busy for ever, a few unpack to any
+size. The separate process has limits of time and memory. Exit status 0 means a readable file, 3 an unreadable one
+with a reason, anything else a crash or a limit.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ from studies.guards.limited_process import REFUSED, limit_this_process, run_limi
 from studies.scene_error import SceneError
 
 LARGEST_MEMORY = 2**31
-"""Bytes of address space for reading a file."""
+"""Address space for reading a file, bytes."""
 
 LONGEST = 2
-"""CPU seconds for reading a file, and one more for every _BYTES_A_SECOND that it has."""
+"""CPU time for reading a file, s; one second more for every _BYTES_A_SECOND of the file."""
 
 _BYTES_A_SECOND = 2**25
 _WHOLE_RESULT = "*"
@@ -53,7 +52,7 @@ def check_scene_readable(path: Path, group: str = "", attributes: Sequence[str] 
 
 
 def check_result_readable(path: Path) -> None:
-    """Raises SceneError where a result file would do harm to a program that opens it."""
+    """Raises SceneError where opening a result file would do harm."""
     _check(path, [_WHOLE_RESULT])
 
 
@@ -67,12 +66,12 @@ def _check(path: Path, what: Sequence[str]) -> None:
 
 
 def run_sandbox(arguments: Sequence[str]) -> tuple[int, str]:
-    """Exit status of the process that reads a file, and what it says."""
+    """Exit status and output of the process that reads a file."""
     return run_limited(__name__, arguments, _WALL_SECONDS)
 
 
 def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = ()) -> tuple[int, str]:
-    """Reads all of a scene; exit status and what is said. This process can do nothing else afterwards."""
+    """Reads a whole scene; exit status and output. Afterwards this process can do nothing else."""
     # loaded before there are limits, as it is no fault of the file how long that takes
     from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
     from studies.scene_file import read_through
@@ -104,7 +103,7 @@ def read_within_limits(path: Path, group: str = "", attributes: Sequence[str] = 
 
 
 def main(arguments: Sequence[str]) -> NoReturn:
-    """The process that reads. arguments: path, group, names of attributes."""
+    """The separate process. arguments: path, group, names of attributes."""
     exit_status, answer = read_within_limits(Path(arguments[0]), arguments[1], arguments[2:])
     print(answer, flush=True)
     sys.exit(exit_status)

@@ -14,9 +14,9 @@ from studies.scenes import BUNDLED, scene_parameters
 
 _PAGE = """# Bundled scenes
 
-The bundled scenes with their parameters, which are keys of `[scene]` in a study file. `run-study --scene-help
-dovetail_sector` prints the section of one scene; `python -m studies.scene_help` prints this page. A study may also name
-[a scene file or a finite-element model](OWN_MODEL.md)."""
+The bundled scenes with their parameters, which are keys of `[scene]` in a study file. A study may also name
+[a scene file or a finite-element model](OWN_MODEL.md). `run-study --scene-help dovetail_sector` prints the section of
+one scene; `python -m studies.scene_help` prints this page."""
 
 
 def scene_help(model: str) -> str:

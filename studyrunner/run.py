@@ -249,7 +249,7 @@ def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, prog
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
-        # before crashes are looked at: what has ended two processes since it was tried again has failed again
+        # Before crashes are counted: a task that has ended two more processes has failed again.
         completion.forget_failed(COMPLETE)
     for crash in take_crashes(completion, fresh=options.fresh):
         if completion.is_left(crash.key):
@@ -264,7 +264,7 @@ def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
     """Removes what a finished study no longer needs, and packs the rest."""
     forget_crashes(completion.store.folder, None if prune else completion.keys - _tried_again(completion))
     completion.prune(0.0 if prune else MOST_OF_OTHERS)
-    # the result stands: what an ending keeps from being packed is packed by the next run
+    # The result is written. What a signal keeps from being packed is packed by the next run.
     try:
         completion.pack()
     except KeyboardInterrupt:
@@ -293,7 +293,7 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
     for key, crashes in read_tally(folder).items():
         if key in own and len(crashes) >= MOST_DEATHS:
             completion.take_as_failed(key, crashes[-1].position, Outcome.CRASHED, crashes[-1].message)
-            # it is on the disk: where it is asked for again, counting begins anew
+            # The failure is on the disk. With --retry-failed counting begins anew.
             forget_crashes(folder, {key})
     tally = read_tally(folder)
     return [crash for crash in new if crash.key in tally]
@@ -346,7 +346,7 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
                 given.add(result.position)
             yield result
         if isinstance(task, BranchTask) and len(given) < task.n_results and task.resume is not None:
-            # the branch had passed states that are damaged or were not asked for then
+            # The earlier run had passed states that are damaged, or that it did not need.
             yield from compute(replace(task, known=task.known | given, resume=None), keep)
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -356,7 +356,7 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
                 n_given += 1
                 yield result
         except Exception as error:
-            # what an ending has broken off is none of the task
+            # An exception from a signal is no failure of the task.
             raise_ending()
             yield from failed_results(task, n_given, error)
 

@@ -90,7 +90,7 @@ class TaskProgress:
             again = replace(again, cost=_cost_left(task, again.n_results))
             self.n_starts_left += again.n_results
         else:
-            # it gives all of its histories again
+            # The task gives all of its histories again.
             self.n_points -= self._n_given.pop(task.number, 0)
         self._left[again.kind] += again.cost
         return [again]
@@ -106,7 +106,7 @@ class TaskProgress:
         """
         left: list[BranchTask | MarchTask] = []
         keys = [task.key for task, _ in lost]
-        # its word is the later one: what it has sent last may be lost with it
+        # The note of the rank is newer than its last message, which may be lost.
         at = next((key for key in keys if key in crashes), next(iter(keys), ""))
         self._n_lost[at] += 1
         for task, n_left in lost:
@@ -130,7 +130,7 @@ class TaskProgress:
             elif crash is not None:
                 self._left[task.kind] -= _cost_left(task, n_left)
             else:
-                # it gives all of its histories again
+                # The task gives all of its histories again.
                 n_given = task.n_results - n_left
                 self.n_points -= sum(len(scaled.points) for scaled in again.histories[:n_given])
                 self._left[task.kind] += task.cost - _cost_left(task, n_left)
@@ -152,7 +152,7 @@ class TaskProgress:
         longest = 0.0
         for task, n_left, elapsed in running:
             expected = task.cost_of(first=n_left == task.n_results) * factors[task.kind]
-            # one that is late takes some time more, nobody knows how much
+            # The time left of a task that takes longer than expected is a guess.
             still = max(expected - elapsed, _LATE * elapsed)
             left += still - expected
             longest = max(longest, still)

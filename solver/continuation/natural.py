@@ -1,7 +1,8 @@
 """Natural continuation of a converged state along one parameter; `arc_length` continues where it fails.
 
 The parameter may be the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale; the caller supplies the balance at a value of it. The work is bounded by the number of steps and failures.
+time scale; the caller supplies the balance at a value of it. The work is bounded by the
+shortest step and the number of failures.
 """
 
 from __future__ import annotations
@@ -64,9 +65,7 @@ def follow_naturally(
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
     fraction, failures = 1.0, 0
-    for _ in range(CONTINUATION.natural_steps):
-        if point.parameter == target:
-            break
+    while point.parameter != target:
         reach = point.parameter + fraction * whole
         if (target - reach) * whole <= CONTINUATION.target_round_off * whole * whole:
             reach = target
@@ -83,7 +82,7 @@ def follow_naturally(
             failures += not result.converged
             if fraction < shortest or failures > CONTINUATION.natural_failures or effort.exhausted:
                 return point, False
-    return point, point.parameter == target
+    return point, True
 
 
 def _is_smooth(before: Evaluation, after: Evaluation) -> bool:

@@ -27,8 +27,6 @@ class ContinuationOptions:
     linear resonance is 2."""
     shortest_fraction: float = 1.0 / 64.0
     """Of the range to the target: where a shorter step is needed the branch is taken to fold."""
-    natural_steps: int = 600
-    """Steps of one continuation."""
     natural_failures: int = 25
     """Steps that do not converge: a branch with many corners is left to arc length. With half as many the dovetail has
     no static state at a friction coefficient of 1000."""
@@ -105,10 +103,6 @@ class ContinuationOptions:
     transient_effort: int = 800
     """Newton iterations of one relaxation, those for the periodic state included: a fall behind a fold of vibro-impact
     takes 400 to 500, and what does not settle (16 pairs of a blade that slips and lifts all over) thousands."""
-    transient_failures: int = 60
-    """Steps that do not converge or change too much."""
-    transient_iterations: int = 12
-    """Newton iterations of a step. Of 36 that converged (impacts, random scenes) one took 11."""
     transient_tolerance: float = 1e-6
     """Scaled residual of a step, which is no result."""
     shortest_transient: float = 1.0 / 64.0

@@ -186,7 +186,7 @@ def relax_to_periodic(
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted = start.predicted_h
     period = 2.0 * np.pi / joint.omega
-    length, tried, failures = 1.0, np.inf, 0
+    length, tried = 1.0, np.inf
     size = float(np.abs(start.displacement_h).max())
     last = min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
     for _ in range(CONTINUATION.transient_steps):
@@ -195,14 +195,13 @@ def relax_to_periodic(
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         tolerance = max(CONTINUATION.transient_tolerance, case.settings.tolerance)
-        most = CONTINUATION.transient_iterations
+        most = CONTINUATION.near_iterations
         result = solve_balance(balance, predicted, solver, tolerance, effort, most)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
         if not result.converged or (change > CONTINUATION.largest_change and length > 1.0):
             length *= CONTINUATION.transient_cut
-            failures += 1
-            if length < CONTINUATION.shortest_transient or failures > CONTINUATION.transient_failures:
+            if length < CONTINUATION.shortest_transient:
                 break
             continue
         motion, predicted = ahead, result.evaluation.predicted_h

@@ -18,16 +18,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.harmonic_balance.options import BALANCE
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from solver.model import BoolArray, FloatArray, IntArray
 from solver.packing import packable
 from solver.structure.joint import Joint
 from solver.structure.rough_forms import SingleArray
@@ -236,45 +234,10 @@ class Linearisation:
             matrix[:, 2::2] -= moved.imag
         return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
 
-    def dense_harmonic(self, pairs: IntArray, place: int) -> ComplexArray:
-        """What the Jacobian does within one harmonic above the static one: a complex matrix over the rows of `pairs`.
-
-        place: of the harmonic among those of the basis. The pairs' tangents mix its cosine and sine in any way; the
-        part that a complex factor can express is taken.
-        """
-        whole = self.joint.basis.synthesis.shape[0]
-        rows, pair, component = self._rows(pairs)
-        cosine = 2 * place + 1
-        motion, force = (
-            _complex_part(
-                part[pairs].reshape(-1, 3, whole, 3, whole)[:, :, cosine : cosine + 2, :, cosine : cosine + 2]
-            )
-            for part in (self.motion_tangent, self.force_tangent)
-        )
-        matrix = self._spread(self.joint.structure.moving.matrix(place), rows, pair, component, motion[..., None])
-        matrix[np.arange(rows.size), pair] += force[pair, component][..., None]
-        return cast("ComplexArray", matrix.reshape(rows.size, -1)[:, 3 * pair + component])
-
     def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         """Rows of `pairs`, and for each its place in `pairs` and its component."""
         rows = self.joint.rows_of(pairs)
         return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
-
-    def _spread(
-        self, stiffness: Matrix, rows: IntArray, pair: IntArray, component: IntArray, motion: Matrix
-    ) -> NDArray[Any]:
-        """`stiffness motion` (n_rows, n_pairs, 3, k) of blocks (n_pairs, 3, 3, k) that act within a pair."""
-        n_pairs = motion.shape[0]
-        spread = np.zeros((n_pairs, 3, rows.size), stiffness.dtype)
-        spread[pair, component] = stiffness[np.ix_(rows, rows)].T
-        moved = np.matmul(spread.transpose(0, 2, 1), motion.reshape(n_pairs, 3, -1))
-        return np.asarray(moved.transpose(1, 0, 2).reshape(rows.size, n_pairs, 3, -1))
-
-
-def _complex_part(tangent: FloatArray) -> ComplexArray:
-    """Complex-linear part (..., 3, 3) of a real map (..., 3, 2, 3, 2) between amplitudes `cosine - i sine`."""
-    cc, cs, sc, ss = tangent[:, :, 0, :, 0], tangent[:, :, 0, :, 1], tangent[:, :, 1, :, 0], tangent[:, :, 1, :, 1]
-    return cast("ComplexArray", 0.5 * (cc + ss) + 0.5j * (cs - sc))
 
 
 @njit(cache=True)

@@ -17,9 +17,6 @@ class BalanceOptions:
     fraction of the preload a vibration is lost in the round-off of the static force at the usual tolerance of 1e-8."""
     peak_points: int = 1024
     """In a period, at which the largest response is looked for: a peak of harmonic 20 is found to 0.2 %."""
-    exact_bytes: float = 2e6
-    """Tangents of all pairs up to which their products stay in double precision: more do not stay in the cache. Does
-    not change results."""
     tail_orders: int = 3
     """Times the highest harmonic: up to there the tail of a friction force is taken in, which eight samples a harmonic
     still tell."""

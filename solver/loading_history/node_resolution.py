@@ -17,11 +17,11 @@ from solver.settings import Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
 
-def resolution_holds(case: Case, joint: Joint, point: PathPoint, effort: Effort) -> bool:
+def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool, effort: Effort) -> bool:
     """Whether a state has about the harmonics and samples that it needs, by one linear solve at most.
 
     One Newton iteration with two levels of harmonics more and twice the samples shows the error. False where that error
-    is above the aim, and where it is so far below that fewer harmonics may do.
+    is above the aim, and where it is so far below that fewer harmonics may do. at_limit: whether there may be no more.
     """
     resolution, evaluation = case.resolution, point.evaluation
     fewest = resolution == first_resolution(case.settings)
@@ -37,7 +37,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, effort: Effort)
     error = Level(case, joint, point).difference(better).times(ACCURACY.two_levels_safety).largest
     settings = case.settings
     least = 0.0 if fewest else ACCURACY.spare_fraction * ACCURACY.kept_fraction * settings.rtol
-    return bool(least <= error <= settings.rtol)
+    return bool(error >= least and (at_limit or error <= settings.rtol))
 
 
 def _moved(

@@ -118,9 +118,7 @@ class LoadingPath:
             balance = self.balance_at(point.parameter, point.evaluation.history)
             return is_stable(balance.linearise(point.evaluation), solver)
 
-        for _ in range(LOADING.most_folds):
-            if effort.exhausted:
-                break
+        while not effort.exhausted:
             point, arrived = follow_naturally(
                 self.balance_at, start, target, solver, tolerance, effort, fine=LOADING.free_step * scale
             )
@@ -128,7 +126,7 @@ class LoadingPath:
                 return Step(point, tuple(folds))
             # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
             end = start if arrived else point
-            span = LOADING.arc_span * scale
+            span = LOADING.search_distance * scale
             arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, effort, stays, beyond=False)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))

@@ -81,19 +81,19 @@ def follow_branch(
         Index of the frequency, in the order of the sweep, and its state or why there is none.
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
-    walks = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
-    walks.effort.tell = tell or walks.effort.tell
+    line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
+    line.effort.tell = tell or line.effort.tell
     counted = 0
     if resume is not None:
         counted, state = unpack(resume)
-        walks.load_state(state)
+        line.load_state(state)
     kept = counted
     started = computing_time()
     for index in order:
-        walks.set_deadline(started + settings.time_limit)
+        line.set_deadline(started + settings.time_limit)
         message = ""
         try:
-            found = walks.advance(float(frequencies[index]))
+            found = line.advance(float(frequencies[index]))
         except OutOfTimeError:
             found = _Found(Outcome.TIME_LIMIT)
         except Exception as error:
@@ -106,27 +106,27 @@ def follow_branch(
                 outcome=found.outcome,
                 state=found.state,
                 coarse=found.coarse,
-                penalty_omega=walks.penalty_omega,
-                resolution=found.resolution or walks.resolution,
+                penalty_omega=line.penalty_omega,
+                resolution=found.resolution or line.resolution,
                 response_error=found.estimate.response,
                 wear_rate_error=found.estimate.wear_rate,
-                newton_iterations=walks.n_iterations - counted,
+                newton_iterations=line.n_iterations - counted,
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
                 message=message or found.message,
             ),
         )
-        started, counted = now, walks.n_iterations
-        # a walk that has found no state to begin with has nothing to go on from
-        begun = walks.walk is not None and walks.walk.saved is not None
+        started, counted = now, line.n_iterations
+        # a sweep that has found no state to begin with has nothing to go on from
+        begun = line.nodes is not None and line.nodes.saved is not None
         if keep is not None and begun and counted >= kept + LOADING.iterations_per_report:
-            keep(pack((counted, walks.state_dict())))
+            keep(pack((counted, line.state_dict())))
             kept = counted
 
 
 _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
-"""Why a walk has ended: they say more than that it has."""
+"""Why a sweep has ended: they say more than that it has."""
 
 
 class _Found:
@@ -143,17 +143,17 @@ class _Found:
 
 
 class FrequencySweepState(TypedDict):
-    """What goes on from frequency to frequency: attributes of a `FrequencySweep` and of its current walk."""
+    """What goes on from frequency to frequency: attributes of a `FrequencySweep` and of its current sweep by nodes."""
 
     origin: Origin
     omega: float | None
     own_iterations: int
-    walked_iterations: int
-    walk: SweepState
+    sweep_iterations: int
+    nodes: SweepState
 
 
 class FrequencySweep:
-    """The sweep over frequencies: one walk for all points with the same origin, or one for each point of a ramp."""
+    """The sweep over frequencies: one sweep for all points with the same origin, or one for each point of a ramp."""
 
     def __init__(
         self,
@@ -170,8 +170,8 @@ class FrequencySweep:
         self.settings = settings
         self.effort = Effort()
         self.origin: Origin | None = None
-        self.walk: NodeSweep | None = None
-        self._walked = 0
+        self.nodes: NodeSweep | None = None
+        self._counted = 0
 
     @property
     def penalty_omega(self) -> float:
@@ -180,71 +180,71 @@ class FrequencySweep:
 
     @property
     def resolution(self) -> Resolution:
-        """Harmonics and samples of the walk."""
-        return Resolution((1,), 4) if self.walk is None else self.walk.case.resolution
+        """Harmonics and samples of the nodes."""
+        return Resolution((1,), 4) if self.nodes is None else self.nodes.case.resolution
 
     @property
     def n_iterations(self) -> int:
         """Newton iterations so far."""
-        return self.effort.iterations + (0 if self.walk is None else self.walk.effort.iterations)
+        return self.effort.iterations + (0 if self.nodes is None else self.nodes.effort.iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """CPU time of the thread, s, after which the state that is sought is given up."""
         self.effort.deadline = deadline
-        if self.walk is not None:
-            self.walk.effort.deadline = deadline
+        if self.nodes is not None:
+            self.nodes.effort.deadline = deadline
 
     def state_dict(self) -> FrequencySweepState:
         """What goes on from frequency to frequency, to be packed."""
-        assert self.walk is not None
-        assert self.walk.saved is not None
+        assert self.nodes is not None
+        assert self.nodes.saved is not None
         assert self.origin is not None
         return {
             "origin": self.origin,
-            "omega": self.walk.path.omega,
+            "omega": self.nodes.path.omega,
             "own_iterations": self.effort.iterations,
-            "walked_iterations": max(self.walk.effort.iterations, self._walked),
-            "walk": self.walk.saved,
+            "sweep_iterations": max(self.nodes.effort.iterations, self._counted),
+            "nodes": self.nodes.saved,
         }
 
     def load_state(self, state: FrequencySweepState) -> None:
         """Go on from the state of another one."""
         self.origin = state["origin"]
         self.effort.iterations = state["own_iterations"]
-        self._walked = state["walked_iterations"]
-        self.walk = self._new_walk(self.origin, state["omega"])
-        self.walk.load_state(state["walk"])
+        self._counted = state["sweep_iterations"]
+        self.nodes = self._new_sweep(self.origin, state["omega"])
+        self.nodes.load_state(state["nodes"])
 
-    def _new_walk(self, origin: Origin, omega: float | None) -> NodeSweep:
+    def _new_sweep(self, origin: Origin, omega: float | None) -> NodeSweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
-        walk = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
-        walk.effort.deadline, walk.effort.tell = self.effort.deadline, self.effort.tell
-        return walk
+        nodes = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
+        nodes.effort.deadline, nodes.effort.tell = self.effort.deadline, self.effort.tell
+        return nodes
 
     def advance(self, frequency: float) -> _Found:
         """State at the next frequency, Hz, with the harmonics that it needs."""
         origin, omega = find_origin(self.model, frequency, self.sweep), 2.0 * np.pi * frequency
         other_cell = self.origin is None or origin.cell != self.origin.cell
-        if self.walk is None or self.sweep == "ramp" or other_cell or self.walk.has_passed(omega):
+        if self.nodes is None or self.sweep == "ramp" or other_cell or self.nodes.has_passed(omega):
             self.origin = origin
             # one that was loaded has not gone again to where it was
-            self.effort.iterations += max(0 if self.walk is None else self.walk.effort.iterations, self._walked)
-            self._walked = 0
-            self.walk = self._new_walk(origin, omega if self.sweep == "ramp" else None)
-            self._begin(self.walk, origin)
-        walk, target = self.walk, 1.0 if self.sweep == "ramp" else omega
-        self._walk_to(walk, target)
+            self.effort.iterations += max(0 if self.nodes is None else self.nodes.effort.iterations, self._counted)
+            self._counted = 0
+            self.nodes = self._new_sweep(origin, omega if self.sweep == "ramp" else None)
+            self._begin(self.nodes, origin)
+        nodes, target = self.nodes, 1.0 if self.sweep == "ramp" else omega
+        self._advance_to(nodes, target)
         self.effort.limit = self.effort.iterations + LOADING.node_iterations
         try:
-            reached, coarse = walk.state_at(target, self.effort)
-            case = walk.case
+            reached, coarse = nodes.state_at(target, self.effort)
+            case = nodes.case
             if reached is None:
                 self.effort.limit = self.effort.iterations + LOADING.first_iterations
                 case, point = self._first(omega)
                 reached = None if point is None else Step(point)
             if reached is None:
-                lost = _Found(self._why_lost(walk))
-                lost.message = self._where_lost(walk)
+                lost = _Found(self._why_lost(nodes))
+                lost.message = self._where_lost(nodes)
                 return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
             if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
@@ -252,14 +252,14 @@ class FrequencySweep:
         except np.linalg.LinAlgError:
             return _Found(Outcome.SINGULAR)
         # those of a ramp are no frequencies
-        fold = float("nan") if self.sweep == "ramp" else (walk.state.fold, *reached.folds)[-1]
-        found = _Found(Outcome.CONVERGED, walk.state.branch + len(reached.folds), fold)
-        return self._judge(refined, omega, found, walk.reference_path.case, coarse)
+        fold = float("nan") if self.sweep == "ramp" else (nodes.state.fold, *reached.folds)[-1]
+        found = _Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
+        return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
 
     def _judge(
         self, refined: Refined, omega: float, found: _Found, coarse_case: Case, coarse: PathPoint | None
     ) -> _Found:
-        """Whether a refined state is a result, with its error and what the coarse walk has come to."""
+        """Whether a refined state is a result, with its error and what the reference sweep has come to."""
         joint = refined.case.joint(omega, self.excitation_amplitude)
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
@@ -277,16 +277,16 @@ class FrequencySweep:
             found.outcome = Outcome.INACCURATE
         return found
 
-    def _begin(self, walk: NodeSweep, origin: Origin) -> None:
-        """A state where the walk begins; none where there is none, or where the structure is singular there."""
+    def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
+        """A state where the sweep begins; none where there is none, or where the structure is singular there."""
         self.effort.limit = self.effort.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
-            if self._begin_at(walk, place):
+            if self._begin_at(nodes, place):
                 return
 
-    def _begin_at(self, walk: NodeSweep, place: float) -> bool:
-        omega, load_factor = (place, 1.0) if walk.path.omega is None else (walk.path.omega, place)
+    def _begin_at(self, nodes: NodeSweep, place: float) -> bool:
+        omega, load_factor = (place, 1.0) if nodes.path.omega is None else (nodes.path.omega, place)
         self.effort.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
         try:
             case, point = self._first(omega, load_factor)
@@ -294,38 +294,38 @@ class FrequencySweep:
             return False
         if point is None:
             return False
-        return walk.begin(case, PathPoint(place, point.evaluation, point.history))
+        return nodes.begin(case, PathPoint(place, point.evaluation, point.history))
 
-    def _walk_to(self, walk: NodeSweep, target: float) -> None:
-        """As far as the target; where the walk ends before, it is begun anew a little behind its end."""
+    def _advance_to(self, nodes: NodeSweep, target: float) -> None:
+        """As far as the target; where the sweep ends before, it is begun anew a little behind its end."""
         # all attempts together: where a joint has no grip none of them leads on
         self.effort.limit = self.effort.iterations + LOADING.first_iterations
-        for _ in range(LOADING.most_restarts):
+        while True:
             try:
-                walk.advance_to(target)
+                nodes.advance_to(target)
             except np.linalg.LinAlgError:
-                walk.lose()
-            if walk.here is not None or walk.path.omega is not None or np.isnan(walk.state.lost_at):
+                nodes.lose()
+            if nodes.here is not None or nodes.path.omega is not None or np.isnan(nodes.state.lost_at):
                 return
-            behind = walk.state.lost_at * (1.0 + LOADING.restart_distance * walk.direction)
-            if (behind - target) * walk.direction >= 0.0:
+            behind = nodes.state.lost_at * (1.0 + LOADING.search_distance * nodes.direction)
+            if (behind - target) * nodes.direction >= 0.0:
                 return
             if self.effort.exhausted:
                 return
-            if not self._begin_at(walk, behind):
-                walk.state = replace(walk.state, lost_at=behind)
+            if not self._begin_at(nodes, behind):
+                nodes.state = replace(nodes.state, lost_at=behind)
 
-    def _why_lost(self, walk: NodeSweep) -> Outcome:
-        never = np.isnan(walk.state.lost_at)
-        return walk.state.failure if never or walk.state.failure in _REASONS else Outcome.BRANCH_LOST
+    def _why_lost(self, nodes: NodeSweep) -> Outcome:
+        never = np.isnan(nodes.state.lost_at)
+        return nodes.state.failure if never or nodes.state.failure in _REASONS else Outcome.BRANCH_LOST
 
-    def _where_lost(self, walk: NodeSweep) -> str:
-        """How far a walk came that has lost its branch; empty for one that never began, and for a ramp."""
-        if np.isnan(walk.state.lost_at):
+    def _where_lost(self, nodes: NodeSweep) -> str:
+        """How far a sweep came that has lost its branch; empty for one that never began, and for a ramp."""
+        if np.isnan(nodes.state.lost_at):
             return ""
-        if walk.path.omega is not None:
-            return f"the vibration repeats up to {100.0 * walk.state.lost_at:.3g} % of the excitation"
-        return f"the sweep goes on in stable states as far as {walk.state.lost_at / (2.0 * np.pi):.6g} Hz"
+        if nodes.path.omega is not None:
+            return f"the vibration repeats up to {100.0 * nodes.state.lost_at:.3g} % of the excitation"
+        return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics, where those of the branch lead to none."""
@@ -339,11 +339,11 @@ class FrequencySweep:
         return None
 
     def _first(self, omega: float, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
-        """A state from the static one; where the harmonics of the walk find none, with others."""
-        assert self.walk is not None
+        """A state from the static one; where the harmonics of the sweep find none, with others."""
+        assert self.nodes is not None
         others = _other_starts() if self.settings.automatic else ()
         why = Outcome.START_FAILED
-        for attempt, resolution in enumerate((self.walk.case.resolution, *others)):
+        for attempt, resolution in enumerate((self.nodes.case.resolution, *others)):
             outcome, case, point = self._first_at(omega, load_factor, resolution)
             if point is not None:
                 return case, point
@@ -353,15 +353,15 @@ class FrequencySweep:
                 why = outcome
             if outcome is Outcome.STATIC_FAILED or self.effort.exhausted:
                 break
-        self.walk.state = replace(self.walk.state, failure=why)
-        return self.walk.case, None
+        self.nodes.state = replace(self.nodes.state, failure=why)
+        return self.nodes.case, None
 
     def _first_at(
         self, omega: float, load_factor: float, resolution: Resolution
     ) -> tuple[Outcome, Case, PathPoint | None]:
         """A state from the static one with these harmonics and samples, as far as they are not fixed."""
-        assert self.walk is not None
-        case = self.walk.case.at(allowed(resolution, self.settings))
+        assert self.nodes is not None
+        case = self.nodes.case.at(allowed(resolution, self.settings))
         unworn = np.zeros(self.model.contact.n_contact)
         outcome, found = solve_first_state(
             case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), self.effort
@@ -370,5 +370,5 @@ class FrequencySweep:
 
 
 def _other_starts() -> tuple[Resolution, ...]:
-    """Harmonics and samples with which a first state is sought where those of the walk find none."""
+    """Harmonics and samples with which a first state is sought where those of the sweep find none."""
     return tuple(Resolution(all_orders(highest), samples) for highest, samples in LOADING.other_starts)

@@ -56,6 +56,8 @@ class SweepState:
         Their harmonics and samples.
     checked : PathPoint or None
         The node at which the harmonics were chosen.
+    at_limit : bool
+        Whether that node needs more harmonics than a sweep may have.
     length : float
         Of the next step, in the unit of the parameter.
     n_nodes : int
@@ -73,6 +75,7 @@ class SweepState:
     nodes: Nodes = ()
     reference: Nodes = ()
     checked: PathPoint | None = None
+    at_limit: bool = False
     length: float = 0.0
     n_nodes: int = 0
     branch: int = 0
@@ -132,7 +135,7 @@ class NodeSweep:
         """
         self._forget()
         self._take_cases(case, case)
-        length = LOADING.longest_step * self.path.scale(point.parameter)
+        length = LOADING.longest_sweep_step * self.path.scale(point.parameter)
         self.state = replace(self.state, nodes=(point,), length=length)
         self._begin_reference()
         if self._choose_resolution() > SENSITIVE_ERROR:
@@ -197,8 +200,8 @@ class NodeSweep:
         here = self.here
         assert here is not None
         scale = self.path.scale(here.parameter)
-        shortest, free = LOADING.shortest_step * scale, LOADING.free_step * scale
-        length = float(np.clip(self.state.length, shortest, LOADING.longest_step * scale))
+        shortest, free = LOADING.shortest_sweep_step * scale, LOADING.free_step * scale
+        length = float(np.clip(self.state.length, shortest, LOADING.longest_sweep_step * scale))
         tolerance = self._node_tolerance()
         while not self.effort.exhausted:
             target = here.parameter + self.direction * length
@@ -263,7 +266,7 @@ class NodeSweep:
         old, new = self.state.checked.evaluation, step.point.evaluation
         if max(vibration_change(old, new), vibration_change(new, old)) > ACCURACY.vibration_recheck:
             joint = self.path.joint_at(step.point.parameter)
-            if resolution_holds(self.case, joint, step.point, self.effort):
+            if resolution_holds(self.case, joint, step.point, self.state.at_limit, self.effort):
                 self.state = replace(self.state, checked=step.point)
             else:
                 self._choose_resolution()
@@ -302,6 +305,7 @@ class NodeSweep:
         if not self.case.settings.automatic:
             return 0.0
         refined = choose_resolution(self.case, self.path.joint_at(here.parameter), here, self.effort)
+        self.state = replace(self.state, at_limit=not refined.accurate)
         point = replace(refined.point, parameter=here.parameter)
         if refined.case.resolution == self.case.resolution:
             self.state = replace(self.state, nodes=(*self.state.nodes[:-1], point), checked=point)

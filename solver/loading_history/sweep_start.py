@@ -45,7 +45,9 @@ def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
         return Origin((), high, cell)
     width = 2.0 ** (1.0 / LOADING.cells_per_octave)
     # where no state is found at the quiet frequency, the edge of the cell and one nearer to the points are tried
-    near, away = (LOADING.begin_below * low, 1.0 / width) if sweep == "up" else (LOADING.begin_above * high, width)
+    near, away = (
+        ((1.0 - LOADING.begin_away) * low, 1.0 / width) if sweep == "up" else ((1.0 + LOADING.begin_away) * high, width)
+    )
     return Origin((_quiet(model, near * away, near), near, near / away), high, cell)
 
 

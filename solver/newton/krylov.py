@@ -8,6 +8,7 @@ operator: `solve_gmres` ends where it stagnates, with the least-squares solution
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -18,8 +19,59 @@ from solver.newton.options import NEWTON
 Product = Callable[[FloatArray], FloatArray]
 
 
+@dataclass
+class Recycled:
+    """What earlier solves with an operator A say of solves with one that is nearly A.
+
+    A cycle of GMRES ends with `A Z = C` for as many orthonormal vectors C as it has taken products. Put in front of A,
+    the correction `E = 1 + (Z - C) C^T` makes the operator the identity on the span of C and leaves all else. The
+    corrections of several solves are one product of low rank, `E = 1 + U W^T`.
+
+    - moves, images (k, n): rows of `U^T` and `W^T`.
+    """
+
+    moves: FloatArray | None = None
+    images: FloatArray | None = None
+
+    def apply(self, vector: FloatArray) -> FloatArray:
+        """`E v` (n,)."""
+        if self.moves is None or self.images is None:
+            return vector
+        return vector + (self.images @ vector) @ self.moves
+
+    def learn(self, basis: FloatArray, triangle: FloatArray, rotations: FloatArray) -> None:
+        """Take in a cycle of GMRES with A E: basis (k + 1, n), triangle (k, k) and Givens rotations (k, 2)."""
+        size = np.abs(np.diag(triangle))
+        if not size.min() > NEWTON.null_space * size.max():
+            return
+        turned = np.eye(len(basis), len(triangle))
+        for place in range(len(triangle) - 1, -1, -1):
+            cosine, sine = rotations[place]
+            above, below = turned[place].copy(), turned[place + 1].copy()
+            turned[place], turned[place + 1] = cosine * above - sine * below, sine * above + cosine * below
+        images = turned.T @ basis
+        moves = np.linalg.solve(triangle.T, basis[:-1])
+        if self.moves is None or self.images is None:
+            self.moves, self.images = moves - images, images
+            return
+        through = moves + (moves @ self.images.T) @ self.moves
+        before = (images @ self.images.T) @ self.moves
+        if len(self.moves) + len(moves) > NEWTON.recycled_directions:
+            # the oldest are those of Jacobians that have changed most
+            self.moves, self.images = through - images, images
+        else:
+            self.moves = np.concatenate([self.moves, through - images - before])
+            self.images = np.concatenate([self.images, images])
+
+
 def solve_gmres(
-    product: Product, right: FloatArray, rtol: float, restart: int, cycles: int, exact: Product | None = None
+    product: Product,
+    right: FloatArray,
+    rtol: float,
+    restart: int,
+    cycles: int,
+    exact: Product | None = None,
+    recycled: Recycled | None = None,
 ) -> tuple[FloatArray, bool]:
     """Solve `exact(x) = right` by restarted GMRES from zero.
 
@@ -35,6 +87,8 @@ def solve_gmres(
         Products of one cycle, and the number of cycles. One that converges, but by wrong products, does not count.
     exact : callable, optional
         The operator itself, `product` by default; applied once a cycle.
+    recycled : Recycled, optional
+        What earlier solves have left; where this one converges, its first cycle is taken in.
 
     Returns
     -------
@@ -42,44 +96,72 @@ def solve_gmres(
     converged : bool
         Whether the relative residual is below rtol.
     """
+    kept = recycled or Recycled()
     solution, residual = np.zeros_like(right), right
     size = float(np.linalg.norm(right))
     norms = [size]
     restart = min(restart, right.size)
-    basis = np.empty((restart + 1, right.size))
-    refinements = 0
-    while cycles > 0 and refinements <= NEWTON.refinements:
+    refinements, first = 0, None
+    while cycles > 0 and refinements <= NEWTON.restarts:
         if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
             break
-        basis[0] = residual / norms[-1]
-        triangle, rotations = np.zeros((restart, restart)), np.zeros((restart, 2))
-        projected = np.zeros(restart + 1)
-        projected[0] = norms[-1]
-        n_columns, lost = 0, False
-        while n_columns < restart and not lost:
-            column, lost = extend_basis(basis, n_columns, product(basis[n_columns]), NEWTON.round_off)
-            if not np.all(np.isfinite(column)) or not rotate_column(column, rotations, n_columns):
-                break
-            triangle[: n_columns + 1, n_columns] = column[: n_columns + 1]
-            cosine, sine = rotations[n_columns]
-            projected[n_columns : n_columns + 2] = cosine * projected[n_columns], -sine * projected[n_columns]
-            n_columns += 1
-            norms.append(abs(float(projected[n_columns])))
-            if norms[-1] <= rtol * size or _stagnates(norms):
-                break
+        cycle = _cycle(lambda vector: product(kept.apply(vector)), residual, norms, rtol * size, restart)
+        n_columns = len(cycle.triangle)
         if n_columns == 0:
             break
+        first = first or cycle
         # where the residual is not met, a direction of the null space would only make the solution large
         least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
-        weights = np.linalg.lstsq(triangle[:n_columns, :n_columns], projected[:n_columns], rcond=least)[0]
-        solution = solution + weights @ basis[:n_columns]
+        weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
+        solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
         refined = norms[-1] <= rtol * size
         refinements, cycles = refinements + refined, cycles - (not refined)
         residual = right - (exact or product)(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):
             break
-    return solution, norms[-1] <= rtol * size
+    converged = norms[-1] <= rtol * size
+    if converged and first is not None and recycled is not None:
+        recycled.learn(first.basis, first.triangle, first.rotations)
+    return solution, converged
+
+
+@dataclass(frozen=True)
+class _Cycle:
+    """One cycle of GMRES after k products.
+
+    - basis (k + 1, n): orthonormal.
+    - triangle (k, k), rotations (k, 2): of the QR factorisation of the Hessenberg matrix, by Givens rotations.
+    - projected (k,): the residual at the start in the terms of the triangle.
+    """
+
+    basis: FloatArray
+    triangle: FloatArray
+    rotations: FloatArray
+    projected: FloatArray
+
+
+def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: float, most: int) -> _Cycle:
+    """Products until the norm of the residual is `wanted`, at most `most`; the norms are appended to `norms`."""
+    basis = np.empty((most + 1, residual.size))
+    triangle, rotations, projected = np.zeros((most, most)), np.zeros((most, 2)), np.zeros(most + 1)
+    basis[0] = residual / norms[-1]
+    projected[0] = norms[-1]
+    k, lost = 0, False
+    while k < most and not lost:
+        column, lost = extend_basis(basis, k, product(basis[k]), NEWTON.round_off)
+        if not np.all(np.isfinite(column)) or not rotate_column(column, rotations, k):
+            break
+        triangle[: k + 1, k] = column[: k + 1]
+        cosine, sine = rotations[k]
+        projected[k : k + 2] = cosine * projected[k], -sine * projected[k]
+        k += 1
+        norms.append(abs(float(projected[k])))
+        if norms[-1] <= wanted or _stagnates(norms):
+            break
+    if lost:
+        basis[k] = 0.0
+    return _Cycle(basis[: k + 1], triangle[:k, :k], rotations[:k], projected[:k])
 
 
 def ritz_values(

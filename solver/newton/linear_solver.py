@@ -12,9 +12,8 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.krylov import ritz_values, solve_gmres
+from solver.newton.krylov import Recycled, ritz_values, solve_gmres
 from solver.newton.options import NEWTON
-from solver.newton.period_preconditioner import PeriodFactor
 from solver.newton.preconditioner import Factor, build_factor
 from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
 
@@ -24,9 +23,10 @@ class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation between its calls."""
 
     _factor: Factor | None = field(default=None, repr=False)
+    _recycled: Recycled = field(default_factory=Recycled, repr=False)
 
-    def solve(self, tangent: Linearisation, right: FloatArray) -> FloatArray:
-        """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N."""
+    def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
+        """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         m = right.shape[1]
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
@@ -35,7 +35,7 @@ class JacobianSolver:
             if rows.size * m <= NEWTON.dense_unknowns:
                 step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
-                step[rows] = self._solve_kept(tangent, pairs, rows, right[rows])
+                step[rows] = self._solve_kept(tangent, right, rtol)[rows]
         # the columns of all other unknowns are those of the identity
         rest = np.ones(right.shape[0], bool)
         rest[rows] = False
@@ -68,97 +68,101 @@ class JacobianSolver:
         they do not settle, a factorisation of this Jacobian takes the place of the kept one; where they still do not,
         the whole slip space is factorised, unless it is too large.
         """
-        kept, active = self._factor, tangent.active()
-        if kept is not None and not kept.exact and np.isin(active, kept.pairs).all():
+        kept = self._factor
+        if kept is not None and not kept.exact:
             sign, settled = self._judge(kept, tangent)
             if settled:
                 return sign
-        factor = self._factor = build_factor(tangent, active)
+        factor = self._keep(build_factor(tangent))
         if factor.exact:
             return factor.sign
         sign, settled = self._judge(factor, tangent)
-        whole = None if settled else find_slip_space(tangent, NEWTON.sign_directions, 0, 0.0)
+        whole = None if settled else find_slip_space(tangent, NEWTON.most_directions)
         return sign if whole is None else build_slip_factor(tangent, whole).sign
 
     def _judge(self, factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
         """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these have settled."""
-        full = np.zeros((tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]))
-        shape = factor.rows.size, full.shape[1]
+        shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
 
         def product(vector: FloatArray) -> FloatArray:
-            full[factor.rows] = factor.solve(vector.reshape(shape))
-            return tangent.apply_roughly(full)[factor.rows].ravel()
+            return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
 
         # a fixed start: the answer must not depend on what was computed before
-        start = np.random.default_rng(0).normal(size=factor.rows.size * full.shape[1])
-        values, residuals = ritz_values(product, start, NEWTON.most_sign_products, _settled)
+        start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
+        values, residuals = ritz_values(product, start, NEWTON.products, _settled)
         # complex ones come in pairs of one real part and do not change the sign
         negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
         return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
-    def _solve_kept(self, tangent: Linearisation, pairs: IntArray, rows: IntArray, right: FloatArray) -> FloatArray:
-        if self._factor is not None and np.isin(pairs, self._factor.pairs).all():
-            products = NEWTON.exact_products if self._factor.exact else _most_products(self._factor)
-            solution, found = self._iterate(self._factor, tangent, rows, right, products, 1)
+    def _keep(self, factor: Factor) -> Factor:
+        self._factor, self._recycled = factor, Recycled()
+        return factor
+
+    def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+        """Solution (n_rel, m) in the rows of the active pairs, with a kept factorisation while products are few."""
+        if self._factor is not None:
+            products = NEWTON.exact_products if self._factor.exact else NEWTON.products
+            solution, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
             if found:
                 return solution
-        self._factor = build_factor(tangent, pairs)
-        if self._factor.exact:
-            return self._solve_exactly(self._factor, tangent, rows, right)
+        factor = self._keep(build_factor(tangent))
+        if factor.exact:
+            return self._solve_exactly(factor, tangent, right)
         # not to the end perhaps: Newton's method judges by the true residual
-        return self._iterate(self._factor, tangent, rows, right, _most_products(self._factor), NEWTON.restarts)[0]
+        return self._iterate(factor, tangent, right, rtol, NEWTON.products, NEWTON.restarts)[0]
 
-    def _solve_exactly(self, factor: Factor, tangent: Linearisation, rows: IntArray, right: FloatArray) -> FloatArray:
+    def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve removes the effect of `NEWTON.neutral_shift`."""
-        padded = np.zeros((tangent.joint.component_index.size, right.shape[1]))
-        padded[rows] = right
-        first = factor.solve(padded)
+        rest = _passive_rows(tangent)
+        right = right.copy()
+        right[rest] = 0.0
+        first = factor.solve(right)
         # the rows of all other pairs follow from these
-        first[~np.isin(np.arange(len(first)), rows)] = 0.0
-        padded[rows] = right - tangent.apply(first)[rows]
-        solution = (first + factor.solve(padded))[rows]
-        return solution if np.all(np.isfinite(solution)) else first[rows]
+        first[rest] = 0.0
+        left = right - tangent.apply(first)
+        left[rest] = 0.0
+        solution = first + factor.solve(left)
+        return solution if np.all(np.isfinite(solution)) else first
 
     def _iterate(
-        self,
-        factor: Factor,
-        tangent: Linearisation,
-        rows: IntArray,
-        right: FloatArray,
-        products: int,
-        restarts: int,
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, restarts: int
     ) -> tuple[FloatArray, bool]:
-        """Solution (n_rows, m) by GMRES, and whether it was found."""
-        full = np.zeros((tangent.joint.component_index.size, right.shape[1]))
-        position = np.searchsorted(factor.rows, rows)
-        padded = np.zeros((factor.rows.size, right.shape[1]))
+        """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
+        rest = _passive_rows(tangent)
 
         def precondition(vector: FloatArray) -> FloatArray:
-            padded[position] = vector.reshape(right.shape)
-            return factor.solve(padded)[position]
+            solved = factor.solve(vector.reshape(right.shape))
+            solved[rest] = 0.0
+            return solved
 
         def product(vector: FloatArray) -> FloatArray:
-            full[rows] = precondition(vector)
-            return tangent.apply_roughly(full)[rows].ravel()
+            image = tangent.apply_roughly(precondition(vector))
+            image[rest] = 0.0
+            return image.ravel()
 
         def exact(vector: FloatArray) -> FloatArray:
-            full[rows] = precondition(vector)
-            return tangent.apply(full)[rows].ravel()
+            image = tangent.apply(precondition(vector))
+            image[rest] = 0.0
+            return image.ravel()
 
+        wanted = right.copy()
+        wanted[rest] = 0.0
         # preconditioned from the right, so that the residual that GMRES watches is the true one
-        solution, found = solve_gmres(product, right.ravel(), NEWTON.forcing, products, restarts, exact)
+        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, restarts, exact, self._recycled)
         return precondition(solution), found
+
+
+def _passive_rows(tangent: Linearisation) -> IntArray:
+    """Rows of the pairs that are not active: the columns of their unknowns are those of the identity."""
+    active = np.zeros(tangent.joint.contact.n_contact, bool)
+    active[tangent.active()] = True
+    return np.flatnonzero(~active[tangent.joint.component_index // 3])
 
 
 def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
     """Whether it is certain which eigenvalues are negative, from Ritz values and their residuals."""
     doubtful = ~(values.real >= NEWTON.certain_real_part)
     return bool(np.all((residuals < NEWTON.settled * np.abs(values))[doubtful]))
-
-
-def _most_products(factor: Factor) -> int:
-    """Products after which a factorisation that is not exact is given up, or GMRES begins again."""
-    return NEWTON.period_products if isinstance(factor, PeriodFactor) else NEWTON.kept_products
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

@@ -95,15 +95,13 @@ class PeriodFactor:
     """The march, and k directions in which the harmonics differ.
 
     seen (k, n_rel (2H+1)): `V^T`. bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`. resonance (k, k): the matrix in
-    brackets. pairs, rows: all of the joint.
+    brackets.
     """
 
     march: SampleMarch
     seen: FloatArray
     bent: FloatArray
     resonance: FloatArray
-    pairs: IntArray
-    rows: IntArray
     exact: bool = False
 
     @property
@@ -136,8 +134,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         bent = np.linalg.solve(resonance.T, steps.T).T
     except np.linalg.LinAlgError:
         return None
-    every = np.arange(joint.contact.n_contact), np.arange(joint.component_index.size)
-    return PeriodFactor(march, seen, bent, resonance, *every)
+    return PeriodFactor(march, seen, bent, resonance)
 
 
 def build_march(tangent: Linearisation) -> SampleMarch:
@@ -185,7 +182,7 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
     """Low-rank difference `U V^T` of the stiffness over the penalty from that of most harmonics.
 
     For each harmonic it has the singular values above `NEWTON.resonant_difference`, at most `NEWTON.resonances` of
-    them, found by a few powers of the difference on fixed vectors, which is accurate enough for large ones.
+    them, found by two powers of the difference on fixed vectors: large singular values stand out.
 
     Returns
     -------
@@ -218,7 +215,7 @@ def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tup
         stiffness = structure.moving.matrix(place - 1) if place else structure.static_stiffness
         change = (stiffness - most) / penalty
         image = change @ np.random.default_rng(0).normal(size=(n_rel, min(NEWTON.resonances, n_rel)))
-        for _ in range(NEWTON.power_iterations):
+        for _ in range(2):
             image = change @ (change.conj().T @ np.linalg.qr(image)[0])
         basis = np.linalg.qr(image)[0]
         left, size, right = np.linalg.svd(basis.conj().T @ change, full_matrices=False)

@@ -51,23 +51,32 @@ class SlipSpace:
         return sum(basis.shape[1] for basis in self.bases)
 
 
-def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: float) -> SlipSpace | None:
-    """Slip space of a Jacobian.
+def find_slip_space(tangent: Linearisation, most: int) -> SlipSpace | None:
+    """Whole slip space of a Jacobian; None where it has more than `most` directions."""
+    pairs, rows = _held_back_rows(tangent)
+    bases: list[FloatArray] = []
+    total = 0
+    for own in rows:
+        basis, _ = _directions(own)
+        total += basis.shape[1]
+        if total > most:
+            return None
+        bases.append(basis)
+    return SlipSpace(pairs, tuple(bases), True)
 
-    Parameters
-    ----------
-    tangent : Linearisation
-        The Jacobian.
-    most_exact : int
-        Directions up to which nothing is left out.
-    most, cutoff : int, float
-        Otherwise directions below `cutoff`, relative to a pair that slips, are left out; up to `most` remain.
 
-    Returns
-    -------
-    SlipSpace or None
-        None where there are more directions than that.
-    """
+def largest_directions(tangent: Linearisation, most: int) -> SlipSpace:
+    """The part of the slip space of a Jacobian with the `most` largest directions of all pairs."""
+    pairs, rows = _held_back_rows(tangent)
+    found = [_directions(own) for own in rows]
+    sizes = np.sort(np.concatenate([np.empty(0), *(size for _, size in found)]))[::-1]
+    least = sizes[most - 1] if most <= sizes.size else 0.0
+    bases = (np.ascontiguousarray(basis[:, : np.count_nonzero(size >= least)]) for basis, size in found)
+    return SlipSpace(pairs, tuple(bases), bool(most >= sizes.size))
+
+
+def _held_back_rows(tangent: Linearisation) -> tuple[IntArray, FloatArray]:
+    """Pairs (n,) with a part of the predicted force that they do not transmit, and its rows (n, 3m + 1, 3m)."""
     joint = tangent.joint
     m = joint.basis.synthesis.shape[0]
     present = np.zeros(3 * joint.contact.n_contact, bool)
@@ -78,31 +87,21 @@ def find_slip_space(tangent: Linearisation, most_exact: int, most: int, cutoff: 
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
     rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
     pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NEWTON.round_off)
-    for least, limit in ((NEWTON.round_off, most_exact), (cutoff, most)):
-        bases = _bases(rows[pairs], least, limit) if limit else None
-        if bases is not None:
-            return SlipSpace(pairs, bases, least == NEWTON.round_off)
-    return None
+    return pairs, rows[pairs]
 
 
-def _bases(rows: FloatArray, least: float, limit: int) -> tuple[FloatArray, ...] | None:
-    """Orthonormal bases (3m, r) of the rows of each pair, by pivoted QR factorisations down to `least`.
+def _directions(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal basis (3m, r) of the rows (k, 3m) of a pair, the largest direction first, and their sizes (r,).
 
-    None as soon as the ranks r add up to more than `limit`. Rows that are not finite have rank 0.
+    Rows that are not finite have none.
     """
-    bases: list[FloatArray] = []
-    total, width = 0, rows.shape[2]
-    for own in rows:
-        if not np.all(np.isfinite(own)):
-            bases.append(np.empty((width, 0)))
-            continue
-        factor, _, scales, _, _ = _PIVOTED_QR(own.T)
-        rank = int(np.count_nonzero(np.abs(np.diag(factor)) > least))
-        total += rank
-        if total > limit:
-            return None
-        bases.append(np.ascontiguousarray(_ORTHOGONAL(factor[:, :width], scales)[0][:, :rank]))
-    return tuple(bases)
+    width = rows.shape[1]
+    if not np.all(np.isfinite(rows)):
+        return np.empty((width, 0)), np.empty(0)
+    factor, _, scales, _, _ = _PIVOTED_QR(rows.T)
+    sizes = np.abs(np.diag(factor))
+    rank = int(np.count_nonzero(sizes > NEWTON.round_off))
+    return np.ascontiguousarray(_ORTHOGONAL(factor[:, :width], scales)[0][:, :rank]), sizes[:rank]
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ class SlipFactor:
     """Factorisation of `I + V^T (Z_r D V - S V)` with the maps to the slip space and back.
 
     there (n, r_most, 3m): `V^T` of each pair of the space, filled up with zeros to the largest rank. kept
-    (n, r_most): which of these rows exist. back (n, 6m, r_most): `D V` and `S V`. pairs, rows: all of the joint.
+    (n, r_most): which of these rows exist. back (n, 6m, r_most): `D V` and `S V`.
     """
 
     joint: Joint
@@ -119,8 +118,6 @@ class SlipFactor:
     kept: BoolArray
     back: FloatArray
     factor: tuple[FloatArray, IntArray]
-    pairs: IntArray
-    rows: IntArray
 
     @property
     def exact(self) -> bool:
@@ -136,7 +133,7 @@ class SlipFactor:
         """Approximate (where `exact`: the) solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
         joint, pairs, m = self.joint, self.space.pairs, right.shape[1]
         if not pairs.size:
-            return right
+            return right.copy()
         spread = joint.to_pairs(right).reshape(-1, 3 * m)
         slips = np.zeros(self.kept.shape)
         slips[self.kept] = scipy.linalg.lu_solve(
@@ -180,8 +177,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
         rank = basis.shape[1]
         there[place, :rank], kept[place, :rank] = basis.T, True
         back[place, : 3 * m, :rank], back[place, 3 * m :, :rank] = motion, force
-    every = np.arange(joint.contact.n_contact), np.arange(joint.component_index.size)
-    return SlipFactor(joint, space, there, kept, back, cast("tuple[FloatArray, IntArray]", factor), *every)
+    return SlipFactor(joint, space, there, kept, back, cast("tuple[FloatArray, IntArray]", factor))
 
 
 def sign_of(factor: tuple[FloatArray, IntArray]) -> float:

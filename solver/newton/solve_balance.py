@@ -14,6 +14,7 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.model import FloatArray
 from solver.newton.iteration import NewtonResult, solve_newton
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.structure.joint import Case, Joint
 
 
@@ -82,7 +83,9 @@ def solve_balance(
 
     def direction(at: Evaluation) -> FloatArray:
         effort.check_time()
-        return solver.solve(balance.linearise(at), -at.residual)
+        # no more products than the tolerance needs
+        rtol = max(NEWTON.forcing, 0.1 * tolerance / max(at.scaled_residual(), tolerance))
+        return solver.solve(balance.linearise(at), -at.residual, rtol)
 
     result = solve_newton(balance.evaluate, direction, start, tolerance, most)
     effort.iterations += result.iterations

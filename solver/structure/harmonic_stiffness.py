@@ -63,8 +63,8 @@ class SharedStiffness:
     A product takes three real ones for all harmonics at once and is bound by reading 3 n_rel^2 numbers, whatever H.
 
     n_rel: of the joint. rates (H,): n w, rad/s. columns (3, n, n_rel): columns r of K, M, C, rows r before rows i.
-    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. few: rough form of few motions,
-    None where that leaves too much out.
+    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. few: rough form
+    with few motions, None where that leaves too much out.
     """
 
     n_rel: int

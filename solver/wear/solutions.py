@@ -201,7 +201,7 @@ class Solutions:
         return work
 
     def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
-        """An integration from its first state, or from where it was saved, to the count `end`; inf where none is known."""
+        """An integration from its first state, or from where it was saved, to the count `end` (inf: open)."""
         progress: Progress | Failure
         if self.saved is not None:
             work.effort.iterations, integration.output.taken = self.saved.iterations, self.saved.output

@@ -1,6 +1,6 @@
-"""What users get wrong when they export a model: one function a mistake, from the deck and the matrices alone.
+"""Mistakes in the export of a model: one function for each mistake, from the deck and the matrices alone.
 
-Each raises SceneError with one sentence where the mistake was made, and returns what it has found otherwise.
+Each function raises SceneError with one sentence where the mistake was made, and otherwise returns what it has found.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _KEEP_PRESTRESS = {
 }
 
 _COUPLED = 1e-9
-"""Stiffness between two surfaces, of the largest one there is, above which they are coupled."""
+"""Relative stiffness between two surfaces above which they are coupled."""
 
 _SPEED_AGREES = 1e-3
 """Relative difference of two speeds that are the same."""
@@ -167,10 +167,10 @@ def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
 
 
 def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float | None:
-    """Square of the speed (rad2/s2) that the stiffness was made at: spin softening is all that a translation meets.
+    """Square of the speed, rad2/s2, at which the stiffness was made: only spin softening resists a translation.
 
-    `Omega^2 = - t^T K t / t^T M t` for a rigid translation t across the axis (3,), a unit vector. None where the model
-    is held, so that a translation meets more than that.
+    `Omega^2 = - t^T K t / t^T M t` for a rigid translation t along a unit vector (3,) across the axis. None where the
+    model is held, so that other stiffness resists as well.
     """
     across = np.linalg.svd(axis[np.newaxis])[2][1:]
     found: list[float] = []
@@ -189,9 +189,9 @@ def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float 
 
 
 def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None:
-    """The stiffness was made at the speed of the deck; the rotation, SI, None where there is none.
+    """Tests that the stiffness was made at the speed of the deck; returns the rotation, SI, None without rotation.
 
-    Where the model is held in its matrices the speed cannot be read back from them, and the deck's is believed.
+    Where the model is held in its matrices the speed cannot be found from them; then the speed of the deck is used.
     """
     rotation = rotation_of_deck(deck, units)
     if rotation is None:
@@ -205,16 +205,16 @@ def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None
 
 
 def check_units(deck: Deck, mass: float | None, units: Units) -> None:
-    """Mass and extent are those of something made of matter.
+    """Tests that mass and extent are those of a body of real material.
 
     Parameters
     ----------
     deck
         In units of the file.
     mass
-        Of the model, in units of the file; None where only its density is known, from the deck.
+        Of the model, in units of the file; None where only the density of the deck is known.
     units
-        What the user says that the files are in.
+        Units of the files according to the user.
     """
     used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks] or [deck.node_numbers]))
     points = deck.coordinates[deck.rows_of_nodes(used)]
@@ -236,7 +236,7 @@ def check_units(deck: Deck, mass: float | None, units: Units) -> None:
 
 
 def _check_moduli(deck: Deck, units: Units) -> None:
-    """Not all materials are stiffer than any, nor softer."""
+    """Tests that a material has a possible modulus."""
     moduli = [(material.young, name) for name, material in deck.materials.items() if material.young is not None]
     if not moduli:
         return

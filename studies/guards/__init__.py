@@ -1,1 +1,1 @@
-"""What files of unknown origin may hold, and where modules may come from: checks before anything is read or loaded."""
+"""Checks of files of unknown origin, and of the places of modules, before anything is read or loaded."""

@@ -1,9 +1,8 @@
-"""Opens HDF5 files that nobody vouches for: what they hold is looked at before any of it is read.
+"""Opens HDF5 files of unknown origin: their structure is checked before data are read.
 
-Nothing out of the file is followed: external, soft and user-defined links, external storage and virtual datasets are
-refused, and so are types other than numbers and text, filters that need a plug-in, and sizes that the file itself does
-not account for. What the library makes of damaged bytes is found out by a process of its own, see
-`studies.sandboxed_read`.
+No reference out of the file is followed: external, soft and user-defined links, external storage and virtual datasets
+are refused. So are types other than numbers and text, filters that need a plug-in, and sizes that exceed the file.
+Damaged bytes may crash the library; this is tested in a separate process, see `studies.sandboxed_read`.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ LARGEST_TOTAL = 2**31
 coefficients."""
 
 LARGEST_FILE = 2**32
-"""Bytes of a file; what is more than its data is waste, or no scene at all."""
+"""Largest size of a file, bytes."""
 
 LARGEST_RESULT = 2**40
-"""Bytes of a result file, which holds the scene as a part."""
+"""Largest size of a result file, bytes, which contains the scene."""
 
 LARGEST_TEXT = 4 * 2**20
-"""Bytes of all texts of a dataset, or of an attribute."""
+"""Largest size of all texts of a dataset or attribute, bytes."""
 
 _WITHOUT_PROOF = 2**26  # bytes that a file of any size may hold once it is unpacked
 _PACKED = 20.0  # and beyond that how many times its own size
@@ -40,7 +39,7 @@ _MOST_CHUNKS = 100_000
 _MOST_OBJECTS = 2000
 _DEEPEST = 4  # of groups and datasets within each other: nd/<k>/load/static
 DEEPEST_RESULT = 5
-"""The same in a result, which holds its scene in a group."""
+"""Deepest level of groups in a result, which contains its scene in a group."""
 
 _LONGEST_NAME = 100
 _FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF)
@@ -74,14 +73,14 @@ def find_group(file: h5py.File, name: str) -> h5py.Group:
 
 
 def find_datasets(group: h5py.Group, file_size: int) -> dict[str, h5py.Dataset]:
-    """Datasets below a group by name with the groups above, each of them safe to be read.
+    """Datasets below a group, by name with the groups above; each can be read safely.
 
-    Those that only give a dimension its name, and named types, are left out.
+    Datasets that only name a dimension, and named types, are left out.
 
     Raises
     ------
     SceneError
-        Where one of them is not what it says, or all together are too large.
+        Where a dataset is not what it declares, or all together are too large.
     """
     walked = walk(group)
     found = {key: item for key, item in walked if isinstance(item, h5py.Dataset) and not only_names_a_dimension(item)}
@@ -96,7 +95,7 @@ def find_datasets(group: h5py.Group, file_size: int) -> dict[str, h5py.Dataset]:
 
 
 def check_dataset(dataset: h5py.Dataset, key: str) -> None:
-    """Raises SceneError where a dataset is not what it says, or reaches out of the file."""
+    """Raises SceneError where a dataset is not what it declares, or refers to data out of the file."""
     if dataset.external or dataset.is_virtual:
         raise SceneError(key, "data in another file", "store the data in this file")
     if not is_number(dataset.dtype) and h5py.check_string_dtype(dataset.dtype) is None:
@@ -201,7 +200,7 @@ def walk(
 
 
 def only_names_a_dimension(item: h5py.HLObject) -> bool:
-    """Whether a dataset is what NetCDF calls a dimension without a variable."""
+    """Whether a dataset is a dimension without variable, in the sense of NetCDF."""
     return (
         isinstance(item, h5py.Dataset)
         and item.ndim == 1
@@ -221,7 +220,7 @@ def _open(group: h5py.Group, name: str | bytes, key: str) -> h5py.HLObject:
 
 
 def declared_bytes(dataset: h5py.Dataset) -> int:
-    """Bytes that the values of a dataset take in memory, as numbers of 8 bytes or complex ones of 16 at least."""
+    """Memory of the values of a dataset, bytes, as numbers of 8 bytes or complex numbers of 16 at least."""
     kind = dataset.dtype
     if not is_number(kind):
         return _bytes(dataset.shape or (), kind)

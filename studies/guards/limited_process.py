@@ -1,7 +1,7 @@
-"""Processes of their own for reading what nobody vouches for, with limits of time and memory.
+"""Processes with limits of time and memory, for reading files of unknown origin.
 
-Such a process may crash, run for ever, or be ended where it takes too much: its end is the answer. It looks for modules
-where this one does, but never in the current folder.
+Such a process may crash, never end, or exceed its memory: its exit status is the answer. Modules are searched where
+this process searches them, but never in the current folder.
 """
 
 from __future__ import annotations

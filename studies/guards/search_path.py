@@ -1,4 +1,4 @@
-"""Where modules are looked for: never in the current folder, where a file beside a study could pass for a library."""
+"""Search path of modules without the current folder, where a file beside a study could replace a library."""
 
 from __future__ import annotations
 

@@ -43,10 +43,10 @@ _LOCK = "lock"
 
 
 class Store:
-    """The folder of a run, locked for it. Raises StoreInUseError and StorageError.
+    """The locked folder of a run. Raises StoreInUseError and StorageError.
 
-    kind: of a record; its field `KEY` is the hash of the history.
-    notes: what a user has to know of what was found there, a line each.
+    kind: data type of a record; the field `KEY` is the hash of the history.
+    notes: lines for the user on what was found in the folder.
     """
 
     def __init__(self, folder: Path, kind: np.dtype[np.void]) -> None:
@@ -85,25 +85,25 @@ class Store:
 
     @property
     def locked(self) -> bool:
-        """Whether no other run is at work here."""
+        """Whether no other run uses the folder."""
         return self._lock.holds
 
     @property
     def histories(self) -> dict[str, Place]:
-        """For each hash of a history on the disk, the number of its file and the place in it."""
+        """Number of the file and row, for each hash of a history on the disk."""
         return self._records.places
 
     def path(self, number: int) -> Path:
-        """A file of records."""
+        """Path of a file of records."""
         return self._records.files[number].path
 
     @property
     def numbers(self) -> list[int]:
-        """Of all files of records."""
+        """Numbers of all files of records."""
         return sorted(self._records.files)
 
     def add_history(self, key: str, record: NDArray[np.void], task: str = "") -> None:
-        """A record (1,) to be written. task: what the progress of a task is known by that this history ends."""
+        """Adds a record (1,). task: hash of the task whose progress is no longer needed with this history."""
         self._waiting.records[key] = record
         if task:
             self._waiting.progress.pop(task, None)
@@ -111,29 +111,29 @@ class Store:
         self._count(self.kind.itemsize)
 
     def add_start(self, key: str, start: Packed) -> None:
-        """A start state to be written."""
+        """Adds a start state."""
         self._waiting.starts[key] = start
         self._count(start.n_bytes)
 
     def has_start(self, key: str) -> bool:
-        """Whether a start state is there."""
+        """Whether a start state is in the folder."""
         return key in self._starts.places or any(key in batch.starts for batch in self._unwritten())
 
     def read_start(self, key: str) -> Packed:
-        """A start state that is there."""
+        """A start state in the folder."""
         for batch in self._unwritten():
             if key in batch.starts:
                 return batch.starts[key]
         return self._read(self._starts, key)
 
     def keep_progress(self, key: str, progress: Packed) -> None:
-        """How far a task is, to be written in place of what was written of it before."""
+        """Adds the progress of a task, in place of an earlier one."""
         self._waiting.progress[key] = progress
         self._waiting.finished.discard(key)
         self._count(progress.n_bytes)
 
     def read_progress(self, key: str) -> Packed | None:
-        """How far a task was; None where that is not known."""
+        """Progress of a task; None where there is none."""
         for batch in self._unwritten():
             if key in batch.progress:
                 return batch.progress[key]
@@ -142,23 +142,23 @@ class Store:
         try:
             return self._read(self._progress, key)
         except StorageError:
-            # whatever is wrong with it, it is no loss but of time
+            # Damaged progress costs only time: the task begins anew.
             self.forget_progress(key)
             return None
 
     def forget_progress(self, key: str) -> None:
-        """The task is finished, or to be done again."""
+        """Removes the progress of a task that is finished, or has to be done again."""
         for batch in self._unwritten():
             batch.progress.pop(key, None)
         self._progress.forget(key)
 
     def tick(self) -> None:
-        """Called many times a second: hands over what waits, at once where nothing was written a moment ago.
+        """Called many times a second: hands over to the writer what waits, without delay after a pause.
 
         Raises
         ------
         StorageError
-            Where what was handed over before could not be written.
+            Where an earlier job could not be written.
         """
         self._take()
         if self._waiting.empty or self._writer.busy:
@@ -183,7 +183,7 @@ class Store:
             raise StorageError(path, error) from error
 
     def select(self, chosen: Callable[[NDArray[np.void]], NDArray[np.bool_]]) -> set[str]:
-        """Hashes of the histories for whose records `chosen` says so; it is given those of a file at once."""
+        """Hashes of the histories that `chosen` selects; `chosen` gets all records of a file at once."""
         found: set[str] = set()
         for number, file in self._records.files.items():
             for row in np.flatnonzero(chosen(self.read(number))).tolist():
@@ -192,17 +192,17 @@ class Store:
         return found
 
     def forget_history(self, key: str) -> None:
-        """The history is to be computed again: its new record will stand for it."""
+        """Marks a history as not computed; a new record replaces the old one."""
         self._records.forget(key)
 
     def forget_start(self, key: str) -> None:
-        """The start state is to be computed again."""
+        """Marks a start state as not computed."""
         for batch in self._unwritten():
             batch.starts.pop(key, None)
         self._starts.forget(key)
 
     def remove_forgotten(self) -> None:
-        """What was forgotten is on the disk no more when this returns, so that no later run finds it."""
+        """Removes everything that was forgotten from the disk, so that no later run finds it."""
         self.flush()
         for sort, index in self._indexes.items():
             self._obsolete += [file.path for file in index.take_dead()]
@@ -213,9 +213,9 @@ class Store:
             self._take(wait=True)
 
     def prune(self, histories: Collection[str], starts: Collection[str], tasks: Collection[str], most: float) -> None:
-        """Removes the oldest files without anything of what is named until the others take `most` bytes together.
+        """Removes the oldest files without named entries until such files have at most `most` bytes together.
 
-        For 0 bytes nothing is left but what is named.
+        With 0 bytes only named entries stay.
         """
         used = ((self._records, histories), (self._starts, starts), (self._progress, tasks))
         idle: list[tuple[SegmentIndex | None, PartFile]] = [(None, file) for file in self._others if file.ours]
@@ -239,7 +239,7 @@ class Store:
             self.remove_forgotten()
 
     def pack(self) -> None:
-        """Packs all files, where no other run is at work; the last call before `close`, as nothing is read after it."""
+        """Packs all files, where no other run uses the folder; the last call before `close`."""
         self.remove_forgotten()
         if not self.locked:
             return
@@ -249,7 +249,7 @@ class Store:
             self._part_writer.pack(sort, file)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and lets other runs into the folder."""
+        """Writes what waits, as far as there is room, and unlocks the folder."""
         try:
             self.flush()
             if self._obsolete:
@@ -263,7 +263,7 @@ class Store:
             self._lock.close()
 
     def _unwritten(self) -> Iterator[Batch]:
-        """What is not, or may not be, on the disk yet, the latest first."""
+        """Batches that are not, or may not be, on the disk yet, latest first."""
         yield self._waiting
         yield self._handed_over
 
@@ -275,7 +275,7 @@ class Store:
                 self._write()
 
     def _write(self) -> None:
-        """Everything that waits becomes a job of the writer, which has none."""
+        """Makes everything that waits a job of the idle writer."""
         # numbered before the batch: what comes now is later than what stands in a merged file
         merges = self._merges or self._due_merges()
         job = Job(self._next_number(), self._waiting, merges, self._obsolete)
@@ -288,7 +288,7 @@ class Store:
         self._writer.take(self._accept, self._refuse, wait=wait)
 
     def _accept(self, job: Job, written: Written) -> None:
-        """Takes note of what is on the disk now."""
+        """Notes what is on the disk now."""
         for sort, file in written.new.items():
             self._indexes[sort].put(file)
         for merge, file in written.merged:
@@ -302,7 +302,7 @@ class Store:
         self._handed_over = Batch()
 
     def _refuse(self, job: Job) -> None:
-        """It waits again."""
+        """Puts a failed batch back to those that wait."""
         self._waiting, self._handed_over = self._waiting.behind(job.batch), Batch()
         self._obsolete += job.remove
 

@@ -1,4 +1,4 @@
-"""A thread that writes: what hands out the tasks never waits for a disk."""
+"""A thread that writes files, so that the thread that hands out tasks never waits for a disk."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Done = TypeVar("Done")
 
 
 class Writer(Generic[Job, Done]):
-    """Does jobs one after the other on a thread of its own. All methods are for one other thread.
+    """Does jobs one after the other on its own thread. All methods are for one other thread.
 
-    An interrupt between any two steps of `take` loses neither a job nor what came of it.
+    An interrupt between any two steps of `take` loses neither a job nor its result.
     """
 
     def __init__(self, do: Callable[[Job], Done]) -> None:
@@ -33,7 +33,7 @@ class Writer(Generic[Job, Done]):
 
     @property
     def busy(self) -> bool:
-        """Whether a job was begun whose end was not taken note of."""
+        """Whether the end of a job was not taken yet."""
         return self._n_begun > self._n_taken
 
     def begin(self, job: Job) -> None:
@@ -43,16 +43,16 @@ class Writer(Generic[Job, Done]):
             self._n_begun += 1
 
     def take(self, accept: Callable[[Job, Done], None], refuse: Callable[[Job], None], *, wait: bool = False) -> None:
-        """Takes note of the jobs that have ended. Raises what a job raised.
+        """Takes the jobs that have ended. Raises what a job raised.
 
         Parameters
         ----------
         accept
-            Called with a job and what came of it.
+            Called with a job and its result.
         refuse
             Called with a job that failed.
         wait
-            Whether to wait until there is nothing more to take note of.
+            Whether to wait for all jobs.
         """
         while True:
             while (ended := self._ended.first()) is not None:
@@ -70,7 +70,7 @@ class Writer(Generic[Job, Done]):
             self._ended.wait()
 
     def close(self) -> None:
-        """Ends the thread, after the jobs that it has."""
+        """Ends the thread after its jobs."""
         self._jobs.put(None)
         with uninterrupted():
             self._thread.join()

@@ -1,4 +1,4 @@
-"""What the commands import before anything else: from here on no module is taken from the current folder."""
+"""The first import of the commands: from here on no module is taken from the current folder."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def dovetail_starts(model: ReducedModel, frequencies: tuple[float, ...], fine: b
     settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3) if fine else SolverSettings()
     before = sweep.LOADING
     if fine:
-        sweep.LOADING = replace(before, smallest_history_change=0.02, largest_history_change=0.02)
+        sweep.LOADING = replace(before, change_limits=(0.03, 0.03))
     try:
         found = dict(follow_branch(model, 0.5, 0.5, np.array(frequencies), "up", settings))
     finally:

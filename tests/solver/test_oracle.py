@@ -23,7 +23,7 @@ CYCLES = np.linspace(0.0, 6000.0, 4)
 WEAR = 1.1e-11
 
 
-def dense_solve(self: JacobianSolver, tangent: Linearisation, right: FloatArray) -> FloatArray:
+def dense_solve(self: JacobianSolver, tangent: Linearisation, right: FloatArray, rtol: float = 0.0) -> FloatArray:
     """The whole Jacobian, all pairs, all harmonics."""
     matrix = tangent.dense(np.arange(tangent.joint.contact.n_contact))
     return np.linalg.solve(matrix, right.ravel()).reshape(right.shape)

@@ -12,8 +12,8 @@ from solver.model import FloatArray
 from solver.newton import preconditioner
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.preconditioner import HarmonicFactor, build_factor
-from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
+from solver.newton.preconditioner import build_factor
+from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, find_slip_space, largest_directions
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 
@@ -44,7 +44,7 @@ def dense_of(tangent: Linearisation) -> FloatArray:
 def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, wear: bool) -> None:
     balance, predicted = case(seed, wear)
     tangent = tangent_of(balance, predicted)
-    space = find_slip_space(tangent, MANY, 0, 0.0)
+    space = find_slip_space(tangent, MANY)
     assert space is not None
     assert space.exact
     assert set(space.pairs) == set(tangent.active())
@@ -69,32 +69,26 @@ def test_the_sign_of_the_determinant_is_followed_through_zero() -> None:
     assert signs == {1.0, -1.0}
 
 
-def test_a_part_of_the_slip_space_steers_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_largest_directions_steer_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
     balance, predicted = case(5)
     tangent = tangent_of(balance, predicted)
-    whole = find_slip_space(tangent, MANY, 0, 0.0)
-    part = find_slip_space(tangent, 0, MANY, NEWTON.partial_cutoff)
+    whole = find_slip_space(tangent, MANY)
     assert whole is not None
-    assert part is not None
-    assert part.size < whole.size
+    assert find_slip_space(tangent, whole.size - 1) is None
+    most = whole.size * 3 // 4
+    part = largest_directions(tangent, most)
+    assert part.size == most
     assert not part.exact
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, exact_directions=0, exact_directions_of_few=0))
-    right = np.random.default_rng(6).normal(size=predicted.shape)
-    found = JacobianSolver().solve(tangent, right)
-    assert np.linalg.norm(tangent.apply(found) - right) < 2e-3 * np.linalg.norm(right)
-
-
-def test_a_slip_space_that_is_too_large_is_left_to_the_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
-    balance, predicted = case(7)
-    tangent = tangent_of(balance, predicted)
-    assert find_slip_space(tangent, 10, 10, NEWTON.partial_cutoff) is None
-    few = {"exact_directions": 0, "exact_directions_of_few": 0, "partial_directions": 0, "low_unknowns": 100}
+    assert largest_directions(tangent, MANY).size == whole.size
+    few = {"exact_directions": 0, "most_directions": 0, "partial_directions": most}
     monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, **few))
     monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
-    assert isinstance(build_factor(tangent, tangent.active()), HarmonicFactor)
-    right = np.random.default_rng(8).normal(size=predicted.shape)
-    found = JacobianSolver().solve(tangent, right)
-    assert np.linalg.norm(tangent.apply(found) - right) < 2e-3 * np.linalg.norm(right)
+    found = build_factor(tangent)
+    assert isinstance(found, SlipFactor)
+    assert not found.exact
+    right = np.random.default_rng(6).normal(size=predicted.shape)
+    step = JacobianSolver().solve(tangent, right)
+    assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
     assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
 
 
@@ -105,7 +99,7 @@ def test_where_everything_sticks_there_is_no_slip_space() -> None:
     constant = ~balance.joint.has_normal[balance.joint.component_index // 3]
     pressed[constant] = 0.0
     tangent = tangent_of(balance, pressed)
-    space = find_slip_space(tangent, MANY, 0, 0.0)
+    space = find_slip_space(tangent, MANY)
     assert space is not None
     assert space.size == 0
     right = np.random.default_rng(1).normal(size=predicted.shape)

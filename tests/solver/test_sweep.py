@@ -85,7 +85,7 @@ def test_the_three_loading_histories_leave_different_states() -> None:
 
 @pytest.mark.slow
 def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    # behind the resonance, with harmonics enough: what the coarse walk misses are its steps alone
+    # behind the resonance, with harmonics enough: what the reference sweep misses are its steps alone
     settings = SolverSettings(harmonics=9, samples=128)
     found = {}
     for change in (0.3, 0.02):
@@ -106,12 +106,12 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("settings", "same"), [(AUTOMATIC, False), (SolverSettings(5, 64), True)])
-def test_the_coarse_walk_has_fewer_harmonics_where_these_are_automatic(settings: SolverSettings, same: bool) -> None:
+def test_the_reference_sweep_has_fewer_harmonics_where_automatic(settings: SolverSettings, same: bool) -> None:
     line = FrequencySweep(dovetail(13), 0.5, 0.5, "up", settings)
     line.advance(BESIDE)
-    assert line.walk is not None
-    assert line.walk.here is not None
-    fine, coarse = line.walk.case.resolution, line.walk.reference_path.case.resolution
+    assert line.nodes is not None
+    assert line.nodes.here is not None
+    fine, coarse = line.nodes.case.resolution, line.nodes.reference_path.case.resolution
     assert (fine == coarse) == same
     assert coarse.highest <= fine.highest
     assert coarse.samples <= fine.samples
@@ -167,7 +167,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort() -> None:
         ((_, start),) = found
         assert start.state is None
         assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
-        # to begin the walk, to begin it anew, and at the point; each ends with one solve under way
+        # to begin the sweep, to begin it anew, and at the point; each ends with one solve under way
         assert start.newton_iterations < 4 * LOADING.first_iterations
 
 
@@ -175,7 +175,7 @@ def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch: p
     monkeypatch.setattr(sweep_module.NodeSweep, "_choose_resolution", lambda _: 0.6)
     sweep = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC)
     origin = find_origin(sweep.model, 100.0, "up")
-    sweep.origin, sweep.walk = origin, sweep._new_walk(origin, None)
-    sweep._begin(sweep.walk, origin)
-    assert sweep.walk.here is None
-    assert sweep.walk.state.failure is Outcome.UNSETTLED
+    sweep.origin, sweep.nodes = origin, sweep._new_sweep(origin, None)
+    sweep._begin(sweep.nodes, origin)
+    assert sweep.nodes.here is None
+    assert sweep.nodes.state.failure is Outcome.UNSETTLED

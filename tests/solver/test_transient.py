@@ -167,7 +167,7 @@ def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> N
         unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), effort
     )
     assert found is None
-    most = CONTINUATION.transient_iterations + CONTINUATION.near_iterations
+    most = CONTINUATION.near_iterations + CONTINUATION.near_iterations
     assert effort.iterations < CONTINUATION.transient_steps * most
 
 
@@ -186,5 +186,5 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch:
         )
         outcomes.append(outcome)
         # one step and one search for the periodic state may be under way
-        assert effort.iterations <= most + CONTINUATION.transient_iterations + CONTINUATION.near_iterations
+        assert effort.iterations <= most + CONTINUATION.near_iterations + CONTINUATION.near_iterations
     assert outcomes == [Outcome.CONVERGED, Outcome.UNSETTLED]

@@ -88,8 +88,11 @@ class DraftStep:
 class Draft:
     """All that was read so far.
 
-    scope: PART inside of *PART and *INSTANCE, else "". instance: name of the only one, "" before. in_parts: whether the
-    deck has parts. step: the one being read, None outside. included: files, relative to the deck's folder.
+    scope: PART inside of *PART and *INSTANCE, else "".
+    instance: name of the only instance, "" before it.
+    in_parts: whether the deck has parts.
+    step: the step that is being read; None outside of steps.
+    included: files, relative to the folder of the deck.
     """
 
     nodes: list[tuple[IntArray, FloatArray, Place]] = field(default_factory=list)

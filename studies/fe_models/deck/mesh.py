@@ -1,7 +1,7 @@
-"""What a deck holds: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
+"""The contents of a deck: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
 
-Node and element numbers are those of the file, not places in an array. Names of sets, surfaces, materials and
-interactions are in capitals, as the codes do not tell them from small letters.
+Node and element numbers are those of the file, not indices of an array. Names of sets, surfaces, materials and
+interactions are in capitals, as the programs ignore case.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ Nodes stand in the order of these codes. C3D8R is read for its geometry: its mat
 class ElementBlock:
     """Elements of one kind.
 
-    kind: a key of NODES_OF_KIND. numbers (m,): element numbers. nodes (m, k): node numbers, in the order of the codes.
+    kind: a key of NODES_OF_KIND.
+    numbers (m,): element numbers.
+    nodes (m, k): node numbers, in the order of the programs.
     """
 
     kind: str
@@ -48,7 +50,9 @@ class ElementBlock:
 class Surface:
     """Faces of elements, or nodes; the other of the two is empty.
 
-    elements (f,): element numbers. faces (f,): 1 to 6, the codes' S1 to S6. nodes (p,): node numbers, ascending.
+    elements (f,): element numbers.
+    faces (f,): 1 to 6, the faces S1 to S6 of the programs.
+    nodes (p,): node numbers, ascending.
     """
 
     elements: IntArray
@@ -63,11 +67,11 @@ class Surface:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two surfaces that are glued, or the cut faces of a sector.
+    """Two glued surfaces, or the cut faces of a sector.
 
-    dependent, independent: names of surfaces (the slave comes first, as in the deck). tolerance: largest distance of a
-    node that is tied, in units of length of the file; None where the deck does not say, or says 0. cyclic: whether
-    these are the cut faces of a sector.
+    dependent, independent: names of surfaces, slave first, as in the deck.
+    tolerance: largest distance of a tied node, in the unit of length of the file; None where the deck gives none, or 0.
+    cyclic: whether these are the cut faces of a sector.
     """
 
     name: str
@@ -81,8 +85,9 @@ class Tie:
 class ContactPair:
     """Two surfaces in contact.
 
-    dependent, independent: names of surfaces (the slave comes first, as in the deck). interaction: the name of what is
-    between them. friction_coefficient: of that interaction, None where the deck does not say.
+    dependent, independent: names of surfaces, slave first, as in the deck.
+    interaction: name of the interaction.
+    friction_coefficient: of the interaction; None where the deck gives none.
     """
 
     dependent: str
@@ -93,10 +98,11 @@ class ContactPair:
 
 @dataclass(frozen=True)
 class CyclicSymmetry:
-    """A sector of a whole.
+    """A sector of a cyclic structure.
 
-    n_sectors: in the whole. tie: name of the tie of the cut faces, "" where the deck does not say. axis (2, 3): two
-    points on the axis.
+    n_sectors: number of sectors.
+    tie: name of the tie of the cut faces, "" where the deck gives none.
+    axis (2, 3): two points on the axis.
     """
 
     n_sectors: int
@@ -106,10 +112,12 @@ class CyclicSymmetry:
 
 @dataclass(frozen=True)
 class Boundary:
-    """Displacements that are prescribed.
+    """Prescribed displacements.
 
-    name: the set, or the node number as a text. nodes (p,): node numbers. first_dof, last_dof: 1 to 3 are displacements
-    along x, y and z; a boundary condition may reach beyond. value: displacement, 0 where it is held.
+    name: the set, or the node number as text.
+    nodes (p,): node numbers.
+    first_dof, last_dof: 1 to 3 are displacements along x, y and z; larger numbers are possible.
+    value: displacement; 0 for held ones.
     """
 
     name: str
@@ -141,10 +149,13 @@ class SolidSection:
 
 @dataclass(frozen=True)
 class CentrifugalLoad:
-    """The load of a rotation.
+    """Centrifugal load.
 
-    name: the set, or the element number as a text. elements (m,): element numbers. omega_squared: square of the speed,
-    rad2/s2. point (3,): on the axis. axis (3,): its direction, of unit length.
+    name: the set, or the element number as text.
+    elements (m,): element numbers.
+    omega_squared: square of the speed, rad2/s2.
+    point (3,): on the axis.
+    axis (3,): unit vector.
     """
 
     name: str
@@ -158,11 +169,16 @@ class CentrifugalLoad:
 class Step:
     """One step of a deck.
 
-    kind: "static", "frequency", or another keyword in small letters; "" where there is none. perturbation: about the
-    state of the step before. nlgeom: with large displacements. line: where it begins, as "sector.inp, line 7".
-    boundaries: those the step adds. boundaries_replaced: whether it takes away all others first. centrifugal: loads.
-    equations_removed: `*EQUATION,REMOVE ALL`. contact_removed: pairs of surfaces (dependent, independent) that
-    `*MODEL CHANGE` takes away. parameters: those of the keyword that gives the kind, by name in capitals.
+    kind: "static", "frequency", or another keyword in small letters; "" where there is none.
+    perturbation: whether the step is about the state of the step before.
+    nlgeom: whether displacements are large.
+    line: first line of the step, as "sector.inp, line 7".
+    boundaries: boundary conditions that the step adds.
+    boundaries_replaced: whether the step first removes all others.
+    centrifugal: centrifugal loads.
+    equations_removed: whether `*EQUATION,REMOVE ALL` is there.
+    contact_removed: pairs of surfaces (dependent, independent) that `*MODEL CHANGE` removes.
+    parameters: of the keyword that gives the kind, by name in capitals.
     """
 
     kind: str

@@ -1,7 +1,7 @@
-"""What the interactive part of the page holds of a result file: the numbers as 32 bit floats, within a limit of size.
+"""Numbers for the interactive part of the page: 32-bit floats of a result file, within a limit of size.
 
-A point is numbered as in the file, the last axis fastest. Values stay in the units of the file; the script on the page
-multiplies them by `factor` where it shows them.
+Points are numbered as in the file, the last axis fastest. Values are in the units of the file; the script of the page
+multiplies them by `factor`.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ POINT_NUMBERS = (
 _LARGEST = {"harmonics_used": "harmonics", "samples_used": "samples in a period"}
 
 MOST_POINTS = 20_000
-"""A larger study has no interactive part: not even its numbers without cycles would fit."""
+"""Largest number of points of a study with interactive part: not even the numbers without cycles would fit."""
 
 _LINES = ("scheme", "sweep")
 _FEWEST_MAP_CYCLES = 11
@@ -70,12 +70,16 @@ _CHARACTERS_A_FLOAT = 16.0 / 3.0
 _BYTES_A_BLOCK = 32e6
 
 Encoded = dict[str, str | float]
-"""`data`: see `encode_floats`; values times `factor` are in `unit`; `label`: what they are."""
+"""`data`: see `encode_floats`. Values times `factor` are in `unit`. `label`: name of the quantity."""
 
 
 @dataclass(frozen=True)
 class PageData:
-    """What the script on the page gets. content: None without an interactive part. notes: what is not in it."""
+    """Input of the script of the page.
+
+    content: None without interactive part.
+    notes: on what is left out.
+    """
 
     content: Mapping[str, object] | None
     notes: tuple[str, ...]
@@ -83,17 +87,17 @@ class PageData:
 
 @dataclass(frozen=True)
 class _Kept:
-    """Points and cycles that are kept: numbers of points, ascending; places of cycles, first and last among them."""
+    """Kept points and cycles: numbers of points, ascending; indices of cycles, with the first and the last."""
 
     points: NDArray[np.int64]
     cycles: NDArray[np.int64]
 
 
 def build_page_data(result: Result, limit: float) -> PageData:
-    """The numbers of the interactive part in about `limit` characters of text.
+    """Numbers of the interactive part in about `limit` characters of text.
 
-    Cycles are thinned out evenly where there are too many numbers, those of the contact pairs before those of the
-    point, then points lose their maps and loops; each of these is said in a note.
+    Where there are too many numbers cycles are thinned out evenly, first those of the contact pairs, then those of the
+    points; then points lose their maps and loops. A note says so.
     """
     n_points = result.held.size
     if n_points > MOST_POINTS:
@@ -173,7 +177,7 @@ def _counts(result: Result, kept: _Kept) -> str:
 
 
 def thin_out(count: int, keep: int) -> NDArray[np.int64]:
-    """`keep` of the places 0 to `count` - 1, evenly, first and last among them; all where `keep` is no less."""
+    """`keep` of the indices 0 to `count` - 1, evenly, with first and last; all where `keep` is at least `count`."""
     if keep >= count:
         return np.arange(count)
     return np.unique(np.round(np.linspace(0, count - 1, max(keep, min(count, 2)))).astype(np.int64))

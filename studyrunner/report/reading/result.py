@@ -1,4 +1,4 @@
-"""A result file as the report reads it: which axes vary, which points hold results, which of them is shown."""
+"""A result file for the report: varying axes, points with results, and the point that is shown."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 
 CONVERGED = 0
-"""The `outcome` of a point that was computed to the end with nothing against it."""
+"""The `outcome` of a point that was computed to the end without restriction."""
 
 _COMPLETE = ("converged", "inaccurate", "sensitive")
-"""Words of the outcomes of points that were computed to the end."""
+"""Outcomes of points that were computed to the end."""
 
 NO_VOLUME = 1e-24
-"""m3. Less than this on all pairs together is no wear but round-off: it is a thousand atoms."""
+"""Volume, m3, below which wear is round-off: a thousand atoms."""
 
 Point = Mapping[str, int]
-"""Index along each axis. Where axes are left out, all values along them are meant."""
+"""Index along each axis. A missing axis stands for all its values."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """One way for the computation of a point to end: number and word of the file, sentence for the reader."""
+    """One outcome: number and word of the file, sentence for the reader."""
 
     number: int
     word: str
@@ -43,9 +43,9 @@ class Ending:
 
 @dataclass(frozen=True)
 class Choice:
-    """Combinations of the axes that a figure shows, each with its label, and a sentence about those it leaves out.
+    """Combinations of the axes that a figure shows, with labels.
 
-    sentence: empty where nothing is left out.
+    sentence: on combinations that are left out; empty where there are none.
     """
 
     points: tuple[dict[str, int], ...]
@@ -59,9 +59,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Result:
-    """A result file; a point is one combination of its axes.
+    """A result file. A point is one combination of the axes.
 
-    dataset: read lazily. A variable that was read whole stays in memory, so that it is read once only.
+    dataset: read lazily. A variable that was read as a whole stays in memory.
     """
 
     path: Path
@@ -79,7 +79,7 @@ class Result:
 
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
-        """Which points were computed to the end, each with its error; in the shape of the axes."""
+        """Points that were computed to the end, in the shape of the axes."""
         outcome = self.dataset["outcome"].values
         if not self.has("last_cycle"):
             # an older file holds nothing of any other point
@@ -89,14 +89,14 @@ class Result:
 
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
-        """Cycle counts up to which the points hold values, NaN where they hold none; in the shape of the axes."""
+        """Last cycle counts with values, NaN without values; in the shape of the axes."""
         last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
         # points of an older file, or of one that was joined to this
         return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
-        """Which points hold values, be it of the first cycles only; in the shape of the axes."""
+        """Points with values, be it of the first cycles only; in the shape of the axes."""
         return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
 
     @cached_property
@@ -115,12 +115,12 @@ class Result:
 
     @cached_property
     def above(self) -> NDArray[np.bool_]:
-        """Which points were computed to the end, their worn volume known less well than to rtol; shape of the axes."""
+        """Points that were computed to the end with a worn volume known less well than rtol; shape of the axes."""
         return np.asarray(self.computed & (self.errors > self.rtol))
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
-        """Which points were computed to the end, with a worn volume that is known to `rtol`; shape of the axes."""
+        """Points that were computed to the end with a worn volume known to `rtol`; in the shape of the axes."""
         return np.asarray(self.computed & (self.errors <= self.rtol))
 
     @property
@@ -136,7 +136,7 @@ class Result:
         return np.asarray(worn.transpose(*self.axes).values, dtype=float)
 
     def ended(self, word: str) -> NDArray[np.bool_]:
-        """Which points have the outcome of this word; in the shape of the axes."""
+        """Points with the outcome of this word; in the shape of the axes."""
         numbers = [number for number, ending in self.endings.items() if ending.word == word]
         return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
 
@@ -159,7 +159,7 @@ class Result:
 
     @property
     def has_history(self) -> bool:
-        """Whether anything is known of the shown point between the first state and a final one."""
+        """Whether the shown point has states between the first and a final one."""
         return len(self.cycles) > 1 and bool(np.isfinite(self.cycles[1:]).any())
 
     def last_kept(self, point: Point) -> int:
@@ -176,7 +176,7 @@ class Result:
 
     @cached_property
     def study(self) -> dict[str, dict[str, object]]:
-        """The effective study that the file carries, by table; empty where it has none that can be read."""
+        """The effective study in the file, by table; empty where there is none that can be read."""
         try:
             return study_tables(self.dataset.attrs)
         except UserError:
@@ -218,7 +218,7 @@ class Result:
         return all(name in self.dataset.variables for name in names)
 
     def lacks(self, *names: str) -> str:
-        """Sentence that says which of these variables to ask for; empty where the file holds all of them."""
+        """Sentence that says which of these variables to ask for; empty where the file has all."""
         missing = [name for name in names if not self.has(name)]
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
 
@@ -248,10 +248,10 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to the end the one of the largest final worn volume; where nothing is worn, or
-        the file does not hold it, the one of the largest response at the first cycle count kept; else the first point
-        that was computed; else the first. Explicit, oscillating and sensitive histories, which wear too much, only
-        count where there is no other; those that ended early only where none was computed to the end.
+        Among the points computed to the end this is the point with the largest final worn volume. Where nothing is
+        worn, or the file has no wear, it is the point with the largest response at the first kept cycle count; else the
+        first computed point; else the first point. Explicit, oscillating and sensitive histories, which wear too much,
+        count only where there is no other; histories that ended early count only where none was computed to the end.
         """
         return dict(self._shown)
 
