@@ -73,16 +73,16 @@ def history_error(
     area
         (n_contact,), m2.
     scheme
-        Of the history: how wrong it is beside its reference solution.
+        Of the history.
     """
-    safety = ACCURACY.history_safety(scheme)
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
-    difference = safety * np.abs(depth - reference["wear_depth"])
-    error = np.fmax(difference @ area, safety * met.largest_before(counts))
-    # a later state that happens to be the same does not make the start better known
-    error = np.fmax(error, _start_error(fine, reference, area) * volume)
-    # in the first steps both histories have the same error, which only the wear rates at their ends show
-    error = np.fmax(error, fine["local"])
+    difference = ACCURACY.history_safety * np.abs(depth - reference["wear_depth"])
+    error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
+    # a later state that happens to be alike does not make the start better known
+    at_start = max(_start_error(fine, reference, area), float(np.nan_to_num(fine["wear_rate_error"][0], posinf=0.0)))
+    error = np.fmax(error, at_start * volume)
+    # errors of Euler steps have one sign, and grow
+    error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.history_safety) * fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)

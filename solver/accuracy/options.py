@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.settings import Scheme
-
 
 @dataclass(frozen=True)
 class AccuracyOptions:
@@ -119,23 +117,14 @@ class AccuracyOptions:
     1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
 
     # wear histories
-    implicit_safety: float = 1.75
-    """Error of a history over its difference to the reference solution, of implicit steps. Dovetail of 16 pairs, steps
-    of 250 to 2000 cycles: 0.2 to 1.8, in the median 1.2."""
-    explicit_safety: float = 0.8
-    """The same, of explicit steps: 0.05 to 0.4, in the median 0.15."""
-    adaptive_safety: float = 1.25
-    """The same, of adaptive steps: 0.03 to 0.85 on the dovetail, up to 1.9 on small random joints."""
+    history_safety: float = 1.5
+    """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
+    250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
     crossing_window: float = 0.5
     """Of the cycle count: histories that differ by when something happens cross each other. The difference that counts
     is the largest one since this fraction of the count (dovetail, 211.25 Hz, steps of 2000 cycles: without it a quarter
     of the true error at the crossing). What comes later has no part in it, so that an error does not depend on how far
     a study goes."""
-
-    def history_safety(self, scheme: Scheme) -> float:
-        """Error of a history over its difference to the reference solution."""
-        factors = {"implicit": self.implicit_safety, "explicit": self.explicit_safety, "adaptive": self.adaptive_safety}
-        return factors[scheme]
 
     @property
     def violation_limits(self) -> dict[str, float]:

@@ -31,9 +31,6 @@ from solver.wear.options import WEAR
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
-ZERO_STABLE = 1.0 + np.sqrt(2.0)
-"""Ratio of two steps up to which errors do not grow from step to step, in theory."""
-
 
 @dataclass(frozen=True)
 class Attempt:

@@ -14,7 +14,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
 from solver.model import FloatArray
 from solver.settings import Scheme
-from solver.wear.bdf2 import ZERO_STABLE, bdf2_attempt
+from solver.wear.bdf2 import bdf2_attempt
 from solver.wear.options import WEAR
 from solver.wear.state import Failure, WearState
 from solver.wear.step import Step, bounded_euler_step, euler_step
@@ -70,9 +70,12 @@ class AdaptiveSteps:
 
     The steps know neither the last cycle count nor the wear coefficient but through `k_w h`. They go beyond the last
     count, which is interpolated, and histories that differ in k_w alone take equal steps.
+
+    bounded: whether a step that moves many times the normal forces is refused.
     """
 
     rtol: float
+    bounded: bool = True
 
     def begin(self, work: WearingJoint, state: WearState) -> WearState:
         """As in `Control`."""
@@ -106,7 +109,8 @@ class AdaptiveSteps:
                     return Step(work.accepted(state, tried.point, length).planned(ahead), size, length)
                 shorter = float(np.clip(wanted, WEAR.smallest_step_ratio, WEAR.refused_step_ratio))
             if length <= shortest:
-                taken = bounded_euler_step(work, state, length, "implicit")
+                one_step = bounded_euler_step if self.bounded else euler_step
+                taken = one_step(work, state, length, "implicit")
                 return taken if isinstance(taken, Failure) else replace(taken, state=taken.state.planned(length))
             length = max(shorter * length, 0.999 * shortest)
 
@@ -115,30 +119,3 @@ class AdaptiveSteps:
         worn, before = float(depth @ work.area), float(state.depth @ work.area)
         at_mean_rate = worn * length / (state.cycle + length)
         return max(WEAR.step_error_fraction * self.rtol * max(worn - before, at_mean_rate), 1e-300)
-
-
-@dataclass(frozen=True)
-class ListedSteps:
-    """Steps to counts that are given, however large their errors are.
-
-    ends: ascending counts at which the steps end.
-    second_order: BDF2 steps, and implicit Euler steps where no BDF2 step is found; else implicit Euler steps.
-    """
-
-    ends: FloatArray
-    second_order: bool
-
-    def begin(self, _: WearingJoint, state: WearState) -> WearState:
-        """As in `Control`."""
-        return state
-
-    def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
-        """As in `Control`."""
-        length = float(self.ends[np.searchsorted(self.ends, state.cycle * (1.0 + 1e-12), "right")]) - state.cycle
-        if self.second_order:
-            if state.previous is not None and length > ZERO_STABLE * state.previous[0]:
-                state = replace(state, previous=None)
-            tried = bdf2_attempt(work, state, length)
-            if tried is not None:
-                return Step(work.accepted(state, tried.point, length), 0.0, length)
-        return euler_step(work, state, length, "implicit")

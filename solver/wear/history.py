@@ -80,7 +80,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     assert state is not None
     counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
     own, course = output.read(counts), fine.output.course
-    coarse = None if reference is None else solutions.output_of(reference)
+    coarse = None if reference is None else solutions.output_of_reference(reference)
     other = _read_or_nan(coarse, counts, own)
     at_steps = np.array(course.cycles)
     apart = _read_or_nan(coarse, at_steps, own)["wear_depth"] - np.array(course.depths)

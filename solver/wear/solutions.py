@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.reference import coarser, every_second
+from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -22,7 +22,7 @@ from solver.results.history import StartState
 from solver.settings import Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
-from solver.wear.control import AdaptiveSteps, Control, GivenSteps, ListedSteps
+from solver.wear.control import AdaptiveSteps, Control, GivenSteps
 from solver.wear.integrate import Integration, Progress, guarded
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput, OutputState
@@ -157,15 +157,14 @@ class Solutions:
         course = fine.output.course
         assert fine.state is not None
         assert self.start.state is not None
-        work, smooth = self._joint(), self.asked.scheme == "adaptive"
-        ends = np.array(every_second(course.ends))
-        end = float(ends[-1]) if ends.size else 0.0
+        work, compared = self._joint(), self._compared(fine)
+        end = float(compared[-1])
         resolutions = tuple((count, coarser(resolution)) for count, resolution in course.resolutions)
         integration = Integration(
-            ListedSteps(ends, smooth),
+            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False),
             PlainCheck(resolutions),
             AtCount(end),
-            DenseOutput(work.area, self._compared(fine), smooth=smooth),
+            DenseOutput(work.area, compared, smooth=True),
             lambda progress: self._save(integration, work, progress, fine),
             bounded=False,
             most_iterations=fine.iterations + WEAR.history_iterations,
@@ -181,17 +180,24 @@ class Solutions:
             return np.zeros(self.asked.cycles.n_outputs)
         return self.output_of(fine).even_counts(self.asked.cycles.n_outputs)
 
-    def output_of(self, ended: Ended) -> DenseOutput:
-        """The output of an integration, to be read."""
-        output = DenseOutput(self.case.model.contact.area, None, smooth=self.asked.scheme == "adaptive")
+    def output_of(self, fine: Ended) -> DenseOutput:
+        """The output of the history, to be read."""
+        return self._output(fine, smooth=self.asked.scheme == "adaptive")
+
+    def output_of_reference(self, ended: Ended) -> DenseOutput:
+        """The output of the reference solution, to be read."""
+        return self._output(ended, smooth=True)
+
+    def _output(self, ended: Ended, *, smooth: bool) -> DenseOutput:
+        output = DenseOutput(self.case.model.contact.area, None, smooth=smooth)
         output.taken = ended.output
         return output
 
     def _compared(self, fine: Ended) -> FloatArray:
-        """Ascending counts at which the reference solution is read."""
+        """Ascending counts at which the reference solution is read, the first 0."""
         reached = min(fine.output.course.ends[-1], self.asked.end)
-        counts = self.counts(fine)
-        return np.unique(np.concatenate([counts[counts <= reached], fine.output.course.cycles]))
+        counts = np.concatenate([[0.0], self.counts(fine), fine.output.course.cycles])
+        return np.unique(counts[counts <= reached])
 
     def _joint(self) -> WearingJoint:
         """The joint, with what is left of the limit of time."""
