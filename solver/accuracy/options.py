@@ -77,7 +77,7 @@ class AccuracyOptions:
     """Error over the difference to twice the samples: 2 to 1.3 where it falls with the step in time or its square."""
     triple_samples_safety: float = 2.0
     """The same to three times the samples: 1.5 to 1.1, but those of single events scatter."""
-    small_slip_work: float = 1e-2
+    small_slip_work: float = 1e-3
     """Of the work of the excitation: where normal force times slip is less, it is judged against this."""
     no_slip_work: float = 1e-3
     """Of the small slip work: where even that is not reached, nothing wears."""
@@ -106,7 +106,7 @@ class AccuracyOptions:
     of 48 pairs with nine harmonics may take 200."""
     most_unknowns: int = 8000
     """Unknowns of a balance that "auto" may march with."""
-    small_joint_displacements: int = 40
+    small_joint: int = 40
     """Relative displacements up to which a joint is small."""
     few_pairs_unknowns: int = 2000
     """As `most_unknowns`, of a small joint: impacts couple all harmonics, and no preconditioner helps."""
@@ -118,8 +118,8 @@ class AccuracyOptions:
 
     # wear histories
     history_safety: float = 1.5
-    """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
-    250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
+    """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps
+    of 250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
     crossing_window: float = 0.5
     """Of the cycle count: histories that differ by when something happens cross each other. The difference that counts
     is the largest one since this fraction of the count (dovetail, 211.25 Hz, steps of 2000 cycles: without it a quarter

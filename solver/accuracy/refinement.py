@@ -188,7 +188,7 @@ class _Search:
         room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
         if here.unknowns(resolution) * resolution.samples > room:
             return False
-        small = n_rel <= ACCURACY.small_joint_displacements
+        small = n_rel <= ACCURACY.small_joint
         most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
             # friction alone: motions that hit something take more in vain

@@ -14,9 +14,8 @@ from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
-from solver.wear.bdf2 import ZERO_STABLE
 from solver.wear.check import chosen_for_another
-from solver.wear.control import AdaptiveSteps, Control, GivenSteps, ListedSteps
+from solver.wear.control import AdaptiveSteps, Control, GivenSteps
 from solver.wear.euler import euler_balance
 from solver.wear.options import WEAR as OPTIONS
 from solver.wear.state import Choice, Failure, WearState
@@ -149,29 +148,15 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
 
 
-@pytest.mark.parametrize("plan", ["listed", "adaptive"])
-def test_a_step_of_second_order_solves_its_own_equation(plan: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if plan == "listed":
-        states, steps = steps_of(ListedSteps(np.array([1000.0, 3000.0, 4000.0]), second_order=True), 3)
-        assert counts(states).tolist() == [0.0, 1000.0, 3000.0, 4000.0]
-    else:
-        # no error is refused, so that steps grow as they may
-        monkeypatch.setattr(control, "WEAR", replace(OPTIONS, step_error_fraction=1e9))
-        states, steps = steps_of(AdaptiveSteps(1e-2), 3)
+def test_a_step_of_second_order_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None:
+    # no error is refused, so that steps grow as they may
+    monkeypatch.setattr(control, "WEAR", replace(OPTIONS, step_error_fraction=1e9))
+    states, steps = steps_of(AdaptiveSteps(1e-2), 3)
     depth, rate, h = depths(states), rates(states), [step.length for step in steps]
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
     for n in (1, 2):
         expected = bdf2_depth(h[n], h[n - 1], depth[n] - depth[n - 1], depth[n], rate[n + 1])
         assert depth[n + 1] == pytest.approx(expected, rel=1e-9)
-
-
-def test_listed_steps_begin_anew_where_one_is_much_longer_than_the_last() -> None:
-    ends = np.array([1000.0, 1000.0 * (1.01 + ZERO_STABLE)])
-    states, _ = steps_of(ListedSteps(ends, second_order=True), 2)
-    assert counts(states)[1:].tolist() == ends.tolist()
-    assert np.diff(depths(states)) == pytest.approx(np.diff([0.0, *ends]) * rates(states)[1:], rel=1e-9)
-    euler, _ = steps_of(ListedSteps(ends / 2.0, second_order=False), 2)
-    assert np.diff(depths(euler)) == pytest.approx(np.diff([0.0, *ends]) / 2.0 * rates(euler)[1:], rel=1e-9)
 
 
 @pytest.mark.parametrize(
