@@ -5,15 +5,17 @@ For use in Python, from this package itself:
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `frequency_response`: the unworn joint over frequency, a `FrequencyResponse`;
 - `march_wear`: its wear over the cycles at one frequency, a `WearHistory`;
+- `tuned`: other limits of the solver for hard cases;
 - `SolverSettings` says how finely and how exactly, `Outcome` how a computation ended.
 
 The rooms, from the ground up: `structure` (Fourier basis, condensation, penalty), `contact` (Coulomb friction and
 unilateral contact through a period), `harmonic_balance` (the DLFT balance and its Jacobian), `newton` (iteration,
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
-transient), `accuracy` (harmonic levels, refinement, error estimates, certificate), `results`, `loading_history` (the
-unworn states of a sweep or a ramp), `wear` (the march on slow time). On top: `forced_response`, `wear_history`. On the
-ground: `model`, `model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. The equations in one convention,
-where the print of the paper is wrong, and what was measured: `PHYSICS.md`.
+transient), `accuracy` (harmonic levels, refinement, reference solution and errors, certificate), `results`,
+`loading_history` (the unworn states of a sweep or a ramp), `wear` (the integration over the slow time). On top:
+`forced_response`, `wear_history`, `tuning`. On the ground: `model`, `model_from_matrices`, `settings`, `outcome`,
+`clock`, `packing`. The equations in one convention, where the print of the paper is wrong, and what was measured:
+`PHYSICS.md`.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from solver.outcome import Outcome
     from solver.results.history import WearHistory
     from solver.settings import SolverSettings
+    from solver.tuning import tuned
     from solver.wear_history import march_wear
 
 __all__ = [
@@ -39,6 +42,7 @@ __all__ = [
     "build_model",
     "frequency_response",
     "march_wear",
+    "tuned",
 ]
 
 # Loaded when first asked for: rooms import each other through this package, and numba takes a while to load.
@@ -51,6 +55,7 @@ _PLACES = {
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
     "march_wear": "wear_history",
+    "tuned": "tuning",
 }
 
 

@@ -6,18 +6,14 @@ harmonics cannot be made more. The summary of a run and the report take all of t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 _SWEEPS = ("up", "down", "ramp")
 _OF_ADAPTIVE_STEPS = ("adaptive", "final")
 
-_OF_STATES = 0.5
-"""Share of the error of a worn volume from which on the error of a wear rate is what it comes from."""
-
-_OF_START = 1.0 / 6.0
-"""The same of the wear rate of the start state, which counts three times (`ResultOptions.start_safety`)."""
+_OF_START = 0.5
+"""Share of the error of a worn volume from which on it comes from the start state: the error of its wear rate."""
 
 _FAR = 10.0
 """Errors of more than so many times `rtol` do not fall in proportion to it."""
@@ -80,10 +76,9 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
     error: of the last worn volume, relative, above `rtol`. wear_rate_error: of the states, the first of the start state
     (NaN: not estimated); empty where they are not known.
     """
-    rates = [0.0 if math.isnan(value) else value for value in wear_rate_error]
-    if _given(used) and max(rates, default=0.0) >= _OF_STATES * error > 0.0:
+    of_start = len(wear_rate_error) > 0 and wear_rate_error[0] >= _OF_START * error > 0.0
+    if _given(used) and of_start:
         return " and ".join(_given(used))
-    of_start = bool(rates) and rates[0] >= _OF_START * error
     if used.scheme not in _OF_ADAPTIVE_STEPS and not of_start:
         return " or ".join(_other_steps(used))
     if error >= _FAR * used.rtol:

@@ -1,11 +1,13 @@
 """How wrong a state is for its harmonics and samples, and which of them it needs.
 
-The error of a state is estimated by solving it again with more harmonics and with more samples, each warm started: what
-changes is the error, up to the rest of the series (`solver.accuracy.level`). Automatic settings go up, one or the
-other, until the estimate is below `rtol`; a state without even harmonics goes on without them, and one in which nothing
-slips or opens keeps the first harmonic alone, which is then exact. Masses that ratchet are brought to rest first
-(`solver.continuation.ratcheting`), and where Newton's method diverges from a warm start with more harmonics these are
-added by homotopy (`solver.continuation.harmonic_homotopy`), as far as that is cheap.
+The error of a state is estimated by solving the state again with more harmonics and with more samples. Each solve
+begins from the state. What changes is the error, up to the rest of the series (`solver.accuracy.resolved_state`).
+
+Automatic settings take more harmonics or more samples until the estimate is below `rtol`. A state without even
+harmonics goes on without them. A state in which nothing slips or opens keeps the first harmonic alone, which is then
+exact. Masses that ratchet are brought to rest first (`solver.continuation.ratcheting`). Where Newton's method
+diverges from a state with fewer harmonics, the others are added by homotopy (`solver.continuation.homotopy`), as far
+as that is cheap.
 """
 
 from __future__ import annotations
@@ -16,11 +18,11 @@ import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.harmonic_levels import room_for, shifted
-from solver.accuracy.level import Level
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
+from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.converged import PathPoint
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
 
@@ -45,7 +47,7 @@ def refine(
     omega: float,
     excitation_amplitude: float,
     point: PathPoint,
-    effort: Effort,
+    budget: Budget,
     most: float = ACCURACY.most_unknowns,
     usual_work: float = 0.0,
 ) -> Refined:
@@ -59,7 +61,7 @@ def refine(
         rad/s, N.
     point
         The state.
-    effort
+    budget
         Newton iterations spent are added to it.
     most
         Unknowns of a joint of 48 pairs up to which more harmonics are taken (`room_for`).
@@ -74,10 +76,12 @@ def refine(
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the effort.
+        Behind the deadline of the budget.
     """
-    search = _Search(case.settings, effort, effort.iterations, most)
-    return search.refined(Level(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(effort))
+    search = _Search(case.settings, budget, budget.iterations, most)
+    return search.refined(
+        ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(budget)
+    )
 
 
 @dataclass
@@ -85,20 +89,20 @@ class _Search:
     """The search for the harmonics and samples that a state needs.
 
     settings: what is automatic, and rtol.
-    effort, begun: Newton iterations are counted here, and how many there were before.
+    budget, begun: Newton iterations are counted here, and how many there were before.
     most: as in `refine`.
     faint: whether slip shows with more samples only than those of the state that was given.
     """
 
     settings: SolverSettings
-    effort: Effort
+    budget: Budget
     begun: int
     most: float
     faint: bool = False
 
-    def refined(self, here: Level) -> Refined:
+    def refined(self, here: ResolvedState) -> Refined:
         """The state of the level that suffices, or of the last one found."""
-        richer: Level | None = None
+        richer: ResolvedState | None = None
         while True:
             if nothing_happens(here.point.evaluation):
                 linear = self._linear(here)
@@ -107,8 +111,8 @@ class _Search:
                 here, self.faint = linear, True
                 continue
             if self.settings.harmonics == "auto":
-                here = here.without_even(self.effort) or here.with_even(self.effort) or here
-            by_samples, finer = here.samples_error(self.effort)
+                here = here.without_even(self.budget) or here.with_even(self.budget) or here
+            by_samples, finer = here.samples_error(self.budget)
             by_harmonics, richer = self._harmonics_error(here, richer)
             estimate = by_samples + by_harmonics
             if not self.settings.automatic:
@@ -116,7 +120,7 @@ class _Search:
                 return Refined(here.case, here.point, known, True)
             holds = here.holds()
             if holds and estimate.largest <= self.settings.rtol:
-                here, estimate = here.relaxed(estimate, self.effort)
+                here, estimate = here.relaxed(estimate, self.budget)
                 return Refined(here.case, here.point, estimate, True)
             wanted = self._wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
             following = self._next(here, wanted, finer, richer)
@@ -126,11 +130,11 @@ class _Search:
                 return Refined(here.case, here.point, estimate, judged <= self.settings.rtol)
             here = following
 
-    def _linear(self, here: Level) -> Refined | Level:
+    def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
         """Of a state in which nothing slips or opens: the result, or the state with samples that see something slip."""
         if self.settings.harmonics == "auto" and here.case.resolution.orders != (1,):
-            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.effort) or here
-        missed = here.missed_event(self.effort)
+            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.budget) or here
+        missed = here.missed_event(self.budget)
         if missed is None:
             return Refined(here.case, here.point, NOTHING, True)
         if self.settings.samples == "auto":
@@ -139,18 +143,20 @@ class _Search:
         accurate = not self.settings.automatic or missing.largest <= self.settings.rtol
         return Refined(here.case, here.point, missing, accurate)
 
-    def _harmonics_error(self, here: Level, known: Level | None) -> tuple[Estimate, Level | None]:
+    def _harmonics_error(
+        self, here: ResolvedState, known: ResolvedState | None
+    ) -> tuple[Estimate, ResolvedState | None]:
         """Error for want of harmonics, and the state with more of them that it comes from."""
-        error, richer = here.harmonics_error(self.effort, known)
+        error, richer = here.harmonics_error(self.budget, known)
         above = shifted(here.case.resolution, 1)
         cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
-            richer = here.by_homotopy(above, self.effort)
+            richer = here.by_homotopy(above, self.budget)
             error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         return error, richer
 
-    def _wanted(self, here: Level, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
+    def _wanted(self, here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
         """Harmonics and samples to go on with, by the errors for want of each."""
         resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
         wanted = resolution
@@ -160,26 +166,28 @@ class _Search:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         return wanted
 
-    def _next(self, here: Level, wanted: Resolution, finer: Level | None, richer: Level | None) -> Level | None:
+    def _next(
+        self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
+    ) -> ResolvedState | None:
         """The state with the harmonics and samples wanted, or with more that are known; None where it is not found.
 
         finer, richer: states with more samples and with more harmonics that are known.
         """
         limit = self.begun + ACCURACY.refinement_work / here.unknowns(shifted(here.case.resolution, 2))
-        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.effort.iterations >= limit:
+        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.budget.iterations >= limit:
             return None
         for known in (finer, richer):
             if known is not None and known.case.resolution == wanted:
                 return known
-        found = here.solve_at(wanted, self.effort)
+        found = here.solve_at(wanted, self.budget)
         if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
             # what is not found from below may be found from above
-            found = richer.solve_at(wanted, self.effort)
+            found = richer.solve_at(wanted, self.budget)
         if found is None and richer is not None and self.settings.harmonics == self.settings.samples == "auto":
             found = richer if self._allowed(here, richer.case.resolution) else None
         return found
 
-    def _allowed(self, here: Level, resolution: Resolution) -> bool:
+    def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may go on with these harmonics and samples."""
         if not here.case.model.holds(resolution.highest):
             return False
@@ -202,4 +210,4 @@ class _Search:
 
 def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
     """Relative differences of response and wear rate of two states of one joint, judged like any error."""
-    return Level(case, joint, one).difference(Level(case, joint, other))
+    return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))

@@ -12,14 +12,14 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
 
 
 def states_after_fold(
-    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
+    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
 ) -> Iterator[PathPoint | Outcome]:
     """Stable states beyond the end of a branch, the most physical one first; each is sought when it is asked for.
 
@@ -35,7 +35,7 @@ def states_after_fold(
         The last state of the branch.
     worn : array (n_contact,)
         Wear depth just beyond the end of the branch, m.
-    solver, effort
+    solver, budget
         As in `solve_balance`.
 
     Yields
@@ -44,7 +44,7 @@ def states_after_fold(
         A state, or last of all why there is no (other) one. Where the mean positions run away at the first attempt,
         ADRIFT, no other one is made.
     """
-    outcome, relaxed = relax_to_periodic(case, joint, worn, last.evaluation, joint, last.history, solver, effort)
+    outcome, relaxed = relax_to_periodic(case, joint, worn, last.evaluation, joint, last.history, solver, budget)
     if relaxed is not None:
         yield relaxed
     if outcome is Outcome.ADRIFT:
@@ -63,8 +63,8 @@ def states_after_fold(
     start = PathPoint(joint.omega, last.evaluation, last.evaluation.history)
     span = CONTINUATION.fold_search_length * joint.omega
     for toward in (-1.0, 1.0):
-        arc = follow_arc(balance_at, start, joint.omega, span, solver, tolerance, effort, stays, toward)
+        arc = follow_arc(balance_at, start, joint.omega, span, solver, tolerance, budget, stays, toward)
         if arc.point is not None and arc.folds:
             yield arc.point
-    outcome, other = solve_first_state(case, joint.omega, joint.excitation_amplitude, worn, solver, effort)
+    outcome, other = solve_first_state(case, joint.omega, joint.excitation_amplitude, worn, solver, budget)
     yield outcome if other is None else other

@@ -16,7 +16,7 @@ from solver.harmonic_balance.converged import BalanceAt, PathPoint, vibration_ch
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def follow_arc(
     span: float,
     solver: JacobianSolver,
     tolerance: float,
-    effort: Effort,
+    budget: Budget,
     accept: Callable[[PathPoint], bool] = lambda _: True,
     toward: float = 0.0,
     beyond: bool = True,
@@ -58,7 +58,7 @@ def follow_arc(
         State to begin with.
     target, span : float
         Value of the parameter that is sought, and its natural length.
-    solver, tolerance, effort
+    solver, tolerance, budget
         As in `solve_balance`.
     accept : callable
         Whether a state at the target ends the search.
@@ -82,7 +82,7 @@ def follow_arc(
     low = min(start.parameter, target) - CONTINUATION.farthest * abs(span)
     high = max(start.parameter, target) + CONTINUATION.farthest * abs(span)
     for _ in range(CONTINUATION.arc_steps):
-        if effort.exhausted:
+        if budget.exhausted:
             break
         point = points[-1]
         tangent = arc.tangent(point.parameter, point.evaluation)
@@ -91,11 +91,11 @@ def follow_arc(
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
         reached = None
         while reached is None and length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
-            reached = arc.step(point, tangent, length, tolerance, effort)
+            reached = arc.step(point, tangent, length, tolerance, budget)
             failures += reached is None
             length *= CONTINUATION.arc_growth if reached is not None else 0.5
         if reached is None and failures < CONTINUATION.arc_failures:
-            reached = arc.step_over_corner(point, tangent, tolerance, effort)
+            reached = arc.step_over_corner(point, tangent, tolerance, budget)
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
@@ -110,10 +110,10 @@ def follow_arc(
         points.append(reached)
         path.append(arc.place(reached.parameter, reached.evaluation))
         if len(points) > 2 and (path[-1][-1] - path[-2][-1]) * (path[-2][-1] - path[-3][-1]) < 0.0:
-            folds.append(arc.fold(points[-3:], tolerance, effort))
+            folds.append(arc.fold(points[-3:], tolerance, budget))
             turns.append(len(points) - 2)
         if (reached.parameter - target) * (point.parameter - target) <= 0.0 and point.parameter != target:
-            found = arc.state_at(point, reached, target, tolerance, effort)
+            found = arc.state_at(point, reached, target, tolerance, budget)
             if found is not None and accept(found):
                 return ArcResult(found, tuple(folds), _jumps(folds, turns, [*points, found], toward))
             if found is not None and not folds and not beyond:
@@ -176,7 +176,7 @@ class _Arc:
         return np.asarray(tangent / np.linalg.norm(tangent))
 
     def step(
-        self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, effort: Effort
+        self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, budget: Budget
     ) -> PathPoint | None:
         """Point of the branch at the given length along the tangent; None where the corrector does not converge."""
         shape = point.evaluation.predicted_h.shape
@@ -204,11 +204,11 @@ class _Arc:
                 return None
             change = (ahead - tangent[:-1] @ held) / pivot
             unknown = unknown - np.append(held - change * moved, change)
-            effort.iterations += 1
+            budget.iterations += 1
         return None
 
     def step_over_corner(
-        self, point: PathPoint, tangent: FloatArray, tolerance: float, effort: Effort
+        self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget
     ) -> PathPoint | None:
         """Point behind a corner of the branch, where a contact sample changes its state and the branch may turn back.
 
@@ -226,7 +226,7 @@ class _Arc:
             if turned is None:
                 continue
             for sign in (np.sign(turned @ tangent) or 1.0, -np.sign(turned @ tangent) or -1.0):
-                reached = self.step(point, sign * turned, length, tolerance, effort)
+                reached = self.step(point, sign * turned, length, tolerance, budget)
                 if reached is None:
                     continue
                 chord = self.place(reached.parameter, reached.evaluation) - base
@@ -235,20 +235,20 @@ class _Arc:
         return None
 
     def state_at(
-        self, before: PathPoint, after: PathPoint, target: float, tolerance: float, effort: Effort
+        self, before: PathPoint, after: PathPoint, target: float, tolerance: float, budget: Budget
     ) -> PathPoint | None:
         """State at the target between two points of the branch; None where Newton's method leaves them."""
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         start = one + fraction * (other - one)
         balance: Balance = self.balance_at(target, self.history)
-        result = solve_balance(balance, start, self.solver, tolerance, effort, CONTINUATION.near_iterations)
+        result = solve_balance(balance, start, self.solver, tolerance, budget, CONTINUATION.near_iterations)
         found = result.evaluation.predicted_h
         farthest = CONTINUATION.target_distance * np.linalg.norm(other - one) + CONTINUATION.target_slack * self.size
         near = np.linalg.norm(found - start) <= farthest
         return PathPoint(target, result.evaluation, self.history) if result.converged and near else None
 
-    def fold(self, points: list[PathPoint], tolerance: float, effort: Effort) -> float:
+    def fold(self, points: list[PathPoint], tolerance: float, budget: Budget) -> float:
         """Extreme value of the parameter among three points around a fold.
 
         The vertex of the parabola through the parameter over the chord length; a point of the branch is added there and
@@ -265,7 +265,7 @@ class _Arc:
                 vertex = CONTINUATION.vertex_offset * (at[2] if at[2] > -at[0] else at[0])
             other = places[2] if vertex > 0.0 else places[0]
             chord = (other - places[1]) / np.linalg.norm(other - places[1])
-            added = self.step(points[1], chord, abs(vertex), tolerance, effort)
+            added = self.step(points[1], chord, abs(vertex), tolerance, budget)
             if added is None:
                 break
             new = [points[0], points[1], added, points[2]] if vertex > 0.0 else [points[0], added, *points[1:]]

@@ -13,14 +13,14 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.fourier import change_orders, from_complex
 from solver.structure.joint import Case, Joint, static_joint
 
 
-def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, effort: Effort) -> PathPoint | None:
+def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, budget: Budget) -> PathPoint | None:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), the load raised from nothing.
 
     The state depends on the history of the load, so it is raised in equal steps and each starts from the tangential
@@ -33,7 +33,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
         Its excitation is left out.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
-    tolerance, effort
+    tolerance, budget
         As in `solve_balance`.
 
     Returns
@@ -49,7 +49,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
     history = np.zeros((joint.contact.n_contact, 2))
     first = balance_at(1.0 / n_steps, history)
     start = first.joint.structure.force_h()
-    found = solve_from_less_friction(first, start, solver, tolerance, effort)
+    found = solve_from_less_friction(first, start, solver, tolerance, budget)
     if found is None:
         return None
     point = PathPoint(1.0 / n_steps, found.evaluation, final_history(first, found.evaluation))
@@ -58,14 +58,14 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, e
         whole = balance_at(load_factor, point.history)
         # without gaps and wear the state grows with its load; much friction allows others that do not
         grown = point.evaluation.predicted_h * (step / (step - 1.0))
-        result = solve_balance(whole, grown, solver, tolerance, effort, CONTINUATION.load_step_iterations)
+        result = solve_balance(whole, grown, solver, tolerance, budget, CONTINUATION.load_step_iterations)
         if result.converged:
             point = PathPoint(load_factor, result.evaluation, final_history(whole, result.evaluation))
             continue
-        point, arrived = follow_naturally(balance_at, point, load_factor, solver, tolerance, effort)
+        point, arrived = follow_naturally(balance_at, point, load_factor, solver, tolerance, budget)
         if not arrived:
             whole = balance_at(load_factor, point.history)
-            found = solve_from_less_friction(whole, point.evaluation.predicted_h, solver, tolerance, effort)
+            found = solve_from_less_friction(whole, point.evaluation.predicted_h, solver, tolerance, budget)
             if found is None:
                 return None
             point = PathPoint(load_factor, found.evaluation, final_history(whole, found.evaluation))
@@ -78,7 +78,7 @@ def solve_first_state(
     excitation_amplitude: float,
     wear_depth: FloatArray,
     solver: JacobianSolver,
-    effort: Effort,
+    budget: Budget,
 ) -> tuple[Outcome, PathPoint | None]:
     """Periodic state from nothing: the static state first, then the excitation is raised.
 
@@ -96,7 +96,7 @@ def solve_first_state(
         rad/s, N.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
-    solver, effort
+    solver, budget
         As in `solve_balance`.
 
     Returns
@@ -108,7 +108,7 @@ def solve_first_state(
     """
     tolerance = case.settings.tolerance
     quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, wear_depth, tolerance, effort)
+    static = solve_static_state(quiet, wear_depth, tolerance, budget)
     if static is None:
         return Outcome.STATIC_FAILED, None
 
@@ -130,38 +130,38 @@ def solve_first_state(
         for part in (static.evaluation.displacement_h, static.evaluation.force_h)
     )
     start = still.predict(displacement_h, force_h)
-    result = solve_balance(still, start, solver, tolerance, effort)
+    result = solve_balance(still, start, solver, tolerance, budget)
     if not result.converged:
         return Outcome.START_FAILED, None
     rest = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
-    point, arrived = follow_naturally(balance_at, rest, 1.0, solver, tolerance, effort)
+    point, arrived = follow_naturally(balance_at, rest, 1.0, solver, tolerance, budget)
     if arrived and stays(point):
         return Outcome.CONVERGED, point
     whole = balance_at(1.0, static.history)
     sliding = start + _free_motion(whole)
-    result = solve_balance(whole, sliding, solver, tolerance, effort)
+    result = solve_balance(whole, sliding, solver, tolerance, budget)
     if result.converged:
         slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
         if stays(slid):
             return Outcome.CONVERGED, slid
     for fraction in CONTINUATION.relief:
         relieved = Balance.frozen(quiet, _relieved(quiet, static, fraction), wear_depth)
-        result = solve_balance(relieved, start, solver, tolerance, effort)
+        result = solve_balance(relieved, start, solver, tolerance, budget)
         if result.converged:
             held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
-            loaded, reached_load = follow_naturally(balance_at, held, 1.0, solver, tolerance, effort)
+            loaded, reached_load = follow_naturally(balance_at, held, 1.0, solver, tolerance, budget)
             if reached_load and stays(loaded):
                 return Outcome.CONVERGED, loaded
     joint = case.joint(omega, excitation_amplitude)
-    why, relaxed = relax_to_periodic(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, effort)
+    why, relaxed = relax_to_periodic(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, budget)
     if relaxed is not None:
         return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
         # it comes last, and where the joint has no grip it goes round and round
-        limit, effort.limit = effort.limit, min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
+        limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
         span = CONTINUATION.load_length
-        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, effort, stays).point
-        effort.limit = limit
+        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, stays).point
+        budget.limit = limit
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None

@@ -31,7 +31,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -39,7 +39,7 @@ from solver.structure.joint import Case, Joint
 
 
 def solve_from_less_friction(
-    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, effort: Effort
+    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, budget: Budget
 ) -> PathPoint | None:
     """State of a balance, by a homotopy from less friction where there is much or Newton's method fails.
 
@@ -51,7 +51,7 @@ def solve_from_less_friction(
         The problem.
     start : array (n_rel, m)
         Predicted force to begin with, N.
-    solver, tolerance, effort
+    solver, tolerance, budget
         As in `solve_balance`.
 
     Returns
@@ -71,10 +71,10 @@ def solve_from_less_friction(
     for _ in range(CONTINUATION.friction_attempts):
         logarithm = float(np.log(friction / largest)) if friction < largest else 0.0
         less = balance_at(logarithm, balance.history)
-        result = solve_balance(less, start, solver, tolerance, effort, CONTINUATION.cold_iterations)
+        result = solve_balance(less, start, solver, tolerance, budget, CONTINUATION.cold_iterations)
         if result.converged:
             lower = PathPoint(logarithm, result.evaluation, balance.history)
-            point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, effort, keep_history=True)
+            point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, budget, keep_history=True)
             if arrived:
                 return PathPoint(largest, point.evaluation, point.history)
         friction *= CONTINUATION.friction_reduction
@@ -82,7 +82,7 @@ def solve_from_less_friction(
 
 
 def add_harmonics(
-    case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, effort: Effort
+    case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, budget: Budget
 ) -> Evaluation | None:
     """State with more harmonics, by a homotopy in their compliance.
 
@@ -92,7 +92,7 @@ def add_harmonics(
         The known state.
     resolution : Resolution
         All its harmonics and new ones, and at least as many samples.
-    effort : Effort
+    budget : Budget
         Where Newton iterations are counted.
 
     Returns
@@ -107,11 +107,11 @@ def add_harmonics(
     homotopy = HarmonicHomotopy(finer, evaluation.history, evaluation.wear_depth, new, *compliances(finer, new))
     start = change_orders(evaluation.predicted_h, case.resolution.orders, resolution.orders)
     first = homotopy.at(0.0, evaluation.history)
-    result = solve_balance(first, start, JacobianSolver(), tolerance, effort)
+    result = solve_balance(first, start, JacobianSolver(), tolerance, budget)
     if not result.converged:
         return None
     point = PathPoint(0.0, result.evaluation, evaluation.history)
-    last, arrived = follow_naturally(homotopy.at, point, 1.0, JacobianSolver(), tolerance, effort, keep_history=True)
+    last, arrived = follow_naturally(homotopy.at, point, 1.0, JacobianSolver(), tolerance, budget, keep_history=True)
     return last.evaluation if arrived else None
 
 

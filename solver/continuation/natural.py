@@ -15,7 +15,7 @@ from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_histor
 from solver.harmonic_balance.dlft import Evaluation
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 
 
 def follow_naturally(
@@ -24,7 +24,7 @@ def follow_naturally(
     target: float,
     solver: JacobianSolver,
     tolerance: float,
-    effort: Effort,
+    budget: Budget,
     keep_history: bool = False,
     fine: float = np.inf,
     shortest: float | None = None,
@@ -41,7 +41,7 @@ def follow_naturally(
         State to begin with.
     target : float
         Value of the parameter.
-    solver, tolerance, effort
+    solver, tolerance, budget
         As in `solve_balance`.
     keep_history : bool
         The history stays that of the start: the intermediate states are no states of the joint.
@@ -71,7 +71,7 @@ def follow_naturally(
             reach = target
         balance = balance_at(reach, point.history)
         most = NEWTON.iterations if fraction <= 2.0 * shortest else CONTINUATION.near_iterations
-        result = solve_balance(balance, point.evaluation.predicted_h, solver, tolerance, effort, most)
+        result = solve_balance(balance, point.evaluation.predicted_h, solver, tolerance, budget, most)
         smooth = abs(reach - point.parameter) <= fine or _is_smooth(point.evaluation, result.evaluation)
         if result.converged and smooth:
             history = point.history if keep_history else final_history(balance, result.evaluation)
@@ -80,7 +80,7 @@ def follow_naturally(
         else:
             fraction *= 0.5
             failures += not result.converged
-            if fraction < shortest or failures > CONTINUATION.natural_failures or effort.exhausted:
+            if fraction < shortest or failures > CONTINUATION.natural_failures or budget.exhausted:
                 return point, False
     return point, True
 

@@ -23,7 +23,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.structure.joint import Joint
 
 
@@ -39,7 +39,7 @@ def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
     return ratcheting_work(joint, evaluation) > fraction * float(evaluation.slip_work.sum())
 
 
-def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float, effort: Effort) -> PathPoint:
+def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float, budget: Budget) -> PathPoint:
     """State after the shakedown of the masses of a state, at the same wear depth.
 
     Parameters
@@ -48,7 +48,7 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
         The state.
     fraction : float
         Of the slip work; less ratcheting is accepted.
-    tolerance, effort
+    tolerance, budget
         As in `solve_balance`.
 
     Returns
@@ -63,7 +63,7 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
             break
         homotopy = _MeanShift(joint, worn, point.evaluation.history, _mean_shift(joint, point))
         start = PathPoint(0.0, point.evaluation, point.evaluation.history)
-        moved, arrived = follow_naturally(homotopy.at, start, 1.0, solver, tolerance, effort, keep_history=True)
+        moved, arrived = follow_naturally(homotopy.at, start, 1.0, solver, tolerance, budget, keep_history=True)
         if not arrived:
             break
         history = final_history(homotopy.at(1.0, start.history), moved.evaluation)

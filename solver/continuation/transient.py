@@ -30,7 +30,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
@@ -151,7 +151,7 @@ def relax_to_periodic(
     start_joint: Joint,
     history: FloatArray,
     solver: JacobianSolver,
-    effort: Effort,
+    budget: Budget,
 ) -> tuple[Outcome, PathPoint | None]:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
@@ -168,7 +168,7 @@ def relax_to_periodic(
         without excitation leads to the state that builds up from rest.
     history : array (n_contact, 2)
         Tangential history at the start, m.
-    solver, effort
+    solver, budget
         As in `solve_balance`.
 
     Returns
@@ -181,22 +181,22 @@ def relax_to_periodic(
     point : PathPoint or None
         The state; its parameter is NaN.
     """
-    effort.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
+    budget.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted = start.predicted_h
     period = 2.0 * np.pi / joint.omega
     length, tried = 1.0, np.inf
     size = float(np.abs(start.displacement_h).max())
-    last = min(effort.limit, effort.iterations + CONTINUATION.transient_effort)
+    last = min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
     for _ in range(CONTINUATION.transient_steps):
-        if effort.iterations > last:
+        if budget.iterations > last:
             break
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         tolerance = max(CONTINUATION.transient_tolerance, case.settings.tolerance)
         most = CONTINUATION.near_iterations
-        result = solve_balance(balance, predicted, solver, tolerance, effort, most)
+        result = solve_balance(balance, predicted, solver, tolerance, budget, most)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
         if not result.converged or (change > CONTINUATION.largest_change and length > 1.0):
@@ -214,7 +214,7 @@ def relax_to_periodic(
         renewed = change < CONTINUATION.renewed_attempt * tried or length >= CONTINUATION.longest_transient
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
-            found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, effort)
+            found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, budget)
             if found is not None and not stable and length >= CONTINUATION.longest_transient:
                 # no step is longer, and this is where they lead
                 return Outcome.UNSTABLE, None
@@ -237,11 +237,11 @@ def _periodic(
     predicted: FloatArray,
     history: FloatArray,
     solver: JacobianSolver,
-    effort: Effort,
+    budget: Budget,
 ) -> tuple[PathPoint | None, bool]:
     """Periodic state from a motion that has relaxed, and whether it is stable."""
     balance = Balance.frozen(joint, history, wear_depth)
-    result = solve_balance(balance, predicted, solver, case.settings.tolerance, effort, CONTINUATION.near_iterations)
+    result = solve_balance(balance, predicted, solver, case.settings.tolerance, budget, CONTINUATION.near_iterations)
     if not result.converged:
         return None, False
     found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))

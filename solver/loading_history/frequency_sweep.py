@@ -18,7 +18,7 @@ from solver.loading_history.sweep import NodeSweep, SweepState
 from solver.loading_history.sweep_start import Origin, Sweep, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, move_point
+from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import Outcome
 from solver.results.history import PeriodicState
 from solver.results.state_report import periodic_state
@@ -69,7 +69,7 @@ class FrequencySweep:
         self.excitation_amplitude = excitation_amplitude
         self.sweep = sweep
         self.settings = settings
-        self.effort = Effort()
+        self.budget = Budget()
         self.origin: Origin | None = None
         self.nodes: NodeSweep | None = None
         self._counted = 0
@@ -87,13 +87,13 @@ class FrequencySweep:
     @property
     def n_iterations(self) -> int:
         """Newton iterations so far."""
-        return self.effort.iterations + (0 if self.nodes is None else self.nodes.effort.iterations)
+        return self.budget.iterations + (0 if self.nodes is None else self.nodes.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """CPU time of the thread, s, after which the state that is sought is given up."""
-        self.effort.deadline = deadline
+        self.budget.deadline = deadline
         if self.nodes is not None:
-            self.nodes.effort.deadline = deadline
+            self.nodes.budget.deadline = deadline
 
     def state_dict(self) -> FrequencySweepState:
         """What goes on from frequency to frequency, to be packed."""
@@ -103,15 +103,15 @@ class FrequencySweep:
         return {
             "origin": self.origin,
             "omega": self.nodes.path.omega,
-            "own_iterations": self.effort.iterations,
-            "sweep_iterations": max(self.nodes.effort.iterations, self._counted),
+            "own_iterations": self.budget.iterations,
+            "sweep_iterations": max(self.nodes.budget.iterations, self._counted),
             "nodes": self.nodes.saved,
         }
 
     def load_state(self, state: FrequencySweepState) -> None:
         """Go on from the state of another one."""
         self.origin = state["origin"]
-        self.effort.iterations = state["own_iterations"]
+        self.budget.iterations = state["own_iterations"]
         self._counted = state["sweep_iterations"]
         self.nodes = self._new_sweep(self.origin, state["omega"])
         self.nodes.load_state(state["nodes"])
@@ -119,7 +119,7 @@ class FrequencySweep:
     def _new_sweep(self, origin: Origin, omega: float | None) -> NodeSweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
         nodes = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
-        nodes.effort.deadline, nodes.effort.tell = self.effort.deadline, self.effort.tell
+        nodes.budget.deadline, nodes.budget.tell = self.budget.deadline, self.budget.tell
         return nodes
 
     def advance(self, frequency: float) -> Found:
@@ -129,25 +129,25 @@ class FrequencySweep:
         if self.nodes is None or self.sweep == "ramp" or other_cell or self.nodes.has_passed(omega):
             self.origin = origin
             # one that was loaded has not gone again to where it was
-            self.effort.iterations += max(0 if self.nodes is None else self.nodes.effort.iterations, self._counted)
+            self.budget.iterations += max(0 if self.nodes is None else self.nodes.budget.iterations, self._counted)
             self._counted = 0
             self.nodes = self._new_sweep(origin, omega if self.sweep == "ramp" else None)
             self._begin(self.nodes, origin)
         nodes, target = self.nodes, 1.0 if self.sweep == "ramp" else omega
         self._advance_to(nodes, target)
-        self.effort.limit = self.effort.iterations + LOADING.node_iterations
+        self.budget.limit = self.budget.iterations + LOADING.node_iterations
         try:
-            reached, coarse = nodes.state_at(target, self.effort)
+            reached, coarse = nodes.state_at(target, self.budget)
             case = nodes.case
             if reached is None:
-                self.effort.limit = self.effort.iterations + LOADING.first_iterations
+                self.budget.limit = self.budget.iterations + LOADING.first_iterations
                 case, point = self._first(omega)
                 reached = None if point is None else Step(point)
             if reached is None:
                 lost = Found(self._why_lost(nodes))
                 lost.message = self._where_lost(nodes)
                 return lost
-            refined = refine(case, omega, self.excitation_amplitude, reached.point, self.effort)
+            refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
             if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
@@ -165,13 +165,13 @@ class FrequencySweep:
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
         if coarse is not None:
-            moved = move_point(coarse_case, refined.case, joint, coarse, self.effort)
+            moved = move_point(coarse_case, refined.case, joint, coarse, self.budget)
             if moved is not None:
                 found.coarse = periodic_state(joint, moved)
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
             found.outcome, found.state, found.coarse = Outcome.CERTIFICATE_FAILED, None, None
-        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.effort):
+        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget):
             found.outcome, found.state, found.coarse = unstable.outcome, None, None
             found.message = unstable.sentence
         elif not refined.accurate:
@@ -180,7 +180,7 @@ class FrequencySweep:
 
     def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
         """A state where the sweep begins; none where there is none, or where the structure is singular there."""
-        self.effort.limit = self.effort.iterations + LOADING.first_iterations
+        self.budget.limit = self.budget.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(nodes, place):
@@ -188,7 +188,7 @@ class FrequencySweep:
 
     def _begin_at(self, nodes: NodeSweep, place: float) -> bool:
         omega, load_factor = (place, 1.0) if nodes.path.omega is None else (nodes.path.omega, place)
-        self.effort.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
+        self.budget.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
         try:
             case, point = self._first(omega, load_factor)
         except np.linalg.LinAlgError:
@@ -200,7 +200,7 @@ class FrequencySweep:
     def _advance_to(self, nodes: NodeSweep, target: float) -> None:
         """As far as the target; where the sweep ends before, it is begun anew a little behind its end."""
         # all attempts together: where a joint has no grip none of them leads on
-        self.effort.limit = self.effort.iterations + LOADING.first_iterations
+        self.budget.limit = self.budget.iterations + LOADING.first_iterations
         while True:
             try:
                 nodes.advance_to(target)
@@ -211,7 +211,7 @@ class FrequencySweep:
             behind = nodes.state.lost_at * (1.0 + LOADING.search_distance * nodes.direction)
             if (behind - target) * nodes.direction >= 0.0:
                 return
-            if self.effort.exhausted:
+            if self.budget.exhausted:
                 return
             if not self._begin_at(nodes, behind):
                 nodes.state = replace(nodes.state, lost_at=behind)
@@ -234,7 +234,7 @@ class FrequencySweep:
             case, point = self._first_at(omega, 1.0, resolution)[1:]
             refined = None
             if point is not None:
-                refined = refine(case, omega, self.excitation_amplitude, point, self.effort)
+                refined = refine(case, omega, self.excitation_amplitude, point, self.budget)
             if refined is not None and refined.accurate:
                 return refined
         return None
@@ -252,7 +252,7 @@ class FrequencySweep:
             why = outcome if attempt == 0 else why
             if outcome is Outcome.STATIC_FAILED:
                 why = outcome
-            if outcome is Outcome.STATIC_FAILED or self.effort.exhausted:
+            if outcome is Outcome.STATIC_FAILED or self.budget.exhausted:
                 break
         self.nodes.state = replace(self.nodes.state, failure=why)
         return self.nodes.case, None
@@ -265,7 +265,7 @@ class FrequencySweep:
         case = self.nodes.case.at(allowed(resolution, self.settings))
         unworn = np.zeros(self.model.contact.n_contact)
         outcome, found = solve_first_state(
-            case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), self.effort
+            case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), self.budget
         )
         return outcome, case, None if found is None else PathPoint(omega, found.evaluation, found.history)
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 from solver.accuracy.harmonic_levels import shifted
-from solver.accuracy.level import Level
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import Refined, refine
+from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, move_point
+from solver.newton.solve_balance import Budget, move_point
 from solver.settings import Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
 
-def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool, effort: Effort) -> bool:
+def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool, budget: Budget) -> bool:
     """Whether a state has about the harmonics and samples that it needs, by one linear solve at most.
 
     One Newton iteration with two levels of harmonics more and twice the samples shows the error. False where that error
@@ -28,21 +28,21 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool,
     if nothing_happens(evaluation):
         looked = Resolution(resolution.orders, max(ACCURACY.event_samples, 2 * resolution.samples))
         # what only more samples see, `refine` finds
-        return fewest and nothing_happens(_moved(case, joint, point, looked, effort, 0).point.evaluation)
+        return fewest and nothing_happens(_moved(case, joint, point, looked, budget, 0).point.evaluation)
     above = shifted(resolution, 2)
     above = allowed(Resolution(above.orders, 2 * above.samples), case.settings)
     if not case.model.holds(above.highest):
         return False
-    better = _moved(case, joint, point, above, effort, 1)
-    error = Level(case, joint, point).difference(better).times(ACCURACY.two_levels_safety).largest
+    better = _moved(case, joint, point, above, budget, 1)
+    error = ResolvedState(case, joint, point).difference(better).times(ACCURACY.two_levels_safety).largest
     settings = case.settings
     least = 0.0 if fewest else ACCURACY.spare_fraction * ACCURACY.kept_fraction * settings.rtol
     return bool(error >= least and (at_limit or error <= settings.rtol))
 
 
 def _moved(
-    case: Case, joint: Joint, point: PathPoint, resolution: Resolution, effort: Effort, iterations: int
-) -> Level:
+    case: Case, joint: Joint, point: PathPoint, resolution: Resolution, budget: Budget, iterations: int
+) -> ResolvedState:
     """A state taken to other harmonics and samples and improved by some Newton iterations."""
     other = case.at(resolution)
     other_joint = other.joint(joint.omega, joint.excitation_amplitude)
@@ -51,14 +51,14 @@ def _moved(
     for _ in range(iterations):
         step = JacobianSolver().solve(balance.linearise(at), -at.residual)
         at = balance.evaluate(at.predicted_h + step)
-        effort.iterations += 1
-    return Level(other, other_joint, replace(point, evaluation=at))
+        budget.iterations += 1
+    return ResolvedState(other, other_joint, replace(point, evaluation=at))
 
 
-def choose_resolution(case: Case, joint: Joint, point: PathPoint, effort: Effort) -> Refined:
+def choose_resolution(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> Refined:
     """A state with the harmonics and samples that a node needs, at least those that automatic settings begin with."""
     # what the sweep misses for want of harmonics shows in the difference to the reference
-    refined = refine(case, joint.omega, joint.excitation_amplitude, point, effort, ACCURACY.coarse_unknowns)
+    refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.coarse_unknowns)
     fewest = first_resolution(case.settings)
     if refined.case.resolution.highest >= fewest.highest:
         return refined
@@ -67,5 +67,5 @@ def choose_resolution(case: Case, joint: Joint, point: PathPoint, effort: Effort
         return replace(refined, case=case, point=point)
     moved = case.at(fewest)
     moved_joint = moved.joint(joint.omega, joint.excitation_amplitude)
-    level = move_point(refined.case, moved, moved_joint, refined.point, effort)
+    level = move_point(refined.case, moved, moved_joint, refined.point, budget)
     return refined if level is None else replace(refined, case=moved, point=level)

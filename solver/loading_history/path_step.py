@@ -21,7 +21,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.options import LOADING
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.stability.hill import is_stable
@@ -67,7 +67,7 @@ class LoadingPath:
         nodes: tuple[PathPoint, ...],
         target: float,
         solver: JacobianSolver,
-        effort: Effort,
+        budget: Budget,
         tolerance: float | None = None,
     ) -> PathPoint | None:
         """Stable state at a value of the parameter, by Newton's method alone; None where there is none so near.
@@ -79,7 +79,7 @@ class LoadingPath:
             The pairs have the tangential history of the last one.
         target : float
             Value of the parameter.
-        solver, effort
+        solver, budget
             As in `solve_balance`.
         tolerance : float, optional
             Of the scaled residual; that of the settings by default.
@@ -91,7 +91,7 @@ class LoadingPath:
             ratio = (target - start.parameter) / (start.parameter - nodes[0].parameter)
             begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
         limit = self.case.settings.tolerance if tolerance is None else tolerance
-        result = solve_balance(balance, begin, solver, limit, effort, CONTINUATION.near_iterations)
+        result = solve_balance(balance, begin, solver, limit, budget, CONTINUATION.near_iterations)
         if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
             return None
         return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
@@ -101,14 +101,14 @@ class LoadingPath:
         nodes: tuple[PathPoint, ...],
         target: float,
         solver: JacobianSolver,
-        effort: Effort,
+        budget: Budget,
         tolerance: float | None = None,
     ) -> Step | Outcome:
         """Stable state at a target from the last of some nodes, by `solve` or else by `step`; or why there is none."""
-        point = self.solve(nodes, target, solver, effort, tolerance)
-        return self.step(nodes[-1], target, solver, effort) if point is None else Step(point)
+        point = self.solve(nodes, target, solver, budget, tolerance)
+        return self.step(nodes[-1], target, solver, budget) if point is None else Step(point)
 
-    def step(self, start: PathPoint, target: float, solver: JacobianSolver, effort: Effort) -> Step | Outcome:
+    def step(self, start: PathPoint, target: float, solver: JacobianSolver, budget: Budget) -> Step | Outcome:
         """Stable state at a target from a state of the same harmonics and samples, or why there is none."""
         tolerance = self.case.settings.tolerance
         start = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
@@ -119,22 +119,22 @@ class LoadingPath:
             balance = self.balance_at(point.parameter, point.evaluation.history)
             return is_stable(balance.linearise(point.evaluation), solver)
 
-        while not effort.exhausted:
+        while not budget.exhausted:
             point, arrived = follow_naturally(
-                self.balance_at, start, target, solver, tolerance, effort, fine=LOADING.free_step * scale
+                self.balance_at, start, target, solver, tolerance, budget, fine=LOADING.free_step * scale
             )
             if arrived and stays(point):
                 return Step(point, tuple(folds))
             # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
             end = start if arrived else point
             span = LOADING.search_distance * scale
-            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, effort, stays, beyond=False)
+            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, stays, beyond=False)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))
             if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
                 # a shorter step leads nearer to where the branch loses its stability without a fold
                 return Outcome.UNSTABLE
-            landed = self._settled(end, target, arc.folds, solver, effort)
+            landed = self._settled(end, target, arc.folds, solver, budget)
             if isinstance(landed, Outcome):
                 return landed
             folds.extend(landed.folds)
@@ -150,14 +150,14 @@ class LoadingPath:
         return f"at {at}, {moving} of {len(point.evaluation.status_t)} pairs slip or open"
 
     def _settled(
-        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, effort: Effort
+        self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, budget: Budget
     ) -> Step | Outcome:
         """State that the structure settles to from the end of a branch, a little beyond it towards the target."""
         fine = LOADING.free_step * self.scale(end.parameter)
         beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
         joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
         unworn = np.zeros(self.case.model.contact.n_contact)
-        why, found = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, solver, effort)
+        why, found = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, solver, budget)
         if found is None:
             return why
         landed = PathPoint(beyond, found.evaluation, found.history)

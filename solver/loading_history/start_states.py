@@ -70,7 +70,7 @@ def follow_branch(
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
-    line.effort.tell = tell or line.effort.tell
+    line.budget.tell = tell or line.budget.tell
     counted = 0
     if resume is not None:
         counted, state = unpack(resume)

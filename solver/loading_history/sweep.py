@@ -29,7 +29,7 @@ from solver.loading_history.node_resolution import choose_resolution, resolution
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import LoadingPath, Step, in_rows
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, move_point
+from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import packable
 from solver.settings import Resolution
@@ -95,7 +95,7 @@ class NodeSweep:
         At the last node from which the sweep goes on as another one would that knows no more than this.
     ahead : Step or None
         The next node, where it is known.
-    effort : Effort
+    budget : Budget
         Newton iterations so far, and their limits.
     """
 
@@ -104,7 +104,7 @@ class NodeSweep:
         self.path = self.reference_path = LoadingPath(case, excitation_amplitude, omega)
         self.direction = direction
         self.solver, self.reference_solver = JacobianSolver(), JacobianSolver()
-        self.effort = Effort()
+        self.budget = Budget()
         self.state = SweepState(case.resolution, case.resolution)
         self.saved: SweepState | None = None
         self.ahead: Step | None = None
@@ -113,7 +113,7 @@ class NodeSweep:
         """Go on from what was `saved` of another sweep to the same points: the nodes follow to the last bit."""
         self.saved = self.state = state
         self._take_cases(self.case.at(state.resolution), self.case.at(state.reference_resolution))
-        self.effort.iterations = state.iterations
+        self.budget.iterations = state.iterations
         self._forget()
 
     @property
@@ -157,9 +157,9 @@ class NodeSweep:
         """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
         while self.here is not None:
             if self.ahead is None:
-                self.effort.tell(self.path.describe(self.here))
-                self.effort.limit = self.effort.iterations + LOADING.node_iterations
-                lost = self.effort.iterations > LOADING.sweep_iterations
+                self.budget.tell(self.path.describe(self.here))
+                self.budget.limit = self.budget.iterations + LOADING.node_iterations
+                lost = self.budget.iterations > LOADING.sweep_iterations
                 self.ahead = None if lost else self._look_ahead()
                 if self.ahead is None:
                     self.lose()
@@ -168,7 +168,7 @@ class NodeSweep:
                 return
             self._advance(self.ahead)
 
-    def state_at(self, parameter: float, effort: Effort) -> tuple[Step | None, PathPoint | None]:
+    def state_at(self, parameter: float, budget: Budget) -> tuple[Step | None, PathPoint | None]:
         """State at a value of the parameter up to the next node, and that of the reference sweep; None where not found.
 
         Behind a fold that the next step jumps over it is reached backwards from the next node, which has jumped.
@@ -180,18 +180,18 @@ class NodeSweep:
         beyond = [at for at in self.ahead.folds if (parameter - at) * self.direction > 0.0]
         reached: Step | Outcome = Outcome.BRANCH_LOST
         if beyond and parameter != self.ahead.point.parameter:
-            reached = self.path.reach((self.ahead.point,), parameter, solver, effort)
+            reached = self.path.reach((self.ahead.point,), parameter, solver, budget)
             if isinstance(reached, Step):
                 reached = Outcome.BRANCH_LOST if reached.folds else replace(reached, folds=tuple(beyond))
         if isinstance(reached, Outcome):
             near = () if self.ahead.folds else (self.ahead.point,)
-            reached = self.path.reach((*near, self.here), parameter, solver, effort)
+            reached = self.path.reach((*near, self.here), parameter, solver, budget)
         if isinstance(reached, Outcome):
             self.state = replace(self.state, failure=reached)
             return None, None
         if not self.state.reference:
             return reached, None
-        other = self.reference_path.reach(self.state.reference, parameter, JacobianSolver(), effort)
+        other = self.reference_path.reach(self.state.reference, parameter, JacobianSolver(), budget)
         return reached, None if isinstance(other, Outcome) else other.point
 
     def _look_ahead(self) -> Step | None:
@@ -202,11 +202,11 @@ class NodeSweep:
         shortest, free = LOADING.shortest_sweep_step * scale, LOADING.free_step * scale
         length = float(np.clip(self.state.length, shortest, LOADING.longest_sweep_step * scale))
         tolerance = self._node_tolerance()
-        while not self.effort.exhausted:
+        while not self.budget.exhausted:
             target = here.parameter + self.direction * length
             if self.path.omega is not None:
                 target = min(target, 1.0)
-            point = self.path.solve(self.state.nodes, target, self.solver, self.effort, tolerance)
+            point = self.path.solve(self.state.nodes, target, self.solver, self.budget, tolerance)
             if point is not None:
                 change = self._change(here, point)
                 if change <= 1.0 or length <= shortest:
@@ -217,7 +217,7 @@ class NodeSweep:
             elif length > free:
                 shorter = max(0.25, free / length)
             else:
-                step = self.path.step(here, target, self.solver, self.effort)
+                step = self.path.step(here, target, self.solver, self.budget)
                 if isinstance(step, Step):
                     self.state = replace(self.state, length=length)
                     return step
@@ -265,7 +265,7 @@ class NodeSweep:
         old, new = self.state.checked.evaluation, step.point.evaluation
         if max(vibration_change(old, new), vibration_change(new, old)) > ACCURACY.vibration_recheck:
             joint = self.path.joint_at(step.point.parameter)
-            if resolution_holds(self.case, joint, step.point, self.state.at_limit, self.effort):
+            if resolution_holds(self.case, joint, step.point, self.state.at_limit, self.budget):
                 self.state = replace(self.state, checked=step.point)
             else:
                 self._choose_resolution()
@@ -275,7 +275,7 @@ class NodeSweep:
     def _advance_reference(self, target: float) -> None:
         """The next node of the reference sweep; where it does not arrive, or jumps, it goes on from the sweep."""
         last = self.state.reference
-        step = self.reference_path.reach(last, target, self.reference_solver, self.effort, self._node_tolerance())
+        step = self.reference_path.reach(last, target, self.reference_solver, self.budget, self._node_tolerance())
         if isinstance(step, Outcome) or step.folds:
             self._begin_reference()
         else:
@@ -289,7 +289,7 @@ class NodeSweep:
         moved = None
         if case.resolution != self.case.resolution:
             joint = replace(self.path, case=case).joint_at(here.parameter)
-            moved = move_point(self.case, case, joint, here, self.effort)
+            moved = move_point(self.case, case, joint, here, self.budget)
         self._take_cases(self.case, self.case if moved is None else case)
         self.state = replace(self.state, reference=(moved or here,), n_nodes=0)
 
@@ -303,7 +303,7 @@ class NodeSweep:
         self.state = replace(self.state, checked=here)
         if not self.case.settings.automatic:
             return 0.0
-        refined = choose_resolution(self.case, self.path.joint_at(here.parameter), here, self.effort)
+        refined = choose_resolution(self.case, self.path.joint_at(here.parameter), here, self.budget)
         self.state = replace(self.state, at_limit=not refined.accurate)
         point = replace(refined.point, parameter=here.parameter)
         if refined.case.resolution == self.case.resolution:
@@ -322,7 +322,7 @@ class NodeSweep:
         moved = None
         if before and self.state.n_nodes > 0:
             joint = self.reference_path.joint_at(before[-1].parameter)
-            moved = move_point(old, reference, joint, before[-1], self.effort)
+            moved = move_point(old, reference, joint, before[-1], self.budget)
         if moved is None:
             self._begin_reference()
         else:
@@ -340,7 +340,7 @@ class NodeSweep:
             nodes=tuple(map(in_rows, state.nodes)),
             reference=tuple(map(in_rows, state.reference)),
             checked=None if state.checked is None else in_rows(state.checked),
-            iterations=self.effort.iterations,
+            iterations=self.budget.iterations,
         )
         self._forget()
         self.saved = self.state

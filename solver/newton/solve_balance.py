@@ -23,7 +23,7 @@ def _silent(_: str) -> None:
 
 
 @dataclass
-class Effort:
+class Budget:
     """Newton iterations of one computation, counted over all its parts.
 
     limit: iterations after which a branch is given up. deadline: CPU time of the thread, s, after which the whole
@@ -55,7 +55,7 @@ def solve_balance(
     start: FloatArray,
     solver: JacobianSolver,
     tolerance: float,
-    effort: Effort,
+    budget: Budget,
     most: int | None = None,
 ) -> NewtonResult[Evaluation]:
     """Solve Eq. (8) of one balance, with an implicit step Eq. (26), by Newton's method on the exact Jacobian, Eq. (16).
@@ -70,7 +70,7 @@ def solve_balance(
         Keeps its factorisation from one solve to the next.
     tolerance : float
         Of the scaled residual, dimensionless.
-    effort : Effort
+    budget : Budget
         Where the iterations are counted.
     most : int, optional
         Iterations, `NEWTON.iterations` by default.
@@ -78,24 +78,24 @@ def solve_balance(
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the effort.
+        Behind the deadline of the budget.
     """
 
     def direction(at: Evaluation) -> FloatArray:
-        effort.check_time()
+        budget.check_time()
         # no more products than the tolerance needs
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(at.scaled_residual(), tolerance))
         return solver.solve(balance.linearise(at), -at.residual, rtol)
 
     result = solve_newton(balance.evaluate, direction, start, tolerance, most)
-    effort.iterations += result.iterations
+    budget.iterations += result.iterations
     return result
 
 
-def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, effort: Effort) -> PathPoint | None:
+def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, budget: Budget) -> PathPoint | None:
     """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
     balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
-    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort)
+    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
     if not result.converged:
         return None
     return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))

@@ -23,7 +23,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
 from solver.newton.krylov import ritz_values
-from solver.newton.solve_balance import Effort, move_point
+from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import Outcome
 from solver.settings import Resolution, all_orders
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
@@ -65,7 +65,7 @@ class Instability:
 
 
 def find_instability(
-    case: Case, joint: Joint, at: Evaluation, effort: Effort, every: bool = True
+    case: Case, joint: Joint, at: Evaluation, budget: Budget, every: bool = True
 ) -> Instability | None:
     """Why the vibration does not stay at a state whose wear is held; None where it stays, or where that is not known.
 
@@ -77,7 +77,7 @@ def find_instability(
     ----------
     case, joint, at
         Of the state.
-    effort
+    budget
         Where Newton iterations are counted.
     every
         False leaves out joints that are not small, or that stay closed: for states between the first and the last of a
@@ -86,7 +86,7 @@ def find_instability(
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the effort.
+        Behind the deadline of the budget.
     """
     switching, stuck = switching_pairs(at)
     frequency = joint.omega / (2.0 * np.pi)
@@ -101,7 +101,7 @@ def find_instability(
     if not (every or (small and _opens_and_closes(at))):
         return None
     if small:
-        sharper = _sharper(case, joint, at, effort)
+        sharper = _sharper(case, joint, at, budget)
         if sharper is None and not _is_driven(joint):
             return None
         joint, at = sharper or (joint, at)
@@ -115,14 +115,14 @@ def find_instability(
     return _judge(second, 2.0 * error, joint)
 
 
-def _sharper(case: Case, joint: Joint, at: Evaluation, effort: Effort) -> tuple[Joint, Evaluation] | None:
+def _sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
     """The state with the harmonics that a joint that opens and closes is judged with; None where it is not found."""
     least = Resolution(all_orders(STABILITY.opening_harmonics), case.resolution.samples)
     if case.resolution.highest >= least.highest or not _opens_and_closes(at):
         return joint, at
     sharp = case.at(replace(least, samples=max(least.samples, STABILITY.opening_samples)))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
-    moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), effort)
+    moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), budget)
     return None if moved is None else (finer, moved.evaluation)
 
 

@@ -55,7 +55,7 @@ def bdf2_attempt(work: WearingJoint, state: WearState, length: float) -> Attempt
     balance = Balance(joint, state.point.history, base, work.gain(factor * length), work.wearing)
     start = work.predicted(state, balance, length)
     tolerance, most = work.case.settings.tolerance, WEAR.step_iterations
-    result = solve_balance(balance, start, work.solver, tolerance, work.effort, most)
+    result = solve_balance(balance, start, work.solver, tolerance, work.budget, most)
     if not result.converged:
         return None
     new = result.evaluation

@@ -8,7 +8,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
@@ -22,19 +22,19 @@ def is_stable_when_held(joint: Joint, evaluation: Evaluation, solver: JacobianSo
 
 
 def state_after_fold(
-    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
+    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
 ) -> PathPoint | Outcome:
     """A stable state at the depths `worn` (n_contact,), m, just beyond the end of the branch of `last`; why there is
     none. Raises OutOfTimeError.
     """
-    for landed in states_after_fold(case, joint, last, worn, solver, effort):
+    for landed in states_after_fold(case, joint, last, worn, solver, budget):
         if isinstance(landed, Outcome):
             return landed
         # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
         balance_at = held_wear(joint, landed.evaluation.wear_depth, worn)
         start = PathPoint(0.0, landed.evaluation, landed.history)
         point, arrived = follow_naturally(
-            balance_at, start, 1.0, solver, case.settings.tolerance, effort, keep_history=True
+            balance_at, start, 1.0, solver, case.settings.tolerance, budget, keep_history=True
         )
         if arrived and is_stable_when_held(joint, point.evaluation, solver):
             return PathPoint(0.0, point.evaluation, final_history(balance_at(1.0, start.history), point.evaluation))

@@ -101,7 +101,7 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
     work.at(state)
     old, case = work.case, work.case.at(resolution)
     joint = case.joint(work.omega, work.excitation_amplitude)
-    point = move_point(old, case, joint, state.point, work.effort)
+    point = move_point(old, case, joint, state.point, work.budget)
     return None if point is None else replace(state, point=point, resolution=resolution, change=None)
 
 
@@ -139,7 +139,7 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState:
     """The state with the harmonics and samples that it needs."""
     work.at(state)
     refined = refine(
-        work.case, work.omega, work.excitation_amplitude, state.point, work.effort, usual_work=work.usual_work
+        work.case, work.omega, work.excitation_amplitude, state.point, work.budget, usual_work=work.usual_work
     )
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
@@ -163,7 +163,7 @@ def _note_accuracy(state: WearState) -> WearState:
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
     """Why the vibration does not stay at a state by its multipliers; every: as in `find_instability`."""
     joint = work.at(state)
-    unstable = find_instability(work.case, joint, state.point.evaluation, work.effort, every)
+    unstable = find_instability(work.case, joint, state.point.evaluation, work.budget, every)
     return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
 
 

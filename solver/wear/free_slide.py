@@ -21,7 +21,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history, vibratio
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.results.options import RESULTS
 from solver.structure.joint import Case, Hold, Joint
 from solver.structure.options import STRUCTURE
@@ -54,7 +54,7 @@ def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
 
 
 def held_on(
-    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, effort: Effort
+    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
 ) -> tuple[Hold, PathPoint] | None:
     """The hold of a joint, and the held state at the depths `worn` (n_contact,), m, just beyond the last state.
 
@@ -66,7 +66,7 @@ def held_on(
     held = case.held(hold)
     other = held.joint(joint.omega, joint.excitation_amplitude)
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
-    found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, effort, keep_history=True)
+    found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, budget, keep_history=True)
     changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
     if (
         not arrived

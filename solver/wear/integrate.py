@@ -65,8 +65,8 @@ class Integration:
     stop: ends the integration.
     output: takes the states.
     save: called with the progress now and then.
-    bounded: whether a jump that moves many times the normal forces is refused.
     most_iterations: Newton iterations beside `step_iterations` for each step, after which the history leads nowhere.
+    bounded: whether a jump that moves many times the normal forces is refused.
     """
 
     control: Control
@@ -74,8 +74,8 @@ class Integration:
     stop: Stop
     output: DenseOutput
     save: Callable[[Progress], None]
+    most_iterations: float
     bounded: bool = True
-    most_iterations: float = WEAR.history_iterations
 
     def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
         """Check and keep the first state."""
@@ -87,18 +87,18 @@ class Integration:
 
     def run(self, work: WearingJoint, progress: Progress) -> tuple[WearState, Failure]:
         """Steps until the end: the last state and how the integration ended."""
-        state, n_steps, saved = progress.state, progress.n_steps, work.effort.iterations
+        state, n_steps, saved = progress.state, progress.n_steps, work.budget.iterations
         while (ended := self.stop(work, state, self.output)) is None:
             n_steps += 1
-            if work.effort.iterations > self.most_iterations + WEAR.step_iterations * n_steps:
+            if work.budget.iterations > self.most_iterations + WEAR.step_iterations * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
             after = guarded(partial(self._one, work, state))
             if isinstance(after, Failure):
                 return state, after
             state = after
-            if work.effort.iterations >= saved + WEAR.iterations_per_save:
+            if work.budget.iterations >= saved + WEAR.iterations_per_save:
                 # with or without anybody who keeps the progress, so that all histories go on from equal numbers
-                state, saved = in_rows(state), work.effort.iterations
+                state, saved = in_rows(state), work.budget.iterations
                 work.drop_factor()
                 self.save(Progress(state, n_steps))
         return state, ended

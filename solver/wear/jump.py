@@ -32,9 +32,9 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     worn = state.depth + beyond * work.rate(at)
     if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
         return Failure(Outcome.STEP_TOO_LONG, said)
-    work.effort.limit = work.effort.iterations + WEAR.jump_iterations
+    work.budget.limit = work.budget.iterations + WEAR.jump_iterations
     landed = _held(work, state, worn) or _on_another_branch(work, state, worn)
-    work.effort.limit = float("inf")
+    work.budget.limit = float("inf")
     if isinstance(landed, Failure):
         return landed
     return replace(landed, cycle=state.cycle + beyond, change=None, previous=None)
@@ -44,7 +44,7 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState |
     """The vibration with the mean position of the joint held; None where the joint does not slide as a whole."""
     if state.hold is not None:
         return None
-    found = held_on(work.case, work.at(state), state.point, worn, work.solver, work.effort)
+    found = held_on(work.case, work.at(state), state.point, worn, work.solver, work.budget)
     if found is None:
         return None
     hold, point = found
@@ -53,7 +53,7 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState |
 
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
     """A stable state of another branch at depths `worn` (n_contact,), m."""
-    landed = state_after_fold(work.case, work.at(state), state.point, worn, work.solver, work.effort)
+    landed = state_after_fold(work.case, work.at(state), state.point, worn, work.solver, work.budget)
     if not isinstance(landed, PathPoint):
         return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     if vibration_change(state.point.evaluation, landed.evaluation) <= WEAR.jump_change:

@@ -138,6 +138,7 @@ class Solutions:
             stop,
             DenseOutput(work.area, counts, smooth=smooth, target=asked.until),
             lambda progress: self._save(integration, work, progress, None),
+            WEAR.history_iterations,
         )
         start = self.start
         assert start.state is not None
@@ -150,7 +151,7 @@ class Solutions:
             return ended
         state = ended.state
         unstable = guarded(lambda: unstable_at_end(work, state))
-        return replace(ended, failure=unstable or ended.failure, iterations=work.effort.iterations)
+        return replace(ended, failure=unstable or ended.failure, iterations=work.budget.iterations)
 
     def reference(self, fine: Ended) -> Ended:
         """The reference solution of a history, at all counts at which the two are compared or read."""
@@ -203,30 +204,30 @@ class Solutions:
         """The joint, with what is left of the limit of time."""
         assert self.start.state is not None
         work = WearingJoint.of(self.case, self.start.state, self.asked.wear_coefficient, self.asked.law)
-        work.effort.deadline = self.began + self.case.settings.time_limit
+        work.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
     def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
         """An integration from its first state, or from where it was saved, to the count `end` (inf: open)."""
         progress: Progress | Failure
         if self.saved is not None:
-            work.effort.iterations, integration.output.taken = self.saved.iterations, self.saved.output
+            work.budget.iterations, integration.output.taken = self.saved.iterations, self.saved.output
             progress, self.saved = self.saved.progress, None
         else:
             progress = guarded(lambda: integration.begin(work, begin()))
         if isinstance(progress, Failure):
-            return Ended(None, progress, integration.output.taken, work.effort.iterations)
+            return Ended(None, progress, integration.output.taken, work.budget.iterations)
         state, failure = integration.run(work, progress)
         last, over = integration.output.last, state.cycle < end < math.inf and not work.wears(state)
         if failure.outcome is Outcome.CONVERGED and last is not None and over:
             # nothing wears any more: the state holds for all later counts
             integration.output.add(end, last.report, last.rate, 0.0)
-        return Ended(state, failure, integration.output.taken, work.effort.iterations)
+        return Ended(state, failure, integration.output.taken, work.budget.iterations)
 
     def _save(self, integration: Integration, work: WearingJoint, progress: Progress, fine: Ended | None) -> None:
         """Hand out the progress of an integration."""
         if self.keep is not None:
-            saved = Saved(progress, integration.output.taken, work.effort.iterations, fine, self.spent)
+            saved = Saved(progress, integration.output.taken, work.budget.iterations, fine, self.spent)
             self.keep(pack(saved))
 
 
@@ -246,7 +247,7 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     history = fine.start_history + 2.0 * (coarse.start_history - fine.start_history)
     balance = Balance.frozen(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
-    found = solve_balance(balance, first, work.solver, work.case.settings.tolerance, work.effort, WEAR.step_iterations)
+    found = solve_balance(balance, first, work.solver, work.case.settings.tolerance, work.budget, WEAR.step_iterations)
     if not found.converged:
         return begun
     point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))

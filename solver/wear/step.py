@@ -49,7 +49,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     whole = balance_at(1.0, base.history)
     start = work.predicted(state, whole, length)
     if start is not base.evaluation.predicted_h:
-        found = solve_balance(whole, start, work.solver, tolerance, work.effort, WEAR.step_iterations)
+        found = solve_balance(whole, start, work.solver, tolerance, work.budget, WEAR.step_iterations)
         if found.converged:
             point = PathPoint(0.0, found.evaluation, final_history(whole, found.evaluation))
             return _euler(work, state, point, length)
@@ -57,7 +57,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
     shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
     last, arrived = follow_naturally(
-        balance_at, base, 1.0, work.solver, tolerance, work.effort, keep_history=True, shortest=shortest
+        balance_at, base, 1.0, work.solver, tolerance, work.budget, keep_history=True, shortest=shortest
     )
     if not is_stable_when_held(joint, last.evaluation, work.solver):
         # where the vibration has become unstable is not known: the jump is made from the start of the step

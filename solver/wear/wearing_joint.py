@@ -14,7 +14,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.results.history import PeriodicState
 from solver.settings import Resolution
 from solver.structure.joint import Case, Hold, Joint
@@ -32,7 +32,7 @@ class WearingJoint:
     omega, excitation_amplitude: rad/s, N.
     wear_coefficient: 1/Pa.
     wearing: what of the slip work wears.
-    effort: iterations spent, and the limit of time.
+    budget: iterations spent, and the limit of time.
     solver: keeps a factorisation from one solve to the next.
     usual_work: N m, slip work against which a smaller one is judged when harmonics are chosen.
     """
@@ -42,7 +42,7 @@ class WearingJoint:
     excitation_amplitude: float
     wear_coefficient: float
     wearing: WearingWork
-    effort: Effort = field(default_factory=Effort)
+    budget: Budget = field(default_factory=Budget)
     solver: JacobianSolver = field(default_factory=JacobianSolver)
     usual_work: float = 0.0
     _joint: Joint | None = field(default=None, repr=False)

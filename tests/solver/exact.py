@@ -17,7 +17,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
@@ -103,11 +103,11 @@ class Errors:
         return self.estimate.response >= response and self.estimate.wear_rate >= wear
 
 
-def first_found(exact: ExactState, case: Case, effort: Effort) -> PathPoint:
+def first_found(exact: ExactState, case: Case, budget: Budget) -> PathPoint:
     """State at the frequency, by the sweep that the branch asks for."""
     begin = exact.omega if exact.begin is None else exact.begin
     idle = np.zeros(exact.model.contact.n_contact)
-    outcome, point = solve_first_state(case, begin, exact.amplitude, idle, JacobianSolver(), effort)
+    outcome, point = solve_first_state(case, begin, exact.amplitude, idle, JacobianSolver(), budget)
     assert outcome is Outcome.CONVERGED
     assert point is not None
     if exact.begin is None:
@@ -119,9 +119,9 @@ def first_found(exact: ExactState, case: Case, effort: Effort) -> PathPoint:
     tolerance, solver = case.settings.tolerance, JacobianSolver()
     at = PathPoint(begin, point.evaluation, point.history)
     for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
-        followed, arrived = follow_naturally(balance_at, at, float(target), solver, tolerance, effort)
+        followed, arrived = follow_naturally(balance_at, at, float(target), solver, tolerance, budget)
         arc = (
-            None if arrived else follow_arc(balance_at, followed, float(target), SWEEP_STEP, solver, tolerance, effort)
+            None if arrived else follow_arc(balance_at, followed, float(target), SWEEP_STEP, solver, tolerance, budget)
         )
         reached = followed if arc is None else arc.point
         assert reached is not None
@@ -131,10 +131,10 @@ def first_found(exact: ExactState, case: Case, effort: Effort) -> PathPoint:
 
 def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
     """Refine a state as the settings say and compare it with the exact one."""
-    effort = Effort()
+    budget = Budget()
     case = build_case(exact.model, exact.friction, exact.omega, settings)
-    point = first_found(exact, case, effort)
-    refined = refine(case, exact.omega, exact.amplitude, point, effort)
+    point = first_found(exact, case, budget)
+    refined = refine(case, exact.omega, exact.amplitude, point, budget)
     joint = refined.case.joint(exact.omega, exact.amplitude)
     evaluation = refined.point.evaluation
     found = to_complex(joint.structure.response_h(joint.to_relative(evaluation.displacement_h)))[:, 0]
@@ -148,7 +148,7 @@ def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
         accurate=refined.accurate,
         orders=refined.case.resolution.orders,
         samples=refined.case.resolution.samples,
-        iterations=effort.iterations,
+        iterations=budget.iterations,
     )
 
 

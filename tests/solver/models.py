@@ -15,7 +15,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import PeriodicState, StartState, WearHistory
@@ -187,7 +187,7 @@ def branch_states(
 
 def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArray) -> PathPoint:
     """State found from nothing, which must exist; its parameter is the share 1 of the excitation."""
-    outcome, point = solve_first_state(case, omega, amplitude, wear_depth, JacobianSolver(), Effort())
+    outcome, point = solve_first_state(case, omega, amplitude, wear_depth, JacobianSolver(), Budget())
     assert outcome is Outcome.CONVERGED
     assert point is not None
     return point

@@ -14,7 +14,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import first_point, scene
@@ -33,7 +33,7 @@ def upper_branch_size(amplitude: float) -> float:
     found = first_point(case, 0.9, amplitude, idle)
     point = PathPoint(0.9, found.evaluation, found.history)
     for omega in np.linspace(0.95, WALL_OMEGA, 6):
-        point, arrived = follow_naturally(balance_at, point, float(omega), JacobianSolver(), TOLERANCE, Effort())
+        point, arrived = follow_naturally(balance_at, point, float(omega), JacobianSolver(), TOLERANCE, Budget())
         assert arrived
     structure = case.joint(WALL_OMEGA, amplitude).structure
     response = structure.response_h(point.evaluation.displacement_h[0, :1])
@@ -49,7 +49,7 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
         return balance_at(amplitude, history)
 
     start = first(0.03)
-    result = follow_arc(watched, start, 0.06, 0.03, JacobianSolver(), TOLERANCE, Effort())
+    result = follow_arc(watched, start, 0.06, 0.03, JacobianSolver(), TOLERANCE, Budget())
     point = result.point
     assert point is not None
     assert len(result.folds) == 2
@@ -64,9 +64,9 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
 def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
     balance_at, first, _ = wall(0.9)
     start = first(0.01)
-    natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Effort())
+    natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Budget())
     assert arrived
-    result = follow_arc(balance_at, start, 0.03, 0.02, JacobianSolver(), TOLERANCE, Effort())
+    result = follow_arc(balance_at, start, 0.03, 0.02, JacobianSolver(), TOLERANCE, Budget())
     arc = result.point
     assert arc is not None
     assert result.folds == ()
@@ -77,11 +77,11 @@ def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
 
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
     balance_at, first, _ = wall(0.5)
-    effort = Effort()
-    result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, effort)
+    budget = Budget()
+    result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, budget)
     assert result.point is None
     attempts = CONTINUATION.arc_steps + CONTINUATION.arc_failures
-    assert effort.iterations <= attempts * CONTINUATION.arc_iterations
+    assert budget.iterations <= attempts * CONTINUATION.arc_iterations
 
 
 def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> None:
@@ -90,17 +90,17 @@ def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> N
     spent, farthest = [], []
     for beyond in (True, False):
         visited: list[float] = []
-        effort = Effort()
+        budget = Budget()
 
         def watched(amplitude: float, history: FloatArray, visited: list[float] = visited) -> Balance:
             visited.append(amplitude)
             return balance_at(amplitude, history)
 
         result = follow_arc(
-            watched, first(0.01), 0.03, 0.02, JacobianSolver(), TOLERANCE, effort, lambda _: False, beyond=beyond
+            watched, first(0.01), 0.03, 0.02, JacobianSolver(), TOLERANCE, budget, lambda _: False, beyond=beyond
         )
         assert result.point is None
-        spent.append(effort.iterations)
+        spent.append(budget.iterations)
         farthest.append(max(visited))
     assert farthest[1] < 0.05 < farthest[0]
     assert spent[1] < 0.5 * spent[0]

@@ -16,7 +16,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings, ToTheEnd
@@ -200,7 +200,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -
             depth = at.wear_depth.copy()
             depth[pair] += sign * step
             balance = Balance.frozen(joint, at.history, depth)
-            solved = solve_balance(balance, at.predicted_h, JacobianSolver(), 1e-13, Effort())
+            solved = solve_balance(balance, at.predicted_h, JacobianSolver(), 1e-13, Budget())
             works.append(solved.evaluation.slip_work)
         wanted = (works[0] - works[1]) / (2.0 * step)
         assert slopes[:, place] == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())

@@ -12,7 +12,7 @@ from solver.continuation.first_state import solve_first_state, solve_static_stat
 from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
@@ -44,7 +44,7 @@ def glued_force(model: ReducedModel) -> FloatArray:
 
 def static_point(model: ReducedModel, friction: float) -> PathPoint:
     case = build_case(model, friction, OMEGA, SETTINGS)
-    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), 1e-9, Effort())
+    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), 1e-9, Budget())
     assert point is not None, f"no static state at a friction coefficient of {friction}"
     return point
 
@@ -82,7 +82,7 @@ def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure()
     away = []
     for friction in (0.06, 0.08, 0.1, 5.0, 1000.0):
         case = build_case(model, friction, OMEGA, SETTINGS)
-        outcome, point = solve_first_state(case, OMEGA, 0.5, np.zeros(PAIRS), JacobianSolver(), Effort())
+        outcome, point = solve_first_state(case, OMEGA, 0.5, np.zeros(PAIRS), JacobianSolver(), Budget())
         assert outcome is Outcome.CONVERGED, f"friction {friction}"
         assert point is not None
         joint = case.joint(OMEGA, 0.5)

@@ -13,7 +13,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
@@ -136,7 +136,7 @@ def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
             continue
         if abs(exact - 1.0) > 0.05:
             seen += 1
-            assert (find_instability(case, joint, at, Effort()) is not None) == (exact > 1.0), (seed, exact)
+            assert (find_instability(case, joint, at, Budget()) is not None) == (exact > 1.0), (seed, exact)
     assert seen > 0
 
 
@@ -147,7 +147,7 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
     beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
-    unstable = find_instability(case, joint, at, Effort())
+    unstable = find_instability(case, joint, at, Budget())
     assert (unstable is not None and unstable.outcome is Outcome.PERIOD_DOUBLED) == beyond
 
 
@@ -164,7 +164,7 @@ def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
     )
     assert (at.status_t == SEPARATED).any()
     assert not (at.status_t == SEPARATED).all()
-    assert find_instability(case, joint, at, Effort()) is None
+    assert find_instability(case, joint, at, Budget()) is None
 
 
 def with_matrices(name: str, **matrices: FloatArray) -> ReducedModel:
@@ -218,7 +218,7 @@ def test_friction_bounds_a_vibration_with_little_negative_damping() -> None:
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
     assert np.abs(response) == pytest.approx([abs(orbit.harmonic(0)), abs(orbit.harmonic(1))], rel=2e-3)
     assert growing_exponents(linear, np.ones(2, bool)).size > 0
-    assert find_instability(case, joint, at, Effort()) is None
+    assert find_instability(case, joint, at, Budget()) is None
 
 
 def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
@@ -274,7 +274,7 @@ def test_it_is_not_looked_for_in_a_travelling_wave() -> None:
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
     assert (
-        find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Effort())
+        find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Budget())
         is None
     )
 

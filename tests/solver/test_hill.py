@@ -14,7 +14,7 @@ from solver.model import FloatArray
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
 from solver.structure.joint import build_case
@@ -43,7 +43,7 @@ def crossings() -> dict[float, list[PathPoint]]:
             return len(seen) == 2
 
         begin = PathPoint(1.55, at, state.start_history)
-        follow_arc(balance_at, begin, target, 0.08, JacobianSolver(), 1e-8, Effort(), collect, toward=1.0)
+        follow_arc(balance_at, begin, target, 0.08, JacobianSolver(), 1e-8, Budget(), collect, toward=1.0)
     found[1.55].insert(0, PathPoint(1.55, at, state.start_history))
     return found
 

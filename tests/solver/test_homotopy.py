@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.level import Level
+from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances, start_with_tail
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.loading_history.start_states import follow_branch
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import change_orders
@@ -52,12 +52,12 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) ->
 def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> None:
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
-    found = Level(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Effort())
+    found = ResolvedState(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Budget())
     assert found is not None
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(found.case, omega, amplitude, found.point)
     assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
-    along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Effort())
+    along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Budget())
     assert along is not None
     assert along.scaled_residual() <= case.settings.tolerance
 
@@ -74,14 +74,14 @@ def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
 @pytest.mark.slow
 def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, attempts = random_scene(THROWN_OFF), []
-    by_homotopy = Level.by_homotopy
+    by_homotopy = ResolvedState.by_homotopy
 
-    def noted(level: Level, resolution: Resolution, effort: Effort) -> Level | None:
-        found = by_homotopy(level, resolution, effort)
+    def noted(level: ResolvedState, resolution: Resolution, budget: Budget) -> ResolvedState | None:
+        found = by_homotopy(level, resolution, budget)
         attempts.append(found is not None)
         return found
 
-    monkeypatch.setattr(Level, "by_homotopy", noted)
+    monkeypatch.setattr(ResolvedState, "by_homotopy", noted)
     frequencies = np.array([scene.frequency_hz])
     states = follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings())
     assert next(states)[1].outcome is Outcome.CONVERGED

@@ -12,7 +12,7 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
@@ -47,7 +47,7 @@ def wall(omega: float, n_harmonics: int = 5) -> tuple[BalanceAt, Callable[[float
 def test_a_natural_step_reaches_its_target_from_either_side() -> None:
     balance_at, first, size = wall(0.5)
     for start, target in ((0.01, 0.06), (0.06, 0.01)):
-        point, arrived = follow_naturally(balance_at, first(start), target, JacobianSolver(), TOLERANCE, Effort())
+        point, arrived = follow_naturally(balance_at, first(start), target, JacobianSolver(), TOLERANCE, Budget())
         assert arrived
         assert point.parameter == target
         assert point.evaluation.scaled_residual() <= TOLERANCE
@@ -57,16 +57,16 @@ def test_a_natural_step_reaches_its_target_from_either_side() -> None:
 
 def test_a_target_that_is_the_start_takes_no_iteration() -> None:
     balance_at, first, _ = wall(0.5)
-    start, effort = first(0.01), Effort()
-    point, arrived = follow_naturally(balance_at, start, 0.01, JacobianSolver(), TOLERANCE, effort)
+    start, budget = first(0.01), Budget()
+    point, arrived = follow_naturally(balance_at, start, 0.01, JacobianSolver(), TOLERANCE, budget)
     assert arrived
     assert point is start
-    assert effort.iterations == 0
+    assert budget.iterations == 0
 
 
 def test_natural_steps_end_before_a_fold_and_say_so() -> None:
     balance_at, first, size = wall(WALL_OMEGA)
-    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Effort())
+    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Budget())
     assert not arrived
     # the branch without impacts ends where the mass reaches the wall; 1/64 of the range is the shortest step
     assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
@@ -88,7 +88,7 @@ def test_history_is_handed_on_or_kept() -> None:
     assert start.history.any()
     for keep in (True, False):
         point, arrived = follow_naturally(
-            balance_at, start, 80.0, JacobianSolver(), TOLERANCE, Effort(), keep_history=keep
+            balance_at, start, 80.0, JacobianSolver(), TOLERANCE, Budget(), keep_history=keep
         )
         assert arrived
         if keep:
@@ -122,8 +122,8 @@ def test_the_history_of_a_mass_on_a_slider_is_its_mean_position() -> None:
 def test_iterations_are_counted() -> None:
     balance_at, first, _ = wall(0.9)
     start = first(0.01)
-    effort = Effort()
+    budget = Budget()
     balance = balance_at(0.011, start.history)
-    result = solve_balance(balance, start.evaluation.predicted_h, JacobianSolver(), TOLERANCE, effort)
+    result = solve_balance(balance, start.evaluation.predicted_h, JacobianSolver(), TOLERANCE, budget)
     assert result.converged
-    assert effort.iterations == result.iterations > 0
+    assert budget.iterations == result.iterations > 0

@@ -22,7 +22,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
@@ -47,7 +47,7 @@ def found(seed: int) -> tuple[RandomScene, Joint, PathPoint] | None:
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(scene.model, scene.friction, omega, SETTINGS)
     unworn = np.zeros(scene.model.contact.n_contact)
-    outcome, point = solve_first_state(case, omega, scene.amplitude, unworn, JacobianSolver(), Effort())
+    outcome, point = solve_first_state(case, omega, scene.amplitude, unworn, JacobianSolver(), Budget())
     if point is None:
         return None
     assert outcome is Outcome.CONVERGED

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.level import Level
+from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.ratcheting import ratcheting_work, ratchets, shake_down
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
@@ -33,12 +33,12 @@ def ratcheting(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathP
     """The first state that is refined at the frequency of the scene, before its masses shake down."""
     seen: list[tuple[Joint, PathPoint]] = []
 
-    def note(level: Level, _: Effort) -> Level:
+    def note(level: ResolvedState, _: Budget) -> ResolvedState:
         seen.append((level.joint, level.point))
         return level
 
     with monkeypatch.context() as patched:
-        patched.setattr(Level, "at_rest", note)
+        patched.setattr(ResolvedState, "at_rest", note)
         started(seed)
     omega = 2 * np.pi * random_scene(seed).frequency_hz
     return next((joint, point) for joint, point in seen if joint.omega == omega)
@@ -49,7 +49,7 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.Mon
     joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
     assert ratcheting_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
     assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
-    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Effort())
+    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Budget())
     assert shaken.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
     assert shaken.evaluation.scaled_residual() <= TOLERANCE
     assert certify(joint, shaken.evaluation).holds(TOLERANCE)
@@ -58,11 +58,11 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.Mon
 @pytest.mark.slow
 def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     joint, point = ratcheting(SLIDING_ON, monkeypatch)
-    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Effort())
+    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Budget())
     assert not ratchets(joint, shaken.evaluation, 1e-3)
     assert shaken.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
     # the next state starts from where this one stays
-    again = shake_down(joint, shaken, 1e-3, TOLERANCE, Effort())
+    again = shake_down(joint, shaken, 1e-3, TOLERANCE, Budget())
     assert again is shaken
     middle = shaken.evaluation.displacement_h[:, 1:, 0] - shaken.evaluation.history
     moved = np.abs(shaken.evaluation.displacement_h[:, 1:, 1:]).max()
@@ -76,7 +76,7 @@ def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pyte
     if seed != SHAKEN_DOWN:
         # without shakedown it tries all harmonics in vain, for minutes
         return
-    monkeypatch.setattr(Level, "at_rest", lambda level, _: level)
+    monkeypatch.setattr(ResolvedState, "at_rest", lambda level, _: level)
     assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
 
 

@@ -19,7 +19,7 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution, SolverSettings, all_orders, first_resolution, samples_for
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, build_case
@@ -50,7 +50,7 @@ def solved_at(case: Case, omega: float, amplitude: float, point: PathPoint, reso
     """The same state with other harmonics and samples, which must be found."""
     other = case.at(resolution)
     balance, start = transfer(other, other.joint(omega, amplitude), point.evaluation, case.resolution.orders)
-    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, Effort(), 60)
+    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, Budget(), 60)
     assert result.converged
     return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
 
@@ -86,7 +86,7 @@ def test_settings_fix_what_they_name() -> None:
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> None:
     case, point = slider(SolverSettings())
     assert case.resolution.orders == (1, 2, 3)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     orders = refined.case.resolution.orders
     assert len(orders) > 1
     assert all(order % 2 for order in orders)
@@ -106,7 +106,7 @@ def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> 
 
 def test_a_state_with_even_harmonics_keeps_them() -> None:
     case, point = started(random_model(2), FRICTION, OMEGA, SLIPPING, SolverSettings())
-    refined = refine(case, OMEGA, SLIPPING, point, Effort())
+    refined = refine(case, OMEGA, SLIPPING, point, Budget())
     orders = refined.case.resolution.orders
     assert orders == all_orders(orders[-1])
     assert 2 in orders
@@ -119,7 +119,7 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
     # the second solve starts from where the first one slipped to: everything sticks
     again = solved_at(case, OMEGA, amplitude, PathPoint(1.0, point.evaluation, point.history), case.resolution)
     assert (again.evaluation.status_t == STICK).all()
-    refined = refine(case, OMEGA, amplitude, again, Effort())
+    refined = refine(case, OMEGA, amplitude, again, Budget())
     assert refined.case.resolution == Resolution((1,), case.resolution.samples)
     assert refined.estimate == Estimate(0.0, 0.0)
     assert refined.accurate
@@ -132,14 +132,14 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
 def test_a_stuck_state_of_fixed_harmonics_keeps_them() -> None:
     case, point = slider(SolverSettings(harmonics=5), force=2.0)
     assert (point.evaluation.status_t == STICK).all()
-    refined = refine(case, SLIDER_OMEGA, 2.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 2.0, point, Budget())
     assert refined.case is case
     assert refined.estimate == Estimate(0.0, 0.0)
 
 
 def test_fixed_settings_return_only_an_estimate() -> None:
     case, point = slider(SolverSettings(3, 64))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     assert refined.case is case
     assert refined.point is point
     assert refined.accurate
@@ -150,7 +150,7 @@ def test_fixed_settings_return_only_an_estimate() -> None:
 @pytest.mark.parametrize("settings", [SolverSettings(harmonics=9, rtol=1e-3), SolverSettings(samples=256, rtol=1e-3)])
 def test_what_the_settings_fix_is_not_changed(settings: SolverSettings) -> None:
     case, point = slider(settings)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     if settings.harmonics != "auto":
         assert refined.case.resolution.orders == all_orders(9)
         assert refined.case.resolution.samples >= case.resolution.samples
@@ -162,7 +162,7 @@ def test_what_the_settings_fix_is_not_changed(settings: SolverSettings) -> None:
 
 def test_three_harmonics_that_do_not_suffice_are_not_called_accurate() -> None:
     case, point = slider(SolverSettings(harmonics=1, rtol=1e-3))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     assert refined.case.resolution.orders == (1,)
     assert not refined.accurate
     assert refined.estimate.response > 1e-3
@@ -174,7 +174,7 @@ def test_a_state_that_is_not_allowed_what_it_needs_says_so(
 ) -> None:
     case, point = slider(SolverSettings(rtol=1e-4))
     monkeypatch.setattr(refinement, "ACCURACY", replace(ACCURACY, **{name: most}))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     assert not refined.accurate
     assert refined.estimate.largest > 1e-4
     assert refined.point.evaluation.scaled_residual() <= 1e-8
@@ -190,7 +190,7 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:
     model = scene("sdof_slider", normal_stiffness=0.0)
     settings, rich = SolverSettings(rtol=0.05), Resolution((1, 3, 5, 7, 9), 256)
     case, point = started(model, 0.5, SLIDER_OMEGA, 10.0, settings, rich)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Effort())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
     assert refined.accurate
     assert refined.case.resolution == Resolution((1, 3), 64)
     exact = response(case, SLIDER_OMEGA, 10.0, point)
@@ -204,10 +204,10 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:
 
 def test_the_point_keeps_its_parameter_and_the_iterations_are_counted() -> None:
     case, point = slider(SolverSettings(rtol=1e-3))
-    effort = Effort()
-    refined = refine(case, SLIDER_OMEGA, 10.0, PathPoint(42.0, point.evaluation, point.history), effort)
+    budget = Budget()
+    refined = refine(case, SLIDER_OMEGA, 10.0, PathPoint(42.0, point.evaluation, point.history), budget)
     assert refined.point.parameter == 42.0
-    assert effort.iterations > 0
+    assert budget.iterations > 0
 
 
 # ----------------------------------------------------------------------------------------------------------- estimates
@@ -241,7 +241,7 @@ def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: floa
     case, point = started(random_model(4, KINDS), FRICTION, OMEGA, amplitude, SolverSettings(rtol=rtol))
     assert SLIP in point.evaluation.status_t
     assert not case.penalty.inertial.any()
-    refined = refine(case, OMEGA, amplitude, point, Effort())
+    refined = refine(case, OMEGA, amplitude, point, Budget())
     assert refined.accurate
     assert fine > refined.case.resolution.highest
     error = true_error(refined, amplitude, Resolution(all_orders(fine), 4096))
@@ -256,6 +256,6 @@ def test_a_state_of_odd_harmonics_takes_even_ones_again_where_its_forces_have_th
     odd = case.at(Resolution((1, 3, 5, 7, 9), 128))
     point = solved_at(case, OMEGA, SLIPPING, whole, odd.resolution)
     assert certify(odd.joint(OMEGA, SLIPPING), point.evaluation).cone_violation > 0.01
-    refined = refine(odd, OMEGA, SLIPPING, point, Effort())
+    refined = refine(odd, OMEGA, SLIPPING, point, Budget())
     assert 2 in refined.case.resolution.orders
     assert certify(refined.case.joint(OMEGA, SLIPPING), refined.point.evaluation).holds(settings.tolerance)

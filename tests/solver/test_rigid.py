@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from solver.accuracy.harmonic_levels import reach, reaches
-from solver.accuracy.level import Level
+from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
 from solver.model import ReducedModel
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import Resolution, SolverSettings
@@ -131,11 +131,11 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, 
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))
     case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
     point = first_point(case, omega, force, np.zeros(1))
-    other = Level(case, case.joint(omega, force), point).solve_at(poor, Effort())
+    other = ResolvedState(case, case.joint(omega, force), point).solve_at(poor, Budget())
     assert other is not None
     assert case.penalty.inertial[0] != other.case.penalty.inertial[0]
     # both are within their errors of the exact motion
-    level = Level(case, case.joint(omega, force), point)
+    level = ResolvedState(case, case.joint(omega, force), point)
     for each in (level, other):
         assert abs(each.response()[0] / exact("stiff spring", force, omega)[0] - 1.0) < 0.02
 

@@ -14,7 +14,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray, ReducedModel
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.results.history import PeriodicState
 from solver.results.state_report import largest_distance, periodic_state, report_state
 from solver.settings import SolverSettings, all_orders
@@ -47,7 +47,7 @@ def periodic(kinds: str, seed: int) -> tuple[Joint, PathPoint, PeriodicState]:
 
 
 def static_point(case: Case, wear_depth: FloatArray, tolerance: float = 1e-10) -> PathPoint:
-    point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, tolerance, Effort())
+    point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, tolerance, Budget())
     assert point is not None
     return point
 

@@ -10,7 +10,7 @@ import pytest
 
 from solver.continuation.first_state import solve_static_state
 from solver.model import FloatArray
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import Scheme, SolverSettings
@@ -40,7 +40,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
     depth = 2e-7 * np.random.default_rng(1).uniform(size=16)
     states = []
     for worn in (np.zeros(16), depth):
-        point = solve_static_state(joint, worn, 1e-10, Effort())
+        point = solve_static_state(joint, worn, 1e-10, Budget())
         assert point is not None
         states.append(point.evaluation)
     before, after = (state.force_h[:, 0, 0] for state in states)
@@ -52,7 +52,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
 def test_wear_that_does_not_act_back_moves_nothing() -> None:
     model = random_model(2, ("constant_load", "constant_load"))
     joint = build_case(model, 0.3, OMEGA, SETTINGS).joint(OMEGA, 0.0)
-    point = solve_static_state(joint, np.zeros(2), 1e-10, Effort())
+    point = solve_static_state(joint, np.zeros(2), 1e-10, Budget())
     assert point is not None
     assert moved_fraction(joint, point.evaluation, np.ones(2)) == 0.0
 
@@ -60,7 +60,7 @@ def test_wear_that_does_not_act_back_moves_nothing() -> None:
 def test_the_reason_names_the_step_and_one_that_would_do() -> None:
     case = build_case(dovetail(), FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS)
     joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
-    point = solve_static_state(joint, np.zeros(16), 1e-10, Effort())
+    point = solve_static_state(joint, np.zeros(16), 1e-10, Budget())
     assert point is not None
     one = np.zeros(16)
     one[0] = 1e-9
@@ -116,7 +116,7 @@ def test_an_open_pair_carries_nothing_and_holds_nothing() -> None:
     gap[:2] = 1e-3
     loose = replace(model, contact=replace(model.contact, gap=gap))
     joint = build_case(loose, FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS).joint(2.0 * np.pi * FREQUENCY, 0.0)
-    point = solve_static_state(joint, np.zeros(16), 1e-10, Effort())
+    point = solve_static_state(joint, np.zeros(16), 1e-10, Budget())
     assert point is not None
     assert point.evaluation.force_h[:2, 0, 0].max() == 0.0
     worn = np.zeros(16)

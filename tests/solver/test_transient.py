@@ -17,7 +17,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.sweep_start import find_origin
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
@@ -36,16 +36,16 @@ def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: flo
     case = build_case(model, friction, omega, settings)
     idle = np.zeros(model.contact.n_contact)
     quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, idle, settings.tolerance, Effort())
+    static = solve_static_state(quiet, idle, settings.tolerance, Budget())
     assert static is not None
     still = Balance.frozen(quiet, static.history, idle)
     at = static.evaluation
     orders = case.resolution.orders
     start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
-    rest = solve_balance(still, start, JacobianSolver(), settings.tolerance, Effort())
+    rest = solve_balance(still, start, JacobianSolver(), settings.tolerance, Budget())
     assert rest.converged
     joint = case.joint(omega, amplitude)
-    _, point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, JacobianSolver(), Effort())
+    _, point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, JacobianSolver(), Budget())
     assert point is not None
     assert point.evaluation.scaled_residual() <= settings.tolerance
     return np.abs(full_motion(model, periodic_state(joint, point)).displacement[1])
@@ -85,14 +85,14 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
     case = build_case(scene("vibro_impact"), 0.0, omega, settings)
     before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
     start = upper_state(case, 1.55)
-    effort = Effort()
+    budget = Budget()
     _, found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, before, start.history, JacobianSolver(), effort
+        case, joint, np.zeros(1), start.evaluation, before, start.history, JacobianSolver(), budget
     )
     assert found is not None
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
-    assert effort.iterations < 500
+    assert budget.iterations < 500
 
 
 def test_before_the_fold_the_mass_stays_where_it_is() -> None:
@@ -102,7 +102,7 @@ def test_before_the_fold_the_mass_stays_where_it_is() -> None:
     case = build_case(scene("vibro_impact"), 0.0, penalty, settings)
     start, joint = upper_state(case, 1.4), case.joint(1.4, FORCE)
     _, found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), Effort()
+        case, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), Budget()
     )
     assert found is not None
     size = np.abs(start.evaluation.displacement_h).max()
@@ -147,7 +147,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
         predicted = np.zeros((1, 5))
         for _ in range(steps):
             balance = Balance.frozen(transient.step(motion, inverse), history, idle)
-            result = solve_balance(balance, predicted, JacobianSolver(), 1e-10, Effort())
+            result = solve_balance(balance, predicted, JacobianSolver(), 1e-10, Budget())
             assert result.converged
             predicted = result.evaluation.predicted_h
             motion = transient.after(result.evaluation, motion, inverse)
@@ -162,13 +162,13 @@ def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> N
     case = build_case(scene("vibro_impact"), 0.0, 1.2, SolverSettings(5, 64))
     start, joint = upper_state(case, 1.2), case.joint(1.2, FORCE)
     unreachable = replace(case, settings=replace(case.settings, tolerance=0.0))
-    effort = Effort()
+    budget = Budget()
     _, found = relax_to_periodic(
-        unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), effort
+        unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), budget
     )
     assert found is None
     most = CONTINUATION.near_iterations + CONTINUATION.near_iterations
-    assert effort.iterations < CONTINUATION.transient_steps * most
+    assert budget.iterations < CONTINUATION.transient_steps * most
 
 
 def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,11 +180,11 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch:
     outcomes = []
     for most in (CONTINUATION.transient_effort, 10):
         monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, transient_effort=most))
-        effort = Effort()
+        budget = Budget()
         outcome, _ = relax_to_periodic(
-            case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), effort
+            case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), budget
         )
         outcomes.append(outcome)
         # one step and one search for the periodic state may be under way
-        assert effort.iterations <= most + CONTINUATION.near_iterations + CONTINUATION.near_iterations
+        assert budget.iterations <= most + CONTINUATION.near_iterations + CONTINUATION.near_iterations
     assert outcomes == [Outcome.CONVERGED, Outcome.UNSETTLED]

@@ -12,7 +12,7 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort
+from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings
@@ -47,7 +47,7 @@ def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
     """A state in which pairs slip, a little below the resonance."""
     omega = 2.0 * np.pi * (RESONANCE[nodal_diameter] - 0.3)
     case = build_case(dovetail(3, nodal_diameter), FRICTION, omega, SETTINGS)
-    outcome, point = solve_first_state(case, omega, 0.5, np.zeros(16), JacobianSolver(), Effort())
+    outcome, point = solve_first_state(case, omega, 0.5, np.zeros(16), JacobianSolver(), Budget())
     assert outcome is Outcome.CONVERGED
     assert point is not None
     assert point.evaluation.slip_work.sum() > 1e-9
@@ -104,11 +104,11 @@ def test_the_structure_settles_to_the_state_that_the_balance_has(nodal_diameter:
     case, point = state(nodal_diameter)
     omega = point.parameter
     joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
-    outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Effort())
+    outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Budget())
     assert outcome is Outcome.CONVERGED
     assert rest is not None
     outcome, settled = relax_to_periodic(
-        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Effort()
+        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Budget()
     )
     assert outcome is Outcome.CONVERGED
     assert settled is not None

@@ -114,7 +114,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
         balance = Balance.frozen(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
-        found = solve_balance(balance, start, work.solver, tolerance, work.effort)
+        found = solve_balance(balance, start, work.solver, tolerance, work.budget)
         point = PathPoint(0.0, found.evaluation, last.history)
         if not found.converged:
             before = last.evaluation.wear_depth
@@ -125,7 +125,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
                 1.0,
                 work.solver,
                 tolerance,
-                work.effort,
+                work.budget,
                 keep_history=True,
             )
             if not arrived:
@@ -134,7 +134,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             continue
         if (point.evaluation.status_t[off] == SEPARATED).all():
             finer = WEAR.off_tolerance * tolerance
-            exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.effort)
+            exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
         margin *= 10.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")

@@ -68,7 +68,7 @@ def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float)
     largest = np.zeros(before.size)
     for place in range(WEAR.tested_states + 1):
         fraction = place / WEAR.tested_states
-        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, work.effort)
+        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, work.budget)
         if not arrived:
             return f"the vibration does not go on to {100 * fraction:.0f} % of the final depths"
         at = point.evaluation

@@ -94,7 +94,7 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     assert isinstance(asked.cycles, ToTheEnd)
     began, share = computing_time(), asked.cycles.final_share
     work = WearingJoint.of(case, start.state, asked.wear_coefficient, asked.law)
-    work.effort.deadline = began + case.settings.time_limit
+    work.budget.deadline = began + case.settings.time_limit
     estimate = Estimate(start.response_error, start.wear_rate_error)
     state = work.begin(start.state, start.resolution, estimate, accurate=start.outcome is Outcome.CONVERGED)
     found = _solved(work, state, FullCheck(asked.loops), share)
@@ -104,7 +104,7 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     history = _assembled(work, start, asked, found, error)
     spent = replace(
         history,
-        newton_iterations=start.newton_iterations + work.effort.iterations,
+        newton_iterations=start.newton_iterations + work.budget.iterations,
         run_time=start.run_time + computing_time() - began,
     )
     return spent, found.reason

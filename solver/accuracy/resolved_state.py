@@ -23,14 +23,14 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Effort, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
 
 @dataclass(frozen=True)
-class Level:
+class ResolvedState:
     """A state with the case that it was solved in.
 
     usual_work: N m, slip work against which that of the state is judged where it is less; 0 where it counts by itself.
@@ -41,9 +41,9 @@ class Level:
     point: PathPoint
     usual_work: float = 0.0
 
-    def solve_at(self, resolution: Resolution, effort: Effort) -> Level | None:
+    def solve_at(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
         """The same state with other harmonics and samples; None where it is not found."""
-        return self._transferred(self.case, self.point.evaluation, resolution, effort)
+        return self._transferred(self.case, self.point.evaluation, resolution, budget)
 
     def unknowns(self, resolution: Resolution) -> int:
         """Unknowns of the balance with other harmonics."""
@@ -53,7 +53,7 @@ class Level:
         """Whether the scene holds so many harmonics and their balance has at most so many unknowns."""
         return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
-    def by_homotopy(self, resolution: Resolution, effort: Effort) -> Level | None:
+    def by_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
         """The same state with more harmonics, these raised from nothing; None where that homotopy ends."""
         if 2 * resolution.highest < self.case.resolution.samples:
             case = self.case.at(resolution)
@@ -62,39 +62,43 @@ class Level:
                 case,
                 joint,
                 *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders, self.case.penalty.inertial),
-                effort,
+                budget,
             )
             if level is not None:
                 return level
-        led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, effort)
+        led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, budget)
         if led is None:
             return None
-        return self._transferred(replace(self.case, resolution=resolution), led, resolution, effort)
+        return self._transferred(replace(self.case, resolution=resolution), led, resolution, budget)
 
-    def _transferred(self, old: Case, evaluation: Evaluation, resolution: Resolution, effort: Effort) -> Level | None:
+    def _transferred(
+        self, old: Case, evaluation: Evaluation, resolution: Resolution, budget: Budget
+    ) -> ResolvedState | None:
         """State found from one with other harmonics or with the penalty of another case."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
         return self._solved(
-            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), effort
+            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), budget
         )
 
-    def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, effort: Effort) -> Level | None:
+    def _solved(
+        self, case: Case, joint: Joint, balance: Balance, start: FloatArray, budget: Budget
+    ) -> ResolvedState | None:
         most = ACCURACY.level_iterations
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, effort, most)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget, most)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
         # the mean position of a mass depends a little on the harmonics
-        return replace(self, case=case, joint=joint, point=point).at_rest(effort)
+        return replace(self, case=case, joint=joint, point=point).at_rest(budget)
 
-    def at_rest(self, effort: Effort) -> Level:
+    def at_rest(self, budget: Budget) -> ResolvedState:
         """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
         settings = self.case.settings
         fraction = ACCURACY.creep_fraction * settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
-        rested = shake_down(self.joint, self.point, fraction, settings.tolerance, effort)
+        rested = shake_down(self.joint, self.point, fraction, settings.tolerance, budget)
         return replace(self, point=rested)
 
     def least_work(self) -> float:
@@ -104,36 +108,36 @@ class Level:
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
-    def without_even(self, effort: Effort) -> Level | None:
+    def without_even(self, budget: Budget) -> ResolvedState | None:
         """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
         if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
             return None
-        return self.solve_at(Resolution(odd, self.case.resolution.samples), effort)
+        return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
 
-    def with_even(self, effort: Effort) -> Level | None:
+    def with_even(self, budget: Budget) -> ResolvedState | None:
         """The same state with all harmonics up to its highest, where it has odd ones alone and needs the others."""
         resolution = self.case.resolution
         if resolution.highest == 1 or not lacks_even(resolution.orders, self.point.evaluation):
             return None
-        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), effort)
+        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), budget)
 
-    def missed_event(self, effort: Effort) -> Level | None:
+    def missed_event(self, budget: Budget) -> ResolvedState | None:
         """The same state with as many samples as it takes to see a pair slip or open, or the contact be made, between
         the samples; None where nothing does. Harmonics without an event in between are exact: one look is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), effort)
+        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), budget)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
-            level = self.solve_at(Resolution(orders, samples), effort)
+            level = self.solve_at(Resolution(orders, samples), budget)
             if level is not None and not nothing_happens(level.point.evaluation):
                 return level
         return finest
 
-    def samples_error(self, effort: Effort) -> tuple[Estimate, Level | None]:
+    def samples_error(self, budget: Budget) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error for want of samples, and the state with more of them that it comes from.
 
         The error depends on where between two samples an event (slip, stick, lift) falls. The sample next to an event
@@ -144,14 +148,16 @@ class Level:
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
-        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), effort)
+        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.double_samples_safety
             return self.difference(finer).times(safety), finer
-        coarser = self.solve_at(Resolution(orders, samples // 2), effort) if samples // 2 > 2 * orders[-1] else None
+        coarser = self.solve_at(Resolution(orders, samples // 2), budget) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
-    def harmonics_error(self, effort: Effort, known: Level | None = None) -> tuple[Estimate, Level | None]:
+    def harmonics_error(
+        self, budget: Budget, known: ResolvedState | None = None
+    ) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error for want of harmonics, and the state with more of them that it comes from.
 
         It is the difference to the state two levels up; where that is not found, takes too many unknowns, or the scene
@@ -183,9 +189,9 @@ class Level:
             affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
-                level = level or self.solve_at(other, effort)
+                level = level or self.solve_at(other, budget)
                 if level is None and 2 < levels <= reaching:
-                    level = self.level_by_level(levels, effort)
+                    level = self.level_by_level(levels, budget)
                 if level is not None:
                     richer = level if levels > 0 else None
                     if levels < seeing and seeing > 2:
@@ -199,14 +205,14 @@ class Level:
         own = self.case.resolution
         return own.orders == resolution.orders and own.samples >= resolution.samples
 
-    def level_by_level(self, levels: int, effort: Effort) -> Level | None:
+    def level_by_level(self, levels: int, budget: Budget) -> ResolvedState | None:
         """The same state so many levels up, where it is not found at once; None where one of them fails."""
-        level: Level | None = self
+        level: ResolvedState | None = self
         for _ in range(levels):
-            level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), effort)
+            level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), budget)
         return level
 
-    def relaxed(self, estimate: Estimate, effort: Effort) -> tuple[Level, Estimate]:
+    def relaxed(self, estimate: Estimate, budget: Budget) -> tuple[ResolvedState, Estimate]:
         """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.
 
         A fraction of rtol is kept, so that the next state does not go up again at once.
@@ -214,7 +220,7 @@ class Level:
         here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
         while estimate.largest <= ACCURACY.spare_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
-            level = here.solve_at(lower, effort) if lower != here.case.resolution else None
+            level = here.solve_at(lower, budget) if lower != here.case.resolution else None
             if level is None:
                 break
             larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate
@@ -245,7 +251,7 @@ class Level:
         """Whether the certificate of the state holds."""
         return certify(self.joint, self.point.evaluation).holds(self.case.settings.tolerance)
 
-    def difference(self, better: Level) -> Estimate:
+    def difference(self, better: ResolvedState) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
         least = better.least_response()
