@@ -79,8 +79,8 @@ def history_error(
     difference = ACCURACY.history_safety * np.abs(depth - reference["wear_depth"])
     error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
     # a later state that happens to be alike does not make the start better known
-    at_start = max(_start_error(fine, reference, area), float(np.nan_to_num(fine["wear_rate_error"][0], posinf=0.0)))
-    error = np.fmax(error, at_start * volume)
+    at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
+    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume)
     # errors of Euler steps have one sign, and grow
     error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.history_safety) * fine["local"])
     reached = np.isfinite(volume)
@@ -93,28 +93,36 @@ def history_error(
     with np.errstate(invalid="ignore"):
         of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
-    return HistoryError(relative, of_pairs, _response_error(fine, reference), _rate_error(fine, reference))
+    # the errors of a start state come from states with more harmonics
+    unworn = (counts == 0.0) | (volume <= 0.0)
+    response, rate = (
+        np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], apart)))
+        for name, apart in (
+            ("response_error", _response_change(fine, reference)),
+            ("wear_rate_error", _rate_change(fine, reference)),
+        )
+    )
+    return HistoryError(relative, of_pairs, response, rate)
 
 
 def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> float:
-    """Relative difference of the wear rates of both start states, pair by pair."""
+    """Relative difference of the wear rates of both start states, pair by pair; 0 where nothing wears."""
     rate, other = fine["depth_rate"][0] * area, reference["depth_rate"][0] * area
     whole = float(rate.sum())
     return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
 
 
-def _response_error(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
-    """Relative difference (n_output,) of the responses, of first harmonic or peak, at least that of the harmonics."""
-    found = fine["response_error"]
+def _response_change(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
+    """Relative difference (n_output,) of the responses, the larger one of first harmonic and peak."""
+    found = np.zeros(len(fine["response"]))
     for name in ("response", "response_peak"):
         size = np.linalg.norm(fine[name], axis=1)
         apart = np.linalg.norm(fine[name] - reference[name], axis=1)
         found = np.fmax(found, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
-    return np.asarray(found)
+    return found
 
 
-def _rate_error(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
-    """Relative difference (n_output,) of the wear rates, at least that of the harmonics."""
+def _rate_change(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
+    """Relative difference (n_output,) of the wear rates."""
     rate, other = fine["wear_rate"], reference["wear_rate"]
-    apart = np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0)
-    return np.asarray(np.fmax(fine["wear_rate_error"], apart))
+    return np.asarray(np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0))

@@ -62,7 +62,9 @@ def integrate_wear(
             _without_state(model, failed, asked), newton_iterations=start.newton_iterations + fine.iterations
         )
     reference = None
-    if fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
+    # of a joint that takes no step the errors of its start state are known
+    stepped = len(fine.output.course.ends) > 1
+    if stepped and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
         reference = solutions.reference(fine)
         if reference.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
             fine = replace(fine, failure=reference.failure)

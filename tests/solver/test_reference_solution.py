@@ -201,7 +201,7 @@ def read(depth: Any, rate: Any = ((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other: 
         "response": np.ones((3, 1), complex),
         "response_peak": np.ones((3, 1)),
         "response_error": np.full(3, 1e-3),
-        "wear_rate_error": np.full(3, np.nan),
+        "wear_rate_error": np.zeros(3),
     }
     return {name: np.array(value) for name, value in (values | other).items()}
 
@@ -235,7 +235,8 @@ def test_a_volume_is_known_no_better_than_the_wear_rates_of_the_start_state() ->
     found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "adaptive")
     # pair by pair, though later states are the same
     assert (found.worn_volume[1:] >= 0.5 / 3.0).all()
-    assert found.wear_rate == pytest.approx([0.1 / 3.0, 0.0, 0.0])
+    # the state itself is known by states with more harmonics
+    assert found.wear_rate == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_what_nothing_confirms_is_not_known() -> None:
@@ -243,6 +244,7 @@ def test_what_nothing_confirms_is_not_known() -> None:
     found = history_error(COUNTS, read(DEPTH), lost, NOWHERE, AREA, "explicit")
     assert found.worn_volume.tolist() == [0.0, 0.0, np.inf]
     assert found.wear_depth[2].tolist() == [np.inf, np.inf]
+    assert np.isinf([found.response[2], found.wear_rate[2]]).all()
     # and what was not reached has no error
     ended = history_error(COUNTS, lost, lost, NOWHERE, AREA, "explicit")
     assert ended.worn_volume[:2].tolist() == [0.0, 0.0]
@@ -257,4 +259,4 @@ def test_response_and_wear_rate_are_known_no_better_than_the_reference_solution_
     other = read(DEPTH, 1.25 * np.ones((3, 2)), response_peak=[[1.0], [1.5], [1.0]], response=[[1.0], [1.0], [1.0j]])
     found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "implicit")
     assert found.response == pytest.approx([1e-3, 0.5, np.sqrt(2.0)])
-    assert found.wear_rate == pytest.approx(np.full(3, 0.25))
+    assert found.wear_rate == pytest.approx([0.0, 0.25, 0.25])
