@@ -45,7 +45,7 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
     """What a worn volume says that is hardly known: that of the history, and that of its reference solution."""
     volume, other = 1e9 * history.worn_volume[row], 1e9 * history.reference_volume[row]
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    coarser = "with steps twice as long, fewer harmonics and a coarser sweep"
+    coarser = "with longer steps, fewer harmonics and a coarser sweep"
     if not math.isfinite(other):
         return f"worn volume {volume:.3g} mm3, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:

@@ -32,11 +32,11 @@ def test_a_history_that_is_known_says_nothing() -> None:
         (
             1e-9,
             0.6,
-            "worn volume 2 mm3, but 1 mm3 with steps twice as long, fewer harmonics and a coarser sweep: known",
+            "worn volume 2 mm3, but 1 mm3 with longer steps, fewer harmonics and a coarser sweep: known",
         ),
-        (1.8e-9, 3.0, "worn volume 2 mm3, not known: 1.8 mm3 with steps twice as long, fewer harmonics and a coarser"),
-        (np.nan, 0.6, "worn volume 2 mm3, known to 60 % only: with steps twice as long, fewer harmonics and a coarser"),
-        (np.nan, np.inf, "worn volume 2 mm3, not known: with steps twice as long"),
+        (1.8e-9, 3.0, "worn volume 2 mm3, not known: 1.8 mm3 with longer steps, fewer harmonics and a coarser"),
+        (np.nan, 0.6, "worn volume 2 mm3, known to 60 % only: with longer steps, fewer harmonics and a coarser"),
+        (np.nan, np.inf, "worn volume 2 mm3, not known: with longer steps"),
     ],
 )
 def test_a_sensitive_volume_is_told_with_that_of_the_reference_solution(other: float, error: float, said: str) -> None:

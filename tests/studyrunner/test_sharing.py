@@ -299,7 +299,7 @@ def test_a_scaled_history_is_sensitive_by_its_own_last_count() -> None:
     found = replace(history(COUNTS, Outcome.SENSITIVE), worn_volume_error=errors, message="of the march")
     results = [build_result(shared_task(), found, place) for place in range(3)]
     assert [result.outcome for result in results] == [15, 15, 0]
-    said = "worn volume 2e+09 mm3, but 3e+09 mm3 with steps twice as long, fewer harmonics and a coarser sweep: "
+    said = "worn volume 2e+09 mm3, but 3e+09 mm3 with longer steps, fewer harmonics and a coarser sweep: "
     assert [result.message for result in results] == ["of the march", said + "known to 70 % only", ""]
 
 
