@@ -54,7 +54,19 @@ class ResolvedState:
         return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
     def by_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
-        """The same state with more harmonics, these raised from nothing; None where that homotopy ends."""
+        """The same state with more harmonics, these raised from nothing; None where the homotopy ends.
+
+        Where the homotopy of all of them at once ends, half of them are raised first.
+        """
+        found = self._in_one_homotopy(resolution, budget)
+        middle = (self.case.resolution.highest + resolution.highest) // 2
+        orders = tuple(order for order in resolution.orders if order <= middle)
+        if found is not None or orders in (self.case.resolution.orders, resolution.orders):
+            return found
+        half = self._in_one_homotopy(Resolution(orders, resolution.samples), budget)
+        return None if half is None else half.solve_at(resolution, budget) or half._in_one_homotopy(resolution, budget)
+
+    def _in_one_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
         if 2 * resolution.highest < self.case.resolution.samples:
             case = self.case.at(resolution)
             joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)

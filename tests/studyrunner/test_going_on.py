@@ -320,7 +320,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
         # the time is over in the midst of the march, however fast the machine is
         nonlocal n_looks
         n_looks += bool(begun)
-        return np.inf if n_looks > 300 else own_clock()
+        return np.inf if n_looks > 150 else own_clock()
 
     monkeypatch.setattr(evaluate, "_solve", solve)
     study += ["-o", "out.nc"]

@@ -85,7 +85,7 @@ def test_the_law_of_a_study_is_the_one_that_wears(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_points_end_at_their_target_each_at_its_own_count(tmp_path: Path) -> None:
-    shared = ("axes.wear_coefficient=[1e-11, 5e-12, 1e-12]", "slow_time.cycles=40000", "slow_time.outputs=41")
+    shared = ("axes.wear_coefficient=[1e-11, 5e-12, 1e-12]", "slow_time.cycles=100000", "slow_time.outputs=101")
     study = study_with(*shared, "slow_time.until={wear_depth = 1e-5}")
     assert read_study(_written(study, tmp_path)).until == study.until == WearTarget("wear_depth", 1e-5)
     whole = run_study(study, tmp_path / "out.nc")
