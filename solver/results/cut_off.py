@@ -1,4 +1,4 @@
-"""Detection of a contact that is cut off: pressure or wear at an edge of the modelled pairs beyond which bodies go on."""
+"""Detection of a cut off contact: pressure or wear at an edge of the modelled pairs at which the bodies go on."""
 
 from __future__ import annotations
 
