@@ -58,7 +58,7 @@ class FrequencySweepState(TypedDict):
 
 
 class FrequencySweep:
-    """The sweep over frequencies: one `NodeSweep` for all points with a common origin; for a ramp, one for each point."""
+    """The sweep over frequencies: one `NodeSweep` for all points with a common origin, or one for each point (ramp)."""
 
     def __init__(
         self,
