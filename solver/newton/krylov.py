@@ -40,7 +40,7 @@ class Recycled:
         return vector + (self.images @ vector) @ self.moves
 
     def learn(self, basis: FloatArray, triangle: FloatArray, rotations: FloatArray) -> None:
-        """Add the correction of a GMRES cycle with A E: basis (k + 1, n), triangle (k, k) and Givens rotations (k, 2)."""
+        """Add the correction of a GMRES cycle with A E: basis (k + 1, n), triangle (k, k), Givens rotations (k, 2)."""
         size = np.abs(np.diag(triangle))
         if not size.min() > NEWTON.null_space * size.max():
             return
