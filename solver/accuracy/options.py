@@ -1,4 +1,4 @@
-"""Tuning constants of the accuracy control: certificate, harmonic levels, error estimates, refinement."""
+"""Tuning constants of the accuracy control: certificate, numbers of harmonics, error estimates, refinement."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class AccuracyOptions:
     asymmetric_force: float = 1e-6
     """Even harmonics of the force over its largest value: above, a state with odd harmonics only gets the even ones."""
 
-    # harmonic levels
+    # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
     """Highest harmonics between which "auto" chooses. The last two serve for comparison only. 7 is left out: on the
     dovetail, states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and
@@ -50,7 +50,7 @@ class AccuracyOptions:
     """Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a
     larger joint some limits grow in proportion, so that they limit the harmonics and not the pairs."""
     coarse_unknowns: int = 1600
-    """Most unknowns of a coarse state: about those of the dovetail of 48 pairs with five harmonics (1584)."""
+    """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584)."""
     periods_in_contact: float = 0.5
     """Shortest contact that the harmonics resolve, in periods of the highest harmonic."""
     stiffness_mismatch: float = 0.25

@@ -5,7 +5,7 @@ The difference of a computation to its reference solution, pair by pair, is take
 - the sweep to the start state: half the nodes, placed between those of the fine sweep (`solver.loading_history`). The
   difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice this
   difference;
-- the harmonics: one level less, with the samples that belong to them;
+- the harmonics: the next lower entry of `harmonic_levels`, with the samples that belong to it;
 - the steps on the slow time: adaptive steps with four times the tolerance, whatever the scheme of the history is.
 
 Some events make an error grow: pairs stick again, a resonance passes, a branch ends. The difference to the reference
@@ -26,5 +26,5 @@ AUTOMATIC = SolverSettings()
 
 
 def coarser(resolution: Resolution) -> Resolution:
-    """Resolution of the reference solution: one level down, or one level up where there is one harmonic only."""
+    """Resolution of the reference solution: the next lower one, or the next higher one for one harmonic only."""
     return shifted(resolution, 1) if resolution.highest <= 1 else fewer(resolution, AUTOMATIC)

@@ -209,7 +209,7 @@ class _Search:
             if not all(order % 2 for order in resolution.orders):
                 return False
             most = min(most, ACCURACY.dear_unknowns)
-        # two levels more are left to compare with
+        # the two highest resolutions serve for a comparison only
         in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most
 

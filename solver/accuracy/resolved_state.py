@@ -163,14 +163,14 @@ class ResolvedState:
     ) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
-        The error is the difference to the first of these states that is found, has few enough unknowns and whose
-        nodal diameters the scene holds:
+        The error is the difference to the state with the most harmonics among the following ones. The state has to be
+        found, its unknowns have to be few enough, and the scene has to hold its nodal diameters:
 
         - with enough harmonics to resolve the shortest contact, as far as cheap. Where no such state is found, the
           error is unknown, whatever the other states give;
         - with so many harmonics that structure and penalty agree beyond them (`reach`), as far as cheap: below, a few
           more harmonics may change nothing;
-        - two levels up, then one level up;
+        - two levels of `harmonic_levels` up, or one level up;
         - one level down, which gives a larger error.
 
         known: a state with more harmonics from an earlier comparison, used again where it has enough of them.

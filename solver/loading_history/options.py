@@ -20,8 +20,8 @@ class LoadingOptions:
     """Cells in an octave. All points of a cell have one first frequency: 105 Hz, half the resonance, for the
     dovetail."""
     origin_candidates: int = 8
-    """Candidates for the first frequency, of which the one with the least vibration is chosen. They are 2 % apart and
-    at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
+    """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen.
+    They are 2 % apart and at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
     first_load_factor: float = 1e-3
     """Load factor at which a ramp begins."""
 
@@ -60,7 +60,7 @@ class LoadingOptions:
     """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
     first_iterations: int = 1000
     """Most Newton iterations of all attempts to begin a sweep, or to begin it again. Tens to hundreds suffice where
-    some pairs stick; a joint that slips everywhere never gets there."""
+    some pairs stick; a joint that slips everywhere takes all of them in vain."""
     sweep_iterations: int = 8000
     """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
     nodes_per_save: int = 8

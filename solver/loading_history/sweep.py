@@ -99,11 +99,7 @@ class NodeSweep:
     """
 
     def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
-        """Begin without a state.
-
-        direction: 1 or -1, sign of the steps of the parameter.
-        omega: frequency of a ramp, rad/s; None for a sweep along the frequency.
-        """
+        """direction: 1 or -1, sign of the steps. omega: frequency of a ramp, rad/s; None for a sweep in frequency."""
         self.path = self.reference_path = LoadingPath(case, excitation_amplitude, omega)
         self.direction = direction
         self.solver, self.reference_solver = JacobianSolver(), JacobianSolver()
@@ -113,7 +109,7 @@ class NodeSweep:
         self.ahead: Step | None = None
 
     def load_state(self, state: SweepState) -> None:
-        """Go on from what was `saved` of another sweep to the same points: the nodes follow to the last bit."""
+        """Go on from the `saved` state of another sweep; the following nodes are equal to the last bit."""
         self.saved = self.state = state
         self._take_cases(self.case.at(state.resolution), self.case.at(state.reference_resolution))
         self.budget.iterations = state.iterations
