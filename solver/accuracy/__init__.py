@@ -1,1 +1,1 @@
-"""How wrong a state is, and what decides the number of harmonics and samples."""
+"""Estimated errors of states and histories, and the automatic choice of harmonics and samples."""

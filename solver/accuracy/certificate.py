@@ -1,19 +1,21 @@
-"""What a state violates: numbers from what is handed out, not from the iteration that found it.
+"""The certificate of a state: by how much the reported motion and force violate the equations of the problem.
 
-Samples obey the contact law by construction, and the series made of them obey it but for what is cut off. So each
-number asks what the samples and the series together can still get wrong:
+The numbers are computed from the reported state alone, not from the iteration that found the state. The samples of a
+period obey the contact law by construction. The Fourier series through these samples obeys the law except for the
+harmonics that are cut off. Each number measures what the samples and the series together can still get wrong:
 
-- residual: equilibrium of the motion and force that are handed out; mean forces are its static harmonic.
-- penetration: of the series of the motion, which is what a user plots, also between samples. Over the largest relative
-  motion in the joint, without its mean: a large mean closing hides nothing. Falls as harmonics are added.
-- tension, cone_violation: of the samples, and of the Fejer mean of the series: the mean of its truncations. Its kernel
-  is positive, so the Fejer mean of any force that obeys the law lies in the cone, too, which is convex: the truncated
-  series of a rigid friction force overshoots by 18 % of its limit for ever and still violates nothing, but coefficients
-  that no such force has are seen.
-- energy_error: work of the excitation on the joint, less what the damping takes, less the friction work of the slip
-  as it wears. What is cut off neither gives nor takes, and the error is that of the sampling. Over the largest of
-  these works, the elastic one and what the excitation could do at most times a loss factor of 1e-3 at least: less does
-  no structure notice.
+- residual: equilibrium of the reported motion and force, the mean forces (static harmonic) included.
+- penetration: of the series of the motion, which is what a user plots, also between the samples. Relative to the
+  largest vibration (relative motion without its mean) in the joint, so that a large mean closing hides nothing. The
+  penetration falls as harmonics are added.
+- tension, cone_violation: of the samples, and of the Fejer mean of the series, which is the mean of its truncations.
+  The Fejer kernel is positive and the friction cone is convex: the Fejer mean of any force that obeys the law lies in
+  the cone, too. So the overshoot of a truncated rigid friction force, 18 % of its limit for any number of harmonics, is
+  no violation. Coefficients that no admissible force has are a violation.
+- energy_error: work of the excitation on the joint, minus the work of the damping, minus the friction work of the slip
+  as it wears. The cut off harmonics do no work, so this is the error of the sampling. Relative to the largest of these
+  works and of the two following, each times a loss factor of 1e-3, which no structure notices: the elastic work, and
+  the work that the excitation could do at most.
 - periodicity_error: change of the slip over a period.
 
 Largest values measured on good states (0 stands for below 1e-12):
@@ -26,10 +28,10 @@ Largest values measured on good states (0 stands for below 1e-12):
 | coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
 | dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
 
-With the limits of `AccuracyOptions` all of these hold but vibro-impact from 1.1 rad/s on at one harmonic, which is far
-off. They are no measure of the truncation error: that is estimated in `solver.accuracy.refinement`. What does not hold,
-as tested: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 % too large (15 % too
-small), slip that does not repeat by 2 % of the limit.
+All of these states hold within the limits of `AccuracyOptions`, except vibro-impact from 1.1 rad/s on with one
+harmonic, which is far off. The certificate does not measure the truncation error, see `solver.accuracy.refinement`.
+Tested faults that the certificate finds: a force 1e-5 off, a harmonic left out, friction that drives, a friction
+coefficient 10 % too large (15 % too small), slip that does not repeat by 2 % of the friction limit.
 """
 
 from __future__ import annotations
@@ -51,14 +53,16 @@ from solver.structure.joint import Joint
 @packable
 @dataclass(frozen=True)
 class Certificate:
-    """Violations of one state, all dimensionless; 0 is perfect.
+    """Violations of one state, all dimensionless; 0 is perfect. `failures` judges the first six.
 
-    residual: scaled residual. penetration: over the largest relative motion. tension: over the largest normal force.
-    cone_violation: over the largest friction limit (normal force where there is no friction). energy_error: over the
-    largest work in a period. periodicity_error: change of the tangential state over a period, over the largest friction
-    limit.
-    response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated. stable: whether
-    small disturbances die out. The last three are not judged here.
+    residual: scaled residual of the equilibrium.
+    penetration: over the largest relative motion.
+    tension: over the largest normal force.
+    cone_violation: over the largest friction limit, or the largest normal force in a joint without friction.
+    energy_error: over the largest work in a period.
+    periodicity_error: change of the tangential state over a period, over the largest friction limit.
+    response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated.
+    stable: whether small disturbances die out.
     """
 
     residual: float
@@ -72,8 +76,8 @@ class Certificate:
     stable: bool = True
 
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
-        """Value and limit of everything that does not hold; tolerance: of the scaled residual. NaN does not hold."""
-        # twice the tolerance: a state that is taken up again from its harmonics has lost some digits to round-off
+        """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
+        # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
         limits = {"residual": 2.0 * max(tolerance, ACCURACY.residual_round_off)} | ACCURACY.violation_limits
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
@@ -84,7 +88,7 @@ class Certificate:
         return not self.failures(tolerance)
 
     def sentence(self, tolerance: float) -> str:
-        """What a user reads: which of them fails, with its value."""
+        """The violations above their limits, with their values, in words for the user."""
         failed = self.failures(tolerance)
         if not failed:
             return "The state obeys equilibrium, contact law and energy balance."
@@ -105,11 +109,11 @@ _MEANING = {
 
 
 NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
-"""Of a state that is not handed out."""
+"""Certificate of a state that is not reported."""
 
 
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
-    """What an evaluated state violates, without truncation errors and stability, which need other states."""
+    """Certificate of an evaluated state, without truncation errors and stability, which need other states."""
     force_t = evaluation.force_t
     friction = joint.friction_coefficient
     largest = force_t[:, 0].max(axis=1, initial=0.0)
@@ -130,14 +134,14 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
 
 
 def _relative(violation: float, size: float) -> float:
-    """Violation over what it is compared with; nothing violated is nothing, whatever it is compared with."""
+    """Violation over a reference size; a violation of 0 stays 0 where the size is 0, too."""
     if violation == 0.0:
         return 0.0
     return violation / size if size > 0.0 else float("inf")
 
 
 def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
-    """Values (..., n N) of a series (..., m) on a grid n times finer than that of the samples."""
+    """Values (..., n N) of a series (..., m) at n times as many points as there are samples."""
     finer = build_basis(joint.basis.orders, ACCURACY.points_per_sample * joint.basis.n_samples)
     return np.asarray(values_h @ finer.synthesis)
 
@@ -152,17 +156,17 @@ def _fejer_mean(joint: Joint, force_h: FloatArray) -> FloatArray:
 
 
 def _residual(joint: Joint, evaluation: Evaluation) -> float:
-    """Scaled residual of the motion and force that are handed out, and the one that the iteration has seen."""
+    """Scaled residual of the reported state, or the one that Newton's iteration has seen where that is larger."""
     motion = joint.to_relative(evaluation.displacement_h)
     left = joint.structure.apply(motion) + joint.to_relative(evaluation.force_h) - joint.structure.force_h()
-    # at a resonance that nothing bounds the forces are small differences of large ones: what round-off may hide
+    # at an unbounded resonance the forces are small differences of large ones: error that round-off may hide
     parts = np.abs(joint.structure.static_stiffness) @ np.abs(motion[:, 1:])
     hidden = np.finfo(float).eps * float(np.linalg.norm(parts)) / evaluation.scale[1]
     return max(evaluation.scaled_residual(), replace(evaluation, residual=left).scaled_residual(), hidden)
 
 
 def _vibrating(values_h: FloatArray) -> FloatArray:
-    """The same series without its mean."""
+    """The series without its mean."""
     moving = values_h.copy()
     moving[..., 0] = 0.0
     return moving
@@ -174,7 +178,7 @@ def _flexed(joint: Joint, force_h: FloatArray) -> FloatArray:
 
 
 def _penetration(joint: Joint, evaluation: Evaluation) -> float:
-    """Largest penetration over the largest relative motion, the elastic one under the contact forces at least."""
+    """Largest penetration over the largest vibration: the relative one, or the elastic one by the contact forces."""
     closing = evaluation.displacement_h[:, 0].copy()
     closing[:, 0] -= joint.contact.gap + evaluation.wear_depth
     depth = _series(joint, closing[joint.has_normal])
@@ -193,13 +197,13 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
-    """Size (...) of the vibration in a series (..., m); a small fraction of the mean at least."""
+    """Size (...) of the vibration in a series (..., m), at least a small fraction of its mean."""
     round_off = ACCURACY.round_off_vibration * np.abs(values_h[..., 0])
     return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 
 def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
-    """Imbalance of the energy of a period over the largest part in it."""
+    """Energy imbalance of a period over the largest work in it."""
     motion, force = joint.to_relative(evaluation.displacement_h), joint.to_relative(evaluation.force_h)
     excitation = _work(joint, joint.structure.force_h(), motion)
     damping = _work(joint, joint.structure.apply(motion), motion)
@@ -207,7 +211,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     dissipation = float(friction_work(joint, evaluation).sum())
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
-    # what the excitation could do at most: beside a resonance it does next to nothing
+    # largest possible work of the excitation: away from a resonance its actual work is almost zero
     apparent = np.pi * float((_amplitude(joint.structure.force_h()) * _amplitude(motion)).sum())
     factor = ACCURACY.noticed_loss_factor
     size = max(abs(excitation), abs(damping), abs(contact), dissipation, factor * elastic, factor * apparent)
@@ -215,7 +219,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
 
 
 def _drive(joint: Joint, evaluation: Evaluation) -> float:
-    """Largest force, N, that drives a marched mass: its velocity repeats to a fraction of what that gives it."""
+    """Largest force, N, that drives a sliding mass (`rigid_slider`), to which a drift of this mass is compared."""
     driven = evaluation.predicted_t[joint.penalty.inertial, 1:]
     return float(np.abs(driven).max(initial=0.0))
 
@@ -223,7 +227,7 @@ def _drive(joint: Joint, evaluation: Evaluation) -> float:
 def _periodicity_error(joint: Joint, evaluation: Evaluation) -> float:
     """Change of the tangential state over the last period, N, of pairs that touch."""
     change = np.hypot(*(evaluation.state_t[:, :, -1] - evaluation.state_t[:, :, 0]).T)
-    # the state of an inertial pair is its displacement; what moves it on is the mean force that its drag takes
+    # the state of an inertial pair is its displacement: its drift is converted to the mean force on its drag
     creep = change * joint.penalty.drag * joint.omega / (2.0 * np.pi)
     change = np.where(joint.penalty.inertial, creep, change)
     touches = evaluation.force_t[:, 0].max(axis=1) > 0.0

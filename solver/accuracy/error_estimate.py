@@ -1,4 +1,4 @@
-"""How wrong a state is, as far as other states tell."""
+"""Estimated errors of a state, from its differences to other states."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ Values = TypeVar("Values", float, FloatArray)
 @packable
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated relative errors of a state: of the first harmonic of its response and of its total wear rate.
+    """Estimated relative errors of a state.
 
-    weight: of the error of the wear rate where it is judged, less than 1 where next to nothing wears.
+    response: of the first harmonic of the response.
+    wear_rate: of the total wear rate.
+    weight: factor on `wear_rate` in `largest`; less than 1 where almost nothing wears.
     """
 
     response: float
@@ -27,24 +29,25 @@ class Estimate:
 
     @property
     def largest(self) -> float:
-        """The larger one, as it is judged."""
+        """The larger error, with the weight of the wear rate."""
         return max(self.response, self.weight * self.wear_rate)
 
     def __add__(self, other: Estimate) -> Estimate:
-        """Errors of two causes, at their worst."""
+        """Sum of the errors of two causes: the worst case."""
         weight = max(self.weight, other.weight)
         return Estimate(self.response + other.response, self.wear_rate + other.wear_rate, weight)
 
     def times(self, factor: float) -> Estimate:
-        """Larger errors."""
+        """The errors times a safety factor."""
         return Estimate(factor * self.response, factor * self.wear_rate, self.weight)
 
 
 def euler_error(length: float, change: Values) -> Values:
-    """Estimated error of an Euler step, explicit or implicit: its difference to the trapezoidal rule.
+    """Estimated error of an explicit or implicit Euler step: its difference to the trapezoidal rule.
 
-    length: of the step, cycles. change: of the wear rate over the step, of each pair, m per cycle, or of all, m3 per
-    cycle. The error is as signed as the change.
+    length: length of the step, cycles.
+    change: change of the wear rate over the step: m per cycle for each pair, or m3 per cycle for the whole joint.
+    Returns the error in m or m3, with the sign of the change.
     """
     return 0.5 * length * change
 

@@ -1,11 +1,16 @@
-"""The harmonic levels between which automatic settings choose, and how many levels up an error would show.
+"""The numbers of harmonics between which automatic settings choose, and how many more an error estimate needs.
 
-Two things hide an error from states with a few more harmonics: a contact that is shorter than the period of the highest
-of them, and a structure that answers higher harmonics otherwise than the penalty does. With the penalty E and the
-compliance G of a pair the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`
-(`solver.structure.penalty`). They need not fall with the next few harmonics: a slider on a beam has a mass that falls
-from mode to mode, and one behind a stiff spring a mass only up to the resonance of the two. As long as the highest
-harmonic is below that, states with a few more harmonics are alike and all wrong.
+The list `harmonic_levels` of the options holds the highest harmonics of these resolutions. "One level up" means the
+next entry of this list.
+
+Two effects hide an error from a comparison with only a few more harmonics:
+
+- a contact that is shorter than the period of the highest harmonic;
+- a structure that answers the higher harmonics otherwise than the penalty does. With the penalty E and the compliance
+  G of a pair, the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`
+  (`solver.structure.penalty`). They need not decrease over the next few harmonics: the modal mass of a slider on a beam
+  falls from mode to mode, and a slider behind a stiff spring acts as a mass only up to the resonance of both. While
+  the highest harmonic lies below this range, states with a few more harmonics agree with each other and are all wrong.
 """
 
 from __future__ import annotations
@@ -20,17 +25,20 @@ from solver.structure.penalty import build_penalty, compliance_at
 
 
 def n_unknowns(resolution: Resolution, n_rel: int) -> int:
-    """Unknowns of a balance of so many relative displacements."""
+    """Number of unknowns of a balance with `n_rel` relative displacements."""
     return n_rel * (2 * len(resolution.orders) + 1)
 
 
 def room_for(unknowns: float, n_rel: int) -> float:
-    """Unknowns that a joint may have where one of 48 pairs may have `unknowns`: a large one has the same harmonics."""
+    """Limit of the unknowns of a joint: `unknowns` is the limit of one with 48 pairs, a larger joint may have more.
+
+    The limit grows with the number of displacements, so that the number of harmonics does not depend on the mesh.
+    """
     return unknowns * max(1.0, n_rel / ACCURACY.displacements_of_limits)
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
-    """So many harmonic levels up (or with -1 one down), with samples enough for them; odd harmonics stay odd."""
+    """Resolution so many levels up, or one level down for -1, with enough samples; odd harmonics stay odd."""
     if levels > 0:
         above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
         highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
@@ -44,7 +52,7 @@ def shifted(resolution: Resolution, levels: int) -> Resolution:
 
 
 def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
-    """One level down: harmonics and samples, whichever are automatic."""
+    """Resolution with one level fewer harmonics and half the samples, as far as these are automatic."""
     orders = shifted(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
     samples = resolution.samples
     if settings.samples == "auto":
@@ -55,8 +63,8 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
 def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
     """Levels up, at least `fewest`, to harmonics that resolve a contact which lasts a fraction `contact` of the period.
 
-    While a contact takes less than about half a period of the highest harmonic, its force is much the same in every
-    harmonic, and a few more of them change next to nothing, however large the error.
+    The force of a contact shorter than about half a period of the highest harmonic is nearly equal in all harmonics. A
+    few more harmonics then change almost nothing, however large the error is.
     """
     above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
     blind = sum(highest * contact < ACCURACY.periods_in_contact for highest in above)
@@ -64,14 +72,15 @@ def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
 
 
 def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
-    """Levels up, at least `fewest`, to harmonics up to `highest`."""
+    """Levels up, at least `fewest`, to a resolution with the harmonic `highest`."""
     return max(fewest, sum(resolution.highest < level <= highest for level in ACCURACY.harmonic_levels))
 
 
 def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
-    """Whether |1 - E G| stays below `stiffness_mismatch` for all pairs and all harmonics above the highest one.
+    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs and for all harmonics above `highest`.
 
-    Judged at real rates, at which the structure has no resonances. omega: rad/s.
+    G is evaluated at real rates (growth instead of vibration), where the structure has no resonances.
+    omega: rad/s.
     """
     penalty = build_penalty(model, omega, highest)
     _, component_index = relative_indices(model.contact)
@@ -87,7 +96,7 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
 
 
 def reach(model: ReducedModel, omega: float, highest: int) -> int:
-    """Lowest highest harmonic of a level, at least the given one, that reaches so far; the last where none does.
+    """Lowest harmonic of the list, not below `highest`, for which `reaches` holds; the last one where none does.
 
     omega: rad/s.
     """

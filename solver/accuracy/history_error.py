@@ -1,4 +1,4 @@
-"""Errors of a wear history from its difference to the reference solution."""
+"""Estimated errors of a wear history, from its difference to the reference solution."""
 
 from __future__ import annotations
 
@@ -30,20 +30,21 @@ class HistoryError:
 
 @dataclass(frozen=True)
 class Met:
-    """Where a history and its reference solution are compared.
+    """Difference of a history and its reference solution at all counts where both were compared.
 
-    cycles (n,): ascending counts. differences (n,): of their depths, as volume of all pairs, m3; NaN where the
-    reference solution has not come to.
+    cycles (n,): ascending counts.
+    differences (n,): sum over all pairs of area times difference of depth, m3; NaN beyond the end of the reference
+        solution.
     """
 
     cycles: FloatArray
     differences: FloatArray
 
     def largest_before(self, counts: FloatArray) -> FloatArray:
-        """Largest difference (n_output,), m3, met since a fraction of each count; 0 where there is none.
+        """Largest difference (n_output,), m3, from `crossing_window` times each count up to this count; 0 if none.
 
-        Histories that differ by when something happens cross each other. Where they cross their difference is small and
-        says nothing.
+        Two histories in which an event happens at different counts cross each other. At the crossing their difference
+        is small and is no measure of the error.
         """
         known = np.isfinite(self.differences)
         at, differences = self.cycles[known], self.differences[known]
@@ -67,33 +68,33 @@ def history_error(
     counts
         (n_output,), ascending, the first 0.
     fine, reference
-        Values of both solutions at the counts, as `solver.wear.output.DenseOutput.read` gives them.
+        Values of both solutions at the counts, from `solver.wear.output.DenseOutput.read`.
     met
-        Differences of both at more counts.
+        Differences of both solutions at more counts.
     area
         (n_contact,), m2.
     scheme
-        Of the history.
+        Scheme of the history.
     """
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
     difference = ACCURACY.history_safety * np.abs(depth - reference["wear_depth"])
     error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
-    # a later state that happens to be alike does not make the start better known
+    # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume)
-    # errors of Euler steps have one sign, and grow
+    # the local errors of Euler steps have one sign and add up
     error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.history_safety) * fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
     relative[unknown & (volume > 0.0)] = np.inf
     relative[~reached] = np.nan
-    # what the volume is wrong by beyond the difference of the histories falls to the pairs as they are worn
+    # the rest of the error of the volume is shared by the pairs in proportion to their depth
     rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
     with np.errstate(invalid="ignore"):
         of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
-    # the errors of a start state come from states with more harmonics
+    # an unworn state has errors of its own, from states with more harmonics
     unworn = (counts == 0.0) | (volume <= 0.0)
     response, rate = (
         np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], apart)))
@@ -113,7 +114,7 @@ def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: Fl
 
 
 def _response_change(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
-    """Relative difference (n_output,) of the responses, the larger one of first harmonic and peak."""
+    """Relative difference (n_output,) of the responses: the larger one of first harmonic and peak."""
     found = np.zeros(len(fine["response"]))
     for name in ("response", "response_peak"):
         size = np.linalg.norm(fine[name], axis=1)

@@ -1,4 +1,4 @@
-"""Tuning constants of the accuracy control: certificate, harmonic levels, error estimates, refinement."""
+"""Tuning constants of the accuracy control: certificate, numbers of harmonics, error estimates, refinement."""
 
 from __future__ import annotations
 
@@ -7,128 +7,128 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AccuracyOptions:
-    """Limits and safety factors; each with its meaning, unit (none: a ratio) and the evidence for its value.
+    """Limits and safety factors: for each its meaning, its unit (none: a ratio) and the evidence for its value.
 
-    What is called measured without a place was measured on the states in the table of `solver.accuracy.certificate`.
+    "Good states" are those in the table of `solver.accuracy.certificate`. "Level": an entry of `harmonic_levels`.
     """
 
     # certificate
     penetration_limit: float = 0.1
-    """Of the largest relative motion. Good states: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
+    """Fraction of the largest relative motion. Good: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
     tension_limit: float = 0.01
-    """Of the largest normal force. Good states: below 1e-12."""
+    """Fraction of the largest normal force. Good states: below 1e-12."""
     cone_limit: float = 0.05
-    """Of the largest friction limit. Good states: below 1e-12; a friction coefficient 10 % too large is found."""
+    """Fraction of the largest friction limit. Good states: below 1e-12; 10 % more friction is found."""
     energy_limit: float = 0.05
-    """Of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
+    """Fraction of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
     periodicity_limit: float = 1e-3
-    """Of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
+    """Fraction of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
     residual_round_off: float = 1e-10
-    """Scaled residual: the mean position of a marched mass is held by 1e-5 of its stiffness."""
+    """Lowest tolerance of the scaled residual: 1e-5 of its stiffness holds the mean position of a sliding mass."""
     points_per_sample: int = 4
-    """Points a sample at which series are looked at: the samples themselves would flatter them."""
+    """Points per sample at which series are judged: at the samples alone their violations are too small."""
     noticed_loss_factor: float = 1e-3
-    """Loss factor that is too small for any structure to notice."""
+    """Loss factor too small to influence any structure."""
     round_off_vibration: float = 1e-6
-    """Of the mean: a smaller vibration is round-off."""
+    """Fraction of the mean: a smaller vibration is round-off."""
 
-    # what happens in a period
+    # events in a period
     round_off_change: float = 1e-9
-    """Change of the tangential state in a period, or even harmonics of the force, over their size: less is round-off
-    (1e-12 and below in good states), the pair does not slip and the state is symmetric."""
+    """Relative change of the tangential state in a period, or relative size of the even harmonics of the force. Less
+    is round-off (1e-12 and below in good states): the pair does not slip, or the state is symmetric."""
     asymmetric_force: float = 1e-6
-    """Even harmonics over the largest force: a state of odd harmonics that has more takes even ones again."""
+    """Even harmonics of the force over its largest value: above, a state with odd harmonics only gets the even ones."""
 
-    # harmonic levels
+    # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
-    """Highest harmonics between which "auto" chooses: all but the last two, with which it compares. Without 7: on the
-    dovetail states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and
+    """Highest harmonics between which "auto" chooses. The last two serve for comparison only. 7 is left out: on the
+    dovetail, states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and
     0.1 % with 5, 7 and 9)."""
     most_mixed_harmonics: int = 79
-    """Highest level of "auto" but for odd harmonics alone: motions that hit something take more in vain."""
+    """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
     displacements_of_limits: int = 144
-    """Relative displacements for which numbers of unknowns are meant here, those of the dovetail of 48 pairs: for a
-    larger joint they grow in proportion, so that the harmonics are limited and not the pairs."""
+    """Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a
+    larger joint some limits grow in proportion, so that they limit the harmonics and not the pairs."""
     coarse_unknowns: int = 1600
-    """Unknowns that it has then at most: about the dovetail of 48 pairs with five harmonics (1584)."""
+    """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584)."""
     periods_in_contact: float = 0.5
-    """Periods of the highest harmonic that the shortest contact takes, from where on harmonics see it."""
+    """Shortest contact that the harmonics resolve, in periods of the highest harmonic."""
     stiffness_mismatch: float = 0.25
-    """Of |1 - E G|: where the structure answers otherwise than the penalty, harmonics are missing."""
+    """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
     octaves_beyond: float = 8.0
-    """Octaves above the first harmonic left out up to which that is judged."""
+    """Octaves above the first harmonic left out over which |1 - E G| is judged."""
 
-    # states at other levels
+    # states at other resolutions
     event_samples: int = 2048
-    """Samples of a period with which a missed event is looked for: a sine overtops a limit unseen by 1e-6 then."""
+    """Samples of a period in the search for a missed event: a sine can exceed a limit between them by 1e-6 only."""
     level_iterations: int = 40
-    """Newton iterations of a solve from the state of another level."""
+    """Newton iterations of a solve that starts from the state at another resolution."""
     dear_unknowns: int = 1000
-    """Unknowns from which a solve is dear: odd harmonics above 79, homotopies and thrice the samples end here."""
+    """Unknowns of an expensive solve: above, no odd harmonics above 79, no homotopy, no 3 N + 2 samples to compare."""
     far_unknowns: int = 400
-    """Unknowns of a balance that is solved only to see a short contact, or how the structure goes on."""
+    """Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
     compared_unknowns: int = 12000
-    """Unknowns of a balance that is solved to estimate an error."""
+    """Most unknowns of a balance that is solved to estimate an error."""
     two_levels_safety: float = 1.5
-    """Error over the difference to two levels up: 2 to 1.2 where the error falls as 1/H to 1/H^3."""
+    """Error over the difference to the state two levels up: 2 to 1.2 where the error falls as 1/H to 1/H^3."""
     one_level_safety: float = 2.5
-    """Error over the difference to one level up: 3.4 to 1.5 for the same."""
+    """Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
     double_samples_safety: float = 1.5
-    """Error over the difference to twice the samples: 2 to 1.3 where it falls with the step in time or its square."""
+    """Error over the difference to twice the samples: 2 to 1.3 for an error as the time step or its square."""
     triple_samples_safety: float = 2.0
-    """The same to three times the samples: 1.5 to 1.1, but those of single events scatter."""
+    """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
     small_slip_work: float = 1e-3
-    """Of the work of the excitation: where normal force times slip is less, it is judged against this."""
+    """Fraction of the work of the excitation: errors of a smaller slip work are relative to this fraction."""
     no_slip_work: float = 1e-3
-    """Of the small slip work: where even that is not reached, nothing wears."""
+    """Fraction of the small slip work: below, nothing wears."""
     creep_fraction: float = 0.1
-    """Of rtol: fraction of the slip work that may be creep."""
+    """Fraction of rtol: part of the slip work that may be creep."""
     small_peak: float = 0.01
-    """Of the largest peak: responses that move less are judged against this."""
+    """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
     small_response: float = 1e-5
-    """Of what the excitation would cause on the stiffness of the joint alone: less says nothing."""
+    """Fraction of the response of the stiffness of the joint alone to the excitation: less has no meaning."""
     kept_fraction: float = 0.5
-    """Of rtol: error up to which harmonics are left out again, so that the next state does not add them at once."""
+    """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
     spare_fraction: float = 0.3
-    """Of the kept error: a state so accurate is tried with fewer harmonics and samples."""
+    """Fraction of the kept error: a state with a smaller error is tried with fewer harmonics and samples."""
     faint_force: float = 0.1
-    """Of rtol, over the largest normal force: contacts with less force need not be resolved."""
+    """Fraction of rtol times the largest normal force: contacts with less force need not be resolved."""
 
     # refinement
     most_samples: int = 8192
-    """Samples of a period, of "auto"."""
+    """Most samples of a period that "auto" takes."""
     samples_of_unknowns: int = 512
-    """Samples of a period where the unknowns are as many as may be, and more where they are fewer. Nine pairs of a
-    blade that lift off at 2000 N: 27 harmonics take 8192 samples without it, 0.2 s an iteration, and the wear rate of
-    what slips at the edge of the contact is as unknown as with 2048."""
+    """Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that
+    lift off at 2000 N: without this limit 27 harmonics take 8192 samples, 0.2 s an iteration, and the wear rate at the
+    edge of the contact is no more accurate than with 2048."""
     refinement_work: float = 1.2e6
-    """Newton iterations of one refinement times the unknowns two levels up: solves that fail take most of them. A joint
-    of 48 pairs with nine harmonics may take 200."""
+    """Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A
+    joint of 48 pairs with nine harmonics may take 200."""
     most_unknowns: int = 8000
-    """Unknowns of a balance that "auto" may march with."""
+    """Most unknowns of a balance in a history with "auto"."""
     small_joint: int = 40
     """Relative displacements up to which a joint is small."""
     few_pairs_unknowns: int = 2000
-    """As `most_unknowns`, of a small joint: impacts couple all harmonics, and no preconditioner helps."""
+    """`most_unknowns` of a small joint: impacts couple all harmonics, and no preconditioner helps."""
     error_ratio: float = 3.0
-    """Of two errors (harmonics, samples): one that is smaller by more is left as it is."""
+    """Ratio of the errors by harmonics and by samples: the smaller one is not refined where their ratio is larger."""
     vibration_recheck: float = 0.3
-    """Relative change of the vibration after which errors are estimated, and harmonics chosen, again. Dovetail: with
-    1.0 the motion on the far side of the resonance is 5 % off, with 0.3 it is 0.5 %."""
+    """Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion
+    of the dovetail on the far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
 
     # wear histories
     history_safety: float = 1.5
     """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps
     of 250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
     crossing_window: float = 0.5
-    """Of the cycle count: histories that differ by when something happens cross each other. The difference that counts
-    is the largest one since this fraction of the count (dovetail, 211.25 Hz, steps of 2000 cycles: without it a quarter
-    of the true error at the crossing). What comes later has no part in it, so that an error does not depend on how far
-    a study goes."""
+    """Fraction of the cycle count. Two histories in which an event happens at different counts cross each other. So the
+    error is the largest difference from this fraction of the count on (dovetail, 211.25 Hz, steps of 2000 cycles:
+    without it the estimate at the crossing is a quarter of the true error). Later differences are not used: an error
+    does not depend on the length of the study."""
 
     @property
     def violation_limits(self) -> dict[str, float]:
-        """Largest accepted violations of a certificate; response and wear rate have estimates of their own."""
+        """Limits of the violations of a certificate; response and wear rate have error estimates instead."""
         return {
             "penetration": self.penetration_limit,
             "tension": self.tension_limit,

@@ -1,4 +1,4 @@
-"""What happens in the period of a state, as far as harmonics and samples are chosen by it."""
+"""Events in the period of a state (slip, lift-off, loss of symmetry) that decide about harmonics and samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from solver.model import FloatArray, IntArray
 
 
 def nothing_happens(evaluation: Evaluation) -> bool:
-    """Whether every pair sticks or is open all period long: the joint is linear. What only touches its limit sticks."""
+    """Whether every pair sticks or is open throughout the period, so that the joint is linear.
+
+    A pair that reaches its friction limit without slip counts as stuck.
+    """
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
     rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off_change * np.abs(state_t).max(axis=2)
     still = rests.all(axis=1) & ~separated.any(axis=1)
@@ -20,12 +23,12 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
-    """Whether a state of odd harmonics alone has contact forces with even ones: it was symmetric and no longer is."""
+    """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
     return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ACCURACY.asymmetric_force)
 
 
 def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
-    """Whether the contact force has no even harmonics but the static one, to a fraction of the largest force."""
+    """Whether all even harmonics of the contact force but the static one are below a fraction of its largest value."""
     half = evaluation.force_t.shape[2] // 2
     if evaluation.force_t.shape[2] % 2:
         return False
@@ -35,7 +38,7 @@ def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
-    """Shortest time in which a pair that opens is in contact.
+    """Duration of the shortest contact of all pairs that open.
 
     Parameters
     ----------
@@ -44,8 +47,7 @@ def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float
     normal_force_t
         (n_contact, N), N.
     felt
-        Fraction of the largest normal force that a pair has to reach: those that hardly touch matter as little as their
-        forces do.
+        Fraction of the largest normal force. Pairs whose force is lower all period long are left out.
 
     Returns
     -------
@@ -59,17 +61,17 @@ def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float
         begins = np.flatnonzero(closed & ~np.roll(closed, 1))
         ends = np.flatnonzero(~closed & np.roll(closed, 1))
         if begins.size:
-            # the first end belongs to the last beginning where the period begins in contact
+            # where the period begins in contact, the first end belongs to the last beginning
             lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
             shortest = min(shortest, int(lasted.min()))
     return float(shortest / n_samples)
 
 
 def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:
-    """Part of the vibrating contact force, over its size, that lies in harmonics which are left out.
+    """Fraction of the vibrating contact force in harmonics that the series of the state does not hold.
 
-    The samples of the force hold harmonics up to half their number. The series of the state holds the harmonics
-    `orders` alone. What lies beyond grows and falls with the error of the state.
+    The samples of the force hold harmonics up to half their number, the series holds the harmonics `orders` only. The
+    fraction beyond the series grows and falls with the error of the state, and needs no further solve.
     """
     force_h = np.fft.rfft(evaluation.force_t, axis=2)[:, :, 1:]
     size = np.linalg.norm(force_h)

@@ -1,15 +1,15 @@
-"""The reference solution: the same computation once more with everything coarser.
+"""The reference solution: a second run of the computation in which everything is coarser.
 
 The difference of a computation to its reference solution, pair by pair, is taken for its error. Coarser are
 
-- the sweep to the start state: half the nodes, between those of the sweep (`solver.loading_history`). The tangential
-  history that both sweeps leave is extrapolated: the reference solution starts from twice the difference;
-- the harmonics: one level less, and the samples that go with them;
-- the steps on the slow time: those of the adaptive scheme with four times the tolerance, whatever the scheme of the
-  history is.
+- the sweep to the start state: half the nodes, placed between those of the fine sweep (`solver.loading_history`). The
+  difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice this
+  difference;
+- the harmonics: the next lower entry of `harmonic_levels`, with the samples that belong to it;
+- the steps on the slow time: adaptive steps with four times the tolerance, whatever the scheme of the history is.
 
-Whatever makes an error grow - pairs that stick again, a resonance that passes, a branch that ends - makes the
-difference grow as well. A sum of local errors does not see this growth.
+Some events make an error grow: pairs stick again, a resonance passes, a branch ends. The difference to the reference
+solution grows as well, a sum of local errors does not.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from solver.accuracy.harmonic_levels import fewer, shifted
 from solver.settings import Resolution, SolverSettings
 
 RTOL_RATIO = 4.0
-"""Tolerance of the steps of the reference solution over that of the history: BDF2 steps are then about twice as long.
+"""Ratio of the step tolerances of reference solution and history: BDF2 steps are then about twice as long.
 With 8 one reference solution of the dovetail was lost (211.25 Hz)."""
 
 AUTOMATIC = SolverSettings()
-"""With these settings harmonics and samples may be left out."""
+"""Settings that let `fewer` reduce both harmonics and samples."""
 
 
 def coarser(resolution: Resolution) -> Resolution:
-    """Harmonics and samples of the reference solution: one level less, or one level more than one harmonic alone."""
+    """Resolution of the reference solution: the next lower one, or the next higher one for one harmonic only."""
     return shifted(resolution, 1) if resolution.highest <= 1 else fewer(resolution, AUTOMATIC)

@@ -1,13 +1,16 @@
-"""How wrong a state is for its harmonics and samples, and which of them it needs.
+"""Estimated error of a state by its harmonics and samples, and the choice of both.
 
 The error of a state is estimated by solving the state again with more harmonics and with more samples. Each solve
-begins from the state. What changes is the error, up to the rest of the series (`solver.accuracy.resolved_state`).
+begins from the state. The change, times a safety factor for the rest of the series, is the error
+(`solver.accuracy.resolved_state`).
 
-Automatic settings take more harmonics or more samples until the estimate is below `rtol`. A state without even
-harmonics goes on without them. A state in which nothing slips or opens keeps the first harmonic alone, which is then
-exact. Masses that ratchet are brought to rest first (`solver.continuation.ratcheting`). Where Newton's method
-diverges from a state with fewer harmonics, the others are added by homotopy (`solver.continuation.homotopy`), as far
-as that is cheap.
+Automatic settings take more harmonics or more samples until the estimate is below `rtol`:
+
+- A state without even harmonics goes on without them.
+- A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
+- Masses that ratchet are brought to rest first (`solver.continuation.ratcheting`).
+- Where Newton's method diverges from a state with fewer harmonics, the others are added by homotopy
+  (`solver.continuation.homotopy`), as far as the number of unknowns allows.
 """
 
 from __future__ import annotations
@@ -29,11 +32,13 @@ from solver.structure.joint import Case, Joint
 
 @dataclass(frozen=True)
 class Refined:
-    """A state with the harmonics and samples that it needs, or as many as there may be.
+    """A state with the harmonics and samples that it needs, or with the most that are allowed.
 
-    case: with the resolution of the state. point: the state; its parameter is that of the point refined. estimate: of
-    its errors. accurate: whether it is below rtol (that of the response, where only the finest samples show any slip);
-    for fixed settings always true.
+    case: the case, with the resolution of the state.
+    point: the state, with the parameter of the state that was given.
+    estimate: estimated errors of the state.
+    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
+        Always true for fixed settings.
     """
 
     case: Case
@@ -51,27 +56,27 @@ def refine(
     most: float = ACCURACY.most_unknowns,
     usual_work: float = 0.0,
 ) -> Refined:
-    """Estimate the error of a state (its wear held) and, with automatic settings, refine it until that is below rtol.
+    """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
     Parameters
     ----------
     case
-        With the harmonics and samples of the state.
+        The case, with the harmonics and samples of the state.
     omega, excitation_amplitude
         rad/s, N.
     point
         The state.
     budget
-        Newton iterations spent are added to it.
+        Counts the Newton iterations.
     most
-        Unknowns of a joint of 48 pairs up to which more harmonics are taken (`room_for`).
+        Most unknowns of a joint of 48 pairs with more harmonics (`room_for`).
     usual_work
-        N m, slip work against which a smaller one is judged: next to none has no relative error to speak of.
+        N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
 
     Returns
     -------
     Refined
-        The state as it was, with its error, where no accurate one is found.
+        The refined state, or the last one found with its error where none is accurate.
 
     Raises
     ------
@@ -88,10 +93,11 @@ def refine(
 class _Search:
     """The search for the harmonics and samples that a state needs.
 
-    settings: what is automatic, and rtol.
-    budget, begun: Newton iterations are counted here, and how many there were before.
+    settings: automatic harmonics and samples, and rtol.
+    budget: counts the Newton iterations.
+    begun: Newton iterations at the start of the search.
     most: as in `refine`.
-    faint: whether slip shows with more samples only than those of the state that was given.
+    faint: whether slip only shows with more samples than those of the given state.
     """
 
     settings: SolverSettings
@@ -101,7 +107,7 @@ class _Search:
     faint: bool = False
 
     def refined(self, here: ResolvedState) -> Refined:
-        """The state of the level that suffices, or of the last one found."""
+        """The state at the resolution that suffices, or the last state found."""
         richer: ResolvedState | None = None
         while True:
             if nothing_happens(here.point.evaluation):
@@ -125,13 +131,13 @@ class _Search:
             wanted = self._wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
             following = self._next(here, wanted, finer, richer)
             if following is None:
-                # slip that few samples see is no reason to give up a motion that is known
+                # slip that only many samples show is no reason to reject an accurate motion
                 judged = estimate.response if self.faint else estimate.largest
                 return Refined(here.case, here.point, estimate, judged <= self.settings.rtol)
             here = following
 
     def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
-        """Of a state in which nothing slips or opens: the result, or the state with samples that see something slip."""
+        """Result for a state in which nothing slips or opens, or the state with more samples that show some slip."""
         if self.settings.harmonics == "auto" and here.case.resolution.orders != (1,):
             here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.budget) or here
         missed = here.missed_event(self.budget)
@@ -146,18 +152,18 @@ class _Search:
     def _harmonics_error(
         self, here: ResolvedState, known: ResolvedState | None
     ) -> tuple[Estimate, ResolvedState | None]:
-        """Error for want of harmonics, and the state with more of them that it comes from."""
+        """Error by missing harmonics, and the state with more harmonics that gave it."""
         error, richer = here.harmonics_error(self.budget, known)
         above = shifted(here.case.resolution, 1)
         cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
-            # impacts: Newton's method diverges from a warm start with more harmonics, though they have the state
+            # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
             richer = here.by_homotopy(above, self.budget)
             error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         return error, richer
 
     def _wanted(self, here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
-        """Harmonics and samples to go on with, by the errors for want of each."""
+        """The next resolution, chosen by the errors of samples and of harmonics."""
         resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
         wanted = resolution
         if self.settings.harmonics == "auto" and (not holds or by_harmonics > by_samples / ACCURACY.error_ratio):
@@ -169,9 +175,9 @@ class _Search:
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
     ) -> ResolvedState | None:
-        """The state with the harmonics and samples wanted, or with more that are known; None where it is not found.
+        """The state with the wanted resolution, or a known state with more harmonics; None where none is found.
 
-        finer, richer: states with more samples and with more harmonics that are known.
+        finer, richer: known states with more samples and with more harmonics.
         """
         limit = self.begun + ACCURACY.refinement_work / here.unknowns(shifted(here.case.resolution, 2))
         if wanted == here.case.resolution or not self._allowed(here, wanted) or self.budget.iterations >= limit:
@@ -181,33 +187,33 @@ class _Search:
                 return known
         found = here.solve_at(wanted, self.budget)
         if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
-            # what is not found from below may be found from above
+            # from a state with more harmonics instead of fewer
             found = richer.solve_at(wanted, self.budget)
         if found is None and richer is not None and self.settings.harmonics == self.settings.samples == "auto":
             found = richer if self._allowed(here, richer.case.resolution) else None
         return found
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
-        """Whether "auto" may go on with these harmonics and samples."""
+        """Whether "auto" may take these harmonics and samples."""
         if not here.case.model.holds(resolution.highest):
             return False
         n_rel = here.joint.component_index.size
-        # what the pairs take at all samples, in all harmonics
+        # the contact law costs unknowns times samples
         room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
         if here.unknowns(resolution) * resolution.samples > room:
             return False
         small = n_rel <= ACCURACY.small_joint
         most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
-            # friction alone: motions that hit something take more in vain
+            # more harmonics for friction without impacts only, whose harmonics are odd
             if not all(order % 2 for order in resolution.orders):
                 return False
             most = min(most, ACCURACY.dear_unknowns)
-        # two levels more are left to compare with
+        # the two highest resolutions serve for a comparison only
         in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most
 
 
 def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
-    """Relative differences of response and wear rate of two states of one joint, judged like any error."""
+    """Relative differences of response and wear rate of two states of one joint."""
     return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))

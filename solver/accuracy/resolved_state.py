@@ -1,7 +1,7 @@
-"""A state at one of several resolutions: the same state at others, and how far they differ.
+"""A state at one resolution (harmonics and samples), the corresponding states at others, and their differences.
 
-What changes in a state that is solved again with more harmonics or with more samples is its error, up to the rest of
-the series, for which there are safety factors (`AccuracyOptions`).
+A state is solved again with more harmonics or with more samples. The change, times a safety factor for the rest of the
+series (`AccuracyOptions`), is its error.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from solver.structure.joint import Case, Joint
 
 @dataclass(frozen=True)
 class ResolvedState:
-    """A state with the case that it was solved in.
+    """A state with the case and the joint of its solution.
 
-    usual_work: N m, slip work against which that of the state is judged where it is less; 0 where it counts by itself.
+    usual_work: N m, lower bound of the slip work to which an error of the wear rate is relative; 0 for none.
     """
 
     case: Case
@@ -42,15 +42,15 @@ class ResolvedState:
     usual_work: float = 0.0
 
     def solve_at(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
-        """The same state with other harmonics and samples; None where it is not found."""
+        """The state with other harmonics and samples; None where it is not found."""
         return self._transferred(self.case, self.point.evaluation, resolution, budget)
 
     def unknowns(self, resolution: Resolution) -> int:
-        """Unknowns of the balance with other harmonics."""
+        """Number of unknowns of the balance with other harmonics."""
         return n_unknowns(resolution, self.joint.component_index.size)
 
     def may_solve(self, resolution: Resolution, most: int) -> bool:
-        """Whether the scene holds so many harmonics and their balance has at most so many unknowns."""
+        """Whether the scene has matrices for so many harmonics, and their balance at most `most` unknowns."""
         return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
     def by_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
@@ -86,7 +86,7 @@ class ResolvedState:
     def _transferred(
         self, old: Case, evaluation: Evaluation, resolution: Resolution, budget: Budget
     ) -> ResolvedState | None:
-        """State found from one with other harmonics or with the penalty of another case."""
+        """State solved from a state with other harmonics or with another penalty."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
         return self._solved(
@@ -105,7 +105,7 @@ class ResolvedState:
         return replace(self, case=case, joint=joint, point=point).at_rest(budget)
 
     def at_rest(self, budget: Budget) -> ResolvedState:
-        """The same state with its marched masses at rest: what they creep is slip and would be taken for wear."""
+        """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         settings = self.case.settings
         fraction = ACCURACY.creep_fraction * settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
@@ -114,14 +114,15 @@ class ResolvedState:
         return replace(self, point=rested)
 
     def least_work(self) -> float:
-        """Slip work, N m, below which a relative error of it weighs less: the usual one, or a part of the work of the
-        excitation.
+        """Slip work, N m, below which its relative error has less weight.
+
+        It is the larger one of `usual_work` and a fraction of the work of the excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, budget: Budget) -> ResolvedState | None:
-        """The same state without its even harmonics, where it has none; None where it needs them or has them not."""
+        """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
         if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
@@ -129,15 +130,15 @@ class ResolvedState:
         return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
 
     def with_even(self, budget: Budget) -> ResolvedState | None:
-        """The same state with all harmonics up to its highest, where it has odd ones alone and needs the others."""
+        """The state solved with all harmonics up to its highest; None unless it lacks even harmonics that it needs."""
         resolution = self.case.resolution
         if resolution.highest == 1 or not lacks_even(resolution.orders, self.point.evaluation):
             return None
         return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), budget)
 
     def missed_event(self, budget: Budget) -> ResolvedState | None:
-        """The same state with as many samples as it takes to see a pair slip or open, or the contact be made, between
-        the samples; None where nothing does. Harmonics without an event in between are exact: one look is enough.
+        """The state with enough samples to show a slip, a separation or a contact between the samples; None if there is
+        none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), budget)
@@ -150,13 +151,15 @@ class ResolvedState:
         return finest
 
     def samples_error(self, budget: Budget) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error for want of samples, and the state with more of them that it comes from.
+        """Estimated error by missing samples, and the state with more samples that gave it.
 
-        The error depends on where between two samples an event (slip, stick, lift) falls. The sample next to an event
-        is also one of twice as many samples and may still be the next one: then both states have the same error. So the
-        other state has 3 N + 2 samples, which have only the phases 0 and pi in common with these N. Where the unknowns
-        are many there are many events, and 2 N samples, with which the refinement can go on, suffice. Where no such
-        state is found the error is the difference to the one with N / 2, which is at least as large.
+        The error depends on the position of an event (slip, stick, lift) between two of the N samples.
+
+        - Twice as many samples contain the sample next to an event, which may still be the next one. Then both states
+          have the same error. So the other state has 3 N + 2 samples, which share only the phases 0 and pi with the N.
+        - Many unknowns mean many events. Then 2 N samples suffice, with which the refinement can go on.
+        - Where no such state is found, the error is the difference to the state with N / 2 samples, which is at least
+          as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
@@ -170,20 +173,24 @@ class ResolvedState:
     def harmonics_error(
         self, budget: Budget, known: ResolvedState | None = None
     ) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error for want of harmonics, and the state with more of them that it comes from.
+        """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
-        It is the difference to the state two levels up; where that is not found, takes too many unknowns, or the scene
-        does not hold the nodal diameters of so many, one level; where not even those, to the state one level down,
-        which is larger. As far as that is cheap it is the difference to a state that sees the shortest contact,
-        and where none such is found the error is unknown, whatever the other states say; and to one with so many that
-        the structure answers those beyond as the penalty does (`reach`): below, a few more may change nothing.
+        The error is the difference to the state with the most harmonics among the following ones. The state has to be
+        found, its unknowns have to be few enough, and the scene has to hold its nodal diameters:
 
-        known: a richer state that was compared before, which is not solved again where it reaches so far.
+        - with enough harmonics to resolve the shortest contact, as far as cheap. Where no such state is found, the
+          error is unknown, whatever the other states give;
+        - with so many harmonics that structure and penalty agree beyond them (`reach`), as far as cheap: below, a few
+          more harmonics may change nothing;
+        - two levels of `harmonic_levels` up, or one level up;
+        - one level down, which gives a larger error.
+
+        known: a state with more harmonics from an earlier comparison, used again where it has enough of them.
         """
         evaluation = self.point.evaluation
         felt = ACCURACY.faint_force * self.case.settings.rtol
         contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
-        # a whole period of the highest harmonic in the contact shows it well, half a period shows it
+        # a contact of one period of the highest harmonic is resolved well, one of half a period just resolved
         far, seeing = (levels_to_see(self.case.resolution, part * contact, 2) for part in (0.5, 1.0))
         while far > 2 and not self.may_solve(shifted(self.case.resolution, far), ACCURACY.far_unknowns):
             far -= 1
@@ -213,21 +220,22 @@ class ResolvedState:
         return UNKNOWN, None
 
     def covers(self, resolution: Resolution) -> bool:
-        """Whether this has these harmonics and at least so many samples."""
+        """Whether the state has these harmonics and at least as many samples."""
         own = self.case.resolution
         return own.orders == resolution.orders and own.samples >= resolution.samples
 
     def level_by_level(self, levels: int, budget: Budget) -> ResolvedState | None:
-        """The same state so many levels up, where it is not found at once; None where one of them fails."""
+        """The state `levels` up, solved one level after the other; None where one of them fails."""
         level: ResolvedState | None = self
         for _ in range(levels):
             level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), budget)
         return level
 
     def relaxed(self, estimate: Estimate, budget: Budget) -> tuple[ResolvedState, Estimate]:
-        """The same state with as few harmonics and samples as it needs, and its estimated errors; `estimate`: of this.
+        """The state with as few harmonics and samples as it needs, and its estimated errors.
 
-        A fraction of rtol is kept, so that the next state does not go up again at once.
+        The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
+        estimate: errors of the present state.
         """
         here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
         while estimate.largest <= ACCURACY.spare_fraction * enough:
@@ -251,8 +259,9 @@ class ResolvedState:
         return largest_responses(self.joint, self.point.evaluation)
 
     def least_response(self) -> float:
-        """Response, m, below which a relative error says nothing: a small fraction of what the excitation would cause
-        on the joint's own stiffness. A mass that its friction holds does not respond at all.
+        """Response, m, below which a relative error has no meaning, as for a mass that friction holds.
+
+        It is a small fraction of the response that the excitation would cause on the stiffness of the joint alone.
         """
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
@@ -260,7 +269,7 @@ class ResolvedState:
         return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
-        """Whether the certificate of the state holds."""
+        """Whether all violations of the certificate are below their limits."""
         return certify(self.joint, self.point.evaluation).holds(self.case.settings.tolerance)
 
     def difference(self, better: ResolvedState) -> Estimate:
@@ -275,6 +284,6 @@ class ResolvedState:
         work = max(self.least_work(), better.least_work())
         if max(its_slip, mine_slip) <= ACCURACY.no_slip_work * work:
             return Estimate(response, 0.0)
-        # no wear rate is surer than the motion that it comes from
+        # the wear rate cannot be more accurate than the motion that causes it
         slip = max(its_slip, ACCURACY.no_slip_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

@@ -1,1 +1,1 @@
-"""The unworn states of a point: a sweep in frequency, or a ramp of the excitation, that leads there."""
+"""The unworn states of a point and the loading history before: a sweep in frequency, or a ramp of the excitation."""

@@ -1,4 +1,4 @@
-"""The sweep along the frequencies of a study: nodes that many points share, and the state at each point."""
+"""The sweep along the frequencies of a study: nodes common to many points, and the state at each point."""
 
 from __future__ import annotations
 
@@ -27,11 +27,15 @@ from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 
 _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
-"""Why a sweep has ended: they say more than that it has."""
+"""Outcomes that tell the reason for the end of a sweep, not only its end."""
 
 
 class Found:
-    """What is known of the state at a frequency. branch, fold: folds jumped over before it, and the last, rad/s."""
+    """The state at a frequency with its errors, or the reason why there is none.
+
+    branch: number of folds jumped over before this frequency.
+    fold: frequency of the last of them, rad/s.
+    """
 
     def __init__(self, outcome: Outcome, branch: int = 0, fold: float = float("nan")) -> None:
         self.outcome = outcome
@@ -44,7 +48,7 @@ class Found:
 
 
 class FrequencySweepState(TypedDict):
-    """What goes on from frequency to frequency: attributes of a `FrequencySweep` and of its current sweep by nodes."""
+    """Saved attributes of a `FrequencySweep` and of its current `NodeSweep`, with which the sweep goes on."""
 
     origin: Origin
     omega: float | None
@@ -54,7 +58,7 @@ class FrequencySweepState(TypedDict):
 
 
 class FrequencySweep:
-    """The sweep over frequencies: one sweep for all points with the same origin, or one for each point of a ramp."""
+    """The sweep over frequencies: one `NodeSweep` for all points with a common origin, or one for each point (ramp)."""
 
     def __init__(
         self,
@@ -76,7 +80,7 @@ class FrequencySweep:
 
     @property
     def penalty_omega(self) -> float:
-        """rad/s, where the penalty is taken."""
+        """Frequency at which the penalty is taken, rad/s."""
         return float("nan") if self.origin is None else 2.0 * np.pi * self.origin.penalty
 
     @property
@@ -90,13 +94,13 @@ class FrequencySweep:
         return self.budget.iterations + (0 if self.nodes is None else self.nodes.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
-        """CPU time of the thread, s, after which the state that is sought is given up."""
+        """Set the CPU time of the thread, s, after which the search for the present state ends."""
         self.budget.deadline = deadline
         if self.nodes is not None:
             self.nodes.budget.deadline = deadline
 
     def state_dict(self) -> FrequencySweepState:
-        """What goes on from frequency to frequency, to be packed."""
+        """Values with which another sweep goes on, to be packed."""
         assert self.nodes is not None
         assert self.nodes.saved is not None
         assert self.origin is not None
@@ -109,7 +113,7 @@ class FrequencySweep:
         }
 
     def load_state(self, state: FrequencySweepState) -> None:
-        """Go on from the state of another one."""
+        """Go on from the saved state of another sweep."""
         self.origin = state["origin"]
         self.budget.iterations = state["own_iterations"]
         self._counted = state["sweep_iterations"]
@@ -128,7 +132,7 @@ class FrequencySweep:
         other_cell = self.origin is None or origin.cell != self.origin.cell
         if self.nodes is None or self.sweep == "ramp" or other_cell or self.nodes.has_passed(omega):
             self.origin = origin
-            # one that was loaded has not gone again to where it was
+            # a loaded sweep stands at an earlier node with fewer iterations
             self.budget.iterations += max(0 if self.nodes is None else self.nodes.budget.iterations, self._counted)
             self._counted = 0
             self.nodes = self._new_sweep(origin, omega if self.sweep == "ramp" else None)
@@ -152,7 +156,7 @@ class FrequencySweep:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return Found(Outcome.SINGULAR)
-        # those of a ramp are no frequencies
+        # folds of a ramp are load factors
         fold = float("nan") if self.sweep == "ramp" else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
         return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
@@ -160,7 +164,7 @@ class FrequencySweep:
     def _judge(
         self, refined: Refined, omega: float, found: Found, coarse_case: Case, coarse: PathPoint | None
     ) -> Found:
-        """Whether a refined state is a result, with its error and what the reference sweep has come to."""
+        """The outcome of a refined state, with its error and the state of the reference sweep."""
         joint = refined.case.joint(omega, self.excitation_amplitude)
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
@@ -179,7 +183,7 @@ class FrequencySweep:
         return found
 
     def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
-        """A state where the sweep begins; none where there is none, or where the structure is singular there."""
+        """Find the first state of the sweep; no success where there is none, or where the structure is singular."""
         self.budget.limit = self.budget.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
@@ -198,8 +202,8 @@ class FrequencySweep:
         return nodes.begin(case, PathPoint(place, point.evaluation, point.history))
 
     def _advance_to(self, nodes: NodeSweep, target: float) -> None:
-        """As far as the target; where the sweep ends before, it is begun anew a little behind its end."""
-        # all attempts together: where a joint has no grip none of them leads on
+        """Advance the sweep to the target; where the sweep is lost before, begin it again a little further on."""
+        # budget of all attempts: where every pair slips, all of them fail
         self.budget.limit = self.budget.iterations + LOADING.first_iterations
         while True:
             try:
@@ -221,7 +225,7 @@ class FrequencySweep:
         return nodes.state.failure if never or nodes.state.failure in _REASONS else Outcome.BRANCH_LOST
 
     def _where_lost(self, nodes: NodeSweep) -> str:
-        """How far a sweep came that has lost its branch; empty for one that never began, and for a ramp."""
+        """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
         if np.isnan(nodes.state.lost_at):
             return ""
         if nodes.path.omega is not None:
@@ -229,7 +233,7 @@ class FrequencySweep:
         return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _restarted_from_static(self, omega: float) -> Refined | None:
-        """An accurate state from the static one with other harmonics, where those of the branch lead to none."""
+        """An accurate state from the static one with other harmonics than the branch; None if there is none."""
         for resolution in _other_starts()[1:]:
             case, point = self._first_at(omega, 1.0, resolution)[1:]
             refined = None
@@ -240,7 +244,7 @@ class FrequencySweep:
         return None
 
     def _first(self, omega: float, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
-        """A state from the static one; where the harmonics of the sweep find none, with others."""
+        """A state from the static one with the harmonics of the sweep, or else with others."""
         assert self.nodes is not None
         others = _other_starts() if self.settings.automatic else ()
         why = Outcome.START_FAILED
@@ -248,7 +252,7 @@ class FrequencySweep:
             outcome, case, point = self._first_at(omega, load_factor, resolution)
             if point is not None:
                 return case, point
-            # the first attempt says why there is none
+            # the reason comes from the first attempt
             why = outcome if attempt == 0 else why
             if outcome is Outcome.STATIC_FAILED:
                 why = outcome
@@ -260,7 +264,7 @@ class FrequencySweep:
     def _first_at(
         self, omega: float, load_factor: float, resolution: Resolution
     ) -> tuple[Outcome, Case, PathPoint | None]:
-        """A state from the static one with these harmonics and samples, as far as they are not fixed."""
+        """A state from the static one with these harmonics and samples, as far as the settings allow them."""
         assert self.nodes is not None
         case = self.nodes.case.at(allowed(resolution, self.settings))
         unworn = np.zeros(self.model.contact.n_contact)
@@ -271,5 +275,5 @@ class FrequencySweep:
 
 
 def _other_starts() -> tuple[Resolution, ...]:
-    """Harmonics and samples with which a first state is sought where those of the sweep find none."""
+    """Harmonics and samples of further attempts to find a first state."""
     return tuple(Resolution(all_orders(highest), samples) for highest, samples in LOADING.other_starts)

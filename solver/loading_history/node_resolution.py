@@ -1,4 +1,4 @@
-"""Harmonics and samples of the nodes of a sweep: whether they still hold, and others where they do not."""
+"""Harmonics and samples of the nodes of a sweep: check whether they still suffice, and new choice."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from solver.structure.joint import Case, Joint
 def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool, budget: Budget) -> bool:
     """Whether a state has about the harmonics and samples that it needs, by one linear solve at most.
 
-    One Newton iteration with two levels of harmonics more and twice the samples shows the error. False where that error
-    is above the aim, and where it is so far below that fewer harmonics may do. at_limit: whether there may be no more.
+    One Newton iteration two levels of harmonics up, with twice the samples, shows the error.
+    False where this error is above rtol, or so far below that fewer harmonics may suffice.
+    at_limit: whether more harmonics are not allowed.
     """
     resolution, evaluation = case.resolution, point.evaluation
     fewest = resolution == first_resolution(case.settings)
     if nothing_happens(evaluation):
         looked = Resolution(resolution.orders, max(ACCURACY.event_samples, 2 * resolution.samples))
-        # what only more samples see, `refine` finds
+        # an event that only more samples show is left to `refine`
         return fewest and nothing_happens(_moved(case, joint, point, looked, budget, 0).point.evaluation)
     above = shifted(resolution, 2)
     above = allowed(Resolution(above.orders, 2 * above.samples), case.settings)
@@ -43,7 +44,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool,
 def _moved(
     case: Case, joint: Joint, point: PathPoint, resolution: Resolution, budget: Budget, iterations: int
 ) -> ResolvedState:
-    """A state taken to other harmonics and samples and improved by some Newton iterations."""
+    """A state with other harmonics and samples, improved by a number of Newton iterations."""
     other = case.at(resolution)
     other_joint = other.joint(joint.omega, joint.excitation_amplitude)
     balance, start = transfer(other, other_joint, point.evaluation, case.resolution.orders, case.penalty.inertial)
@@ -56,13 +57,13 @@ def _moved(
 
 
 def choose_resolution(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> Refined:
-    """A state with the harmonics and samples that a node needs, at least those that automatic settings begin with."""
-    # what the sweep misses for want of harmonics shows in the difference to the reference
+    """A node with the harmonics and samples that it needs, at least the first ones of automatic settings."""
+    # `coarse_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
     refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.coarse_unknowns)
     fewest = first_resolution(case.settings)
     if refined.case.resolution.highest >= fewest.highest:
         return refined
-    # a joint that sticks needs one harmonic, but the next node may be the first one that slips
+    # a joint that sticks needs one harmonic only, but may slip at the next node
     if case.resolution == fewest:
         return replace(refined, case=case, point=point)
     moved = case.at(fewest)

@@ -1,7 +1,8 @@
 """One step of a loading path: from a stable state to a stable state at another frequency or excitation.
 
-`LoadingPath.solve` solves one balance, from the line through the last states. Where Newton's method fails or the state
-is unstable, `LoadingPath.step` searches: by smaller natural steps, by arc length through folds, and in time.
+`LoadingPath.solve` solves one balance, with a linear extrapolation of the last two states as its start. Where Newton's
+method fails or the state is unstable, `LoadingPath.step` searches by smaller natural steps, by arc-length continuation
+through folds, and by integration in time.
 """
 
 from __future__ import annotations
@@ -31,7 +32,11 @@ from solver.structure.joint import Case, Joint
 @packable
 @dataclass(frozen=True)
 class Step:
-    """A state reached by a step and the folds that were jumped over in it (values of the parameter)."""
+    """End of a step.
+
+    point: the state reached.
+    folds: values of the parameter at the folds that the step has jumped over.
+    """
 
     point: PathPoint
     folds: tuple[float, ...] = ()
@@ -39,8 +44,12 @@ class Step:
 
 @dataclass(frozen=True)
 class LoadingPath:
-    """The unworn joint along its frequency (parameter: rad/s; omega: None) or, at a frequency omega, rad/s, along its
-    excitation (parameter: load factor, of excitation_amplitude, N).
+    """The unworn joint along its frequency or its excitation, which is the parameter of the path.
+
+    case: model, friction and settings.
+    excitation_amplitude: N.
+    omega: None where the parameter is the frequency, rad/s; else the fixed frequency, rad/s, and the parameter is the
+        load factor on the amplitude.
     """
 
     case: Case
@@ -59,7 +68,7 @@ class LoadingPath:
         return Balance.frozen(self.joint_at(parameter), history, unworn)
 
     def scale(self, parameter: float) -> float:
-        """What lengths of steps are relative to."""
+        """Reference value for the lengths of steps."""
         return abs(parameter) if self.omega is None else 1.0
 
     def solve(
@@ -70,19 +79,19 @@ class LoadingPath:
         budget: Budget,
         tolerance: float | None = None,
     ) -> PathPoint | None:
-        """Stable state at a value of the parameter, by Newton's method alone; None where there is none so near.
+        """Stable state at a value of the parameter by Newton's method alone; None where none is found.
 
         Parameters
         ----------
         nodes : tuple of PathPoint
-            One or two states of the branch with the same harmonics: Newton's method begins on the line through them.
-            The pairs have the tangential history of the last one.
+            One or two states of the branch with equal harmonics. Newton's method starts on the line through them. The
+            tangential history comes from the last state.
         target : float
             Value of the parameter.
         solver, budget
             As in `solve_balance`.
         tolerance : float, optional
-            Of the scaled residual; that of the settings by default.
+            Tolerance of the scaled residual, by default from the settings.
         """
         start = nodes[-1]
         joint, begin = self.joint_at(target), start.evaluation.predicted_h
@@ -104,12 +113,12 @@ class LoadingPath:
         budget: Budget,
         tolerance: float | None = None,
     ) -> Step | Outcome:
-        """Stable state at a target from the last of some nodes, by `solve` or else by `step`; or why there is none."""
+        """Stable state at a target from the last of some nodes by `solve`, or else by `step`; or why there is none."""
         point = self.solve(nodes, target, solver, budget, tolerance)
         return self.step(nodes[-1], target, solver, budget) if point is None else Step(point)
 
     def step(self, start: PathPoint, target: float, solver: JacobianSolver, budget: Budget) -> Step | Outcome:
-        """Stable state at a target from a state of the same harmonics and samples, or why there is none."""
+        """Stable state at a target from a state with equal harmonics and samples, or the reason why there is none."""
         tolerance = self.case.settings.tolerance
         start = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
         scale = self.scale(target)
@@ -125,14 +134,14 @@ class LoadingPath:
             )
             if arrived and stays(point):
                 return Step(point, tuple(folds))
-            # natural steps may have led onto an unstable part, nobody knows where: then the step begins before them
+            # natural steps may have passed the unknown start of an unstable part: then the search begins before them
             end = start if arrived else point
             span = LOADING.search_distance * scale
             arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, stays, beyond=False)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))
             if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
-                # a shorter step leads nearer to where the branch loses its stability without a fold
+                # a shorter step comes closer to the loss of stability without a fold
                 return Outcome.UNSTABLE
             landed = self._settled(end, target, arc.folds, solver, budget)
             if isinstance(landed, Outcome):
@@ -144,7 +153,7 @@ class LoadingPath:
         return Outcome.BRANCH_LOST
 
     def describe(self, point: PathPoint) -> str:
-        """Where a state lies, and how much of the joint moves in it."""
+        """Parameter of a state and number of its pairs that slip or open, in words."""
         at = f"{point.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {point.parameter:.3g}"
         moving = int(np.count_nonzero((point.evaluation.status_t != STICK).any(axis=1)))
         return f"at {at}, {moving} of {len(point.evaluation.status_t)} pairs slip or open"
@@ -152,7 +161,7 @@ class LoadingPath:
     def _settled(
         self, end: PathPoint, target: float, folds: tuple[float, ...], solver: JacobianSolver, budget: Budget
     ) -> Step | Outcome:
-        """State that the structure settles to from the end of a branch, a little beyond it towards the target."""
+        """State to which the structure settles in time from the end of a branch, a little beyond this end."""
         fine = LOADING.free_step * self.scale(end.parameter)
         beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
         joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
@@ -163,14 +172,14 @@ class LoadingPath:
         landed = PathPoint(beyond, found.evaluation, found.history)
         if vibration_change(end.evaluation, found.evaluation) <= CONTINUATION.smooth_change:
             return Step(landed)
-        # an arc that broke off behind the fold has found it all the same
+        # an arc that ended beyond the fold has found the fold all the same
         return Step(
             landed, (max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (target - end.parameter)),)
         )
 
 
 def in_rows(point: PathPoint) -> PathPoint:
-    """The same point with arrays that lie in memory as they do when they were kept: sums over them are the same."""
+    """The point with arrays in the memory layout of a saved one, so that sums over them are equal to the last bit."""
     values: dict[str, Any] = {entry.name: getattr(point.evaluation, entry.name) for entry in fields(point.evaluation)}
     lain: dict[str, Any] = {
         name: np.array(value, order="C") for name, value in values.items() if isinstance(value, np.ndarray)

@@ -1,9 +1,9 @@
-"""Unworn periodic states of a study's frequencies, each with the loading history that leads to it.
+"""Unworn periodic states at the frequencies of a study, each with the loading history that leads to the state.
 
-- "up", "down": the excitation frequency is swept slowly, as when a machine is run up or down. Along a branch that bends
-  over, the two directions find different states.
-- "ramp": the excitation is raised slowly at the frequency of the point, as when a flutter or a flow disturbance sets in
-  at speed. Every point is independent of all others.
+- "up", "down": the excitation frequency is swept slowly, as in the run-up or run-down of a machine. On a branch that
+  bends over, the two directions find different states.
+- "ramp": the excitation is raised slowly at the frequency of the point, as at the onset of flutter or of a flow
+  disturbance at constant speed. Every point is independent of all others.
 """
 
 from __future__ import annotations
@@ -35,38 +35,39 @@ def follow_branch(
     resume: Packed | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at some frequencies: index and state, one by one.
+    """Unworn periodic states at given frequencies: index and state, one by one.
 
-    A state depends on its own frequency and on no other: the sweep to it begins at a frequency that is the same for
-    all points of a quarter octave (`sweep_start`) and has steps of its own (`sweep`). Where the branch ends at a fold
-    it is followed by arc length until it reaches the next node in a stable state, which is where a slow sweep of the
-    machine would land if the branch is one curve. Where that fails, the structure is left to settle in time from the
-    last state, and at last the state is sought from the static one.
+    A state depends on its own frequency only: the sweep begins at a frequency common to all points of a quarter octave
+    (`sweep_start`) and chooses its own steps (`sweep`).
+
+    Where the branch ends at a fold, arc-length continuation follows the branch to a stable state at the next node. A
+    slow sweep of the machine would land there if the branch is one curve. Where the continuation fails, the
+    structure settles in time from the last state. The last attempt starts from the static state.
 
     Parameters
     ----------
     model, friction_coefficient
-        The case.
+        The model, and the friction coefficient of all pairs or of each pair.
     excitation_amplitude
         N.
     frequencies
         Hz, ascending.
     sweep
-        How the states are reached: "up" or "down" along the frequency, "ramp" at a fixed one.
+        Loading history: "up" or "down" along the frequency, or "ramp" of the excitation at a fixed frequency.
     settings
         Harmonics, samples, tolerances, limit of time.
     keep
-        Called now and then, after the state was taken from the iterator, with the progress of the sweep.
+        Called from time to time with the progress of the sweep, after a state was taken from the iterator.
     resume
-        Such progress of a sweep that differs in its frequencies only. Frequencies beyond those that it had passed are
-        reached from there; the states are the same to the last bit, but for `run_time`.
+        Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
+        frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     tell
-        Called with where the sweep is and what it does there, in words.
+        Called with the position and the activity of the sweep, in words.
 
     Yields
     ------
     tuple of int and StartState
-        Index of the frequency, in the order of the sweep, and its state or why there is none.
+        Index of the frequency, in the order of the sweep, and the state or the reason why there is none.
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
@@ -85,7 +86,7 @@ def follow_branch(
         except OutOfTimeError:
             found = Found(Outcome.TIME_LIMIT)
         except Exception as error:
-            # one bad point is one bad point: the sweep goes on from the state before
+            # an error spoils one point only: the sweep goes on from the state before
             found, message = Found(Outcome.EXCEPTION), describe_error(error)
         now = computing_time()
         yield (
@@ -106,7 +107,7 @@ def follow_branch(
             ),
         )
         started, counted = now, line.n_iterations
-        # a sweep that has found no state to begin with has nothing to go on from
+        # a sweep without a first state has nothing to resume
         begun = line.nodes is not None and line.nodes.saved is not None
         if keep is not None and begun and counted >= kept + LOADING.iterations_per_report:
             keep(pack((counted, line.state_dict())))

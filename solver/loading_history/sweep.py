@@ -1,17 +1,16 @@
-"""The loading history of a point: a slow sweep in steps of its own, which leave the joint as the machine would.
+"""The loading history of a point: a slow sweep with steps of its own, which leaves the joint as the machine would.
 
-Friction makes the periodic states of a joint a family. Which of them is reached depends on the tangential displacements
-at which the pairs stick, and these depend on all vibration before. A sweep therefore has nodes of its own: their
-distance is chosen by the change of the vibration from node to node, and by nothing else. A state that is asked for
-between two nodes is solved from the node before it and leaves the sweep as it is. So a point has one state, whatever
-else is asked for.
+Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one of
+them, and these displacements depend on all vibration before. So a sweep has nodes of its own, whose distance depends
+only on the change of the vibration from node to node. A state between two nodes is solved from the node before and
+leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
-The reference sweep goes beside it, in steps of twice the length and with fewer harmonics and samples where these are
-automatic; the sweep never corrects it. The error of a sweep comes from its steps: a pair that sticks from some
-frequency on keeps the history of the last node at which the pair slipped, up to one step too early. The nodes of the
-reference sweep therefore lie midway between those of the sweep: with nodes in common both would often take the history
-of a pair from one and the same node, and agree by chance. The difference of both sweeps is at least half the error of
-the finer one, and as a rule the error of the coarser one.
+The reference sweep runs beside the sweep. Its steps are twice as long, and its harmonics and samples fewer where these
+are automatic. It never corrects the sweep. The error of a sweep comes from its steps: a pair that sticks from some
+frequency on keeps the history of the last node with slip, up to one step too early. The nodes of the reference sweep
+therefore lie midway between those of the sweep. At common nodes both would often take the history of a pair from the
+same node, and agree by chance. The difference of both sweeps is at least half the error of the finer sweep, and as a
+rule the error of the coarser one.
 """
 
 from __future__ import annotations
@@ -36,35 +35,35 @@ from solver.settings import Resolution
 from solver.structure.joint import Case
 
 _FINAL = (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
-"""Ends of a transient just beyond a node, which a shorter step does not change."""
+"""Outcomes of a transient just beyond a node that a shorter step does not change."""
 
 Nodes = tuple[PathPoint, ...]
-"""The last nodes of a sweep, one or two with the same harmonics, the current one last; none where there is no state."""
+"""The last one or two nodes of a sweep, with equal harmonics, the current one last; empty where there is no state."""
 
 
 @packable
 @dataclass(frozen=True)
 class SweepState:
-    """What goes on from node to node.
+    """State of a sweep at a node, with which the sweep goes on.
 
     Attributes
     ----------
     nodes, reference : Nodes
-        Of the sweep and of the reference sweep.
+        Last nodes of the sweep and of the reference sweep.
     resolution, reference_resolution : Resolution
-        Their harmonics and samples.
+        Harmonics and samples of both sweeps.
     checked : PathPoint or None
         The node at which the harmonics were chosen.
     at_limit : bool
         Whether that node needs more harmonics than a sweep may have.
     length : float
-        Of the next step, in the unit of the parameter.
+        Length of the next step, in the unit of the parameter.
     n_nodes : int
-        Nodes since both sweeps had one in common.
+        Number of nodes since the last common node of both sweeps.
     branch, fold : int, float
-        Folds jumped over so far, and the value of the parameter at the last of them, NaN if none.
+        Number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     failure, lost_at : Outcome, float
-        Why there is no state, and the parameter of the last node before, NaN if there was none.
+        Reason why there is no state, and the parameter of the last node before, NaN if there was none.
     iterations : int
         Newton iterations so far.
     """
@@ -85,22 +84,22 @@ class SweepState:
 
 
 class NodeSweep:
-    """A sweep along the frequency (rad/s; up or down), or along the load factor for a ramp, node by node.
+    """A sweep, node by node, up or down along the frequency (rad/s), or along the load factor for a ramp.
 
     Attributes
     ----------
     state : SweepState
-        At the current node.
+        State at the current node.
     saved : SweepState or None
-        At the last node from which the sweep goes on as another one would that knows no more than this.
+        State at the last saved node. A resumed sweep that starts from this state is equal to the last bit.
     ahead : Step or None
         The next node, where it is known.
     budget : Budget
-        Newton iterations so far, and their limits.
+        Counts and limits the Newton iterations.
     """
 
     def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
-        """direction: 1 or -1, of the parameter. omega: rad/s, of a ramp; None for a sweep along the frequency."""
+        """direction: 1 or -1, sign of the steps. omega: frequency of a ramp, rad/s; None for a sweep in frequency."""
         self.path = self.reference_path = LoadingPath(case, excitation_amplitude, omega)
         self.direction = direction
         self.solver, self.reference_solver = JacobianSolver(), JacobianSolver()
@@ -110,7 +109,7 @@ class NodeSweep:
         self.ahead: Step | None = None
 
     def load_state(self, state: SweepState) -> None:
-        """Go on from what was `saved` of another sweep to the same points: the nodes follow to the last bit."""
+        """Go on from the `saved` state of another sweep; the following nodes are equal to the last bit."""
         self.saved = self.state = state
         self._take_cases(self.case.at(state.resolution), self.case.at(state.reference_resolution))
         self.budget.iterations = state.iterations
@@ -123,14 +122,14 @@ class NodeSweep:
 
     @property
     def case(self) -> Case:
-        """Harmonics and samples of the nodes."""
+        """The case with the harmonics and samples of the nodes."""
         return self.path.case
 
     def begin(self, case: Case, point: PathPoint) -> bool:
-        """Take up the first state, which has the harmonics and samples of a case; False where it is none.
+        """Take the first state, which has the harmonics and samples of a case; False where the state is rejected.
 
-        A state that more harmonics change by more than half is none: one harmonic gives a joint that slips and opens
-        all over a state that it does not have.
+        A state that more harmonics change by more than half is rejected: one harmonic can give a joint that slips and
+        opens everywhere a state that does not exist.
         """
         self._forget()
         self._take_cases(case, case)
@@ -144,17 +143,17 @@ class NodeSweep:
         return True
 
     def lose(self) -> None:
-        """The sweep ends behind the current node."""
+        """End the sweep at the current node."""
         at = self.state.lost_at if self.here is None else self.here.parameter
         self.state, self.ahead = replace(self.state, lost_at=at, nodes=(), reference=()), None
 
     def has_passed(self, parameter: float) -> bool:
-        """Whether a value of the parameter lies before the current node, or before where the sweep was lost."""
+        """Whether a value of the parameter lies before the current node, or before the end of a lost sweep."""
         last = self.state.lost_at if self.here is None else self.here.parameter
         return (parameter - last) * self.direction < 0.0
 
     def advance_to(self, parameter: float) -> None:
-        """Go on until the next node lies at or beyond a value of the parameter, or the branch is lost before it."""
+        """Go on until the next node lies at or beyond a value of the parameter, or until the branch is lost."""
         while self.here is not None:
             if self.ahead is None:
                 self.budget.tell(self.path.describe(self.here))
@@ -169,13 +168,13 @@ class NodeSweep:
             self._advance(self.ahead)
 
     def state_at(self, parameter: float, budget: Budget) -> tuple[Step | None, PathPoint | None]:
-        """State at a value of the parameter up to the next node, and that of the reference sweep; None where not found.
+        """States of the sweep and of the reference sweep at a parameter up to the next node; None where not found.
 
-        Behind a fold that the next step jumps over it is reached backwards from the next node, which has jumped.
+        A state beyond a fold is solved backwards from the next node, to which the sweep has jumped.
         """
         if self.here is None or self.ahead is None:
             return None, None
-        # nothing of this is to be seen in the sweep
+        # the sweep must not depend on this state: a solver of its own
         solver = JacobianSolver()
         beyond = [at for at in self.ahead.folds if (parameter - at) * self.direction > 0.0]
         reached: Step | Outcome = Outcome.BRANCH_LOST
@@ -195,7 +194,7 @@ class NodeSweep:
         return reached, None if isinstance(other, Outcome) else other.point
 
     def _look_ahead(self) -> Step | None:
-        """The next node: as far as the change of the vibration lets it be."""
+        """The next node, as far away as the change of the vibration allows."""
         here = self.here
         assert here is not None
         scale = self.path.scale(here.parameter)
@@ -229,12 +228,12 @@ class NodeSweep:
         return None
 
     def _node_tolerance(self) -> float:
-        """Scaled residual of a node: the states that are handed out are solved to the end."""
+        """Tolerance of the scaled residual of a node; reported states are solved to the tolerance of the settings."""
         settings = self.case.settings
         return max(settings.tolerance, LOADING.node_residual * settings.rtol)
 
     def _change(self, before: PathPoint, after: PathPoint) -> float:
-        """Change of the vibration in a step over the largest that there may be."""
+        """Change of the vibration in a step over the largest change allowed."""
         one, other = before.evaluation, after.evaluation
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), LOADING.small_vibration * float(limit))
@@ -257,7 +256,7 @@ class NodeSweep:
             fold=(self.state.fold, *step.folds)[-1],
         )
         if step.folds:
-            # behind a jump both sweeps begin anew: where the reference jumps says nothing of the steps
+            # after a jump both sweeps begin anew: the place of the jump is no measure of the error by steps
             self._begin_reference()
         elif self.state.n_nodes % 2 == 0 and self.state.reference:
             self._advance_reference(0.5 * (before.parameter + step.point.parameter))
@@ -273,7 +272,7 @@ class NodeSweep:
             self._save()
 
     def _advance_reference(self, target: float) -> None:
-        """The next node of the reference sweep; where it does not arrive, or jumps, it goes on from the sweep."""
+        """Solve the next node of the reference sweep; after a failure or a jump, begin this sweep anew."""
         last = self.state.reference
         step = self.reference_path.reach(last, target, self.reference_solver, self.budget, self._node_tolerance())
         if isinstance(step, Outcome) or step.folds:
@@ -282,7 +281,7 @@ class NodeSweep:
             self.state = replace(self.state, reference=(last[-1], step.point))
 
     def _begin_reference(self) -> None:
-        """Both sweeps are at the current node."""
+        """Begin the reference sweep at the current node of the sweep."""
         here = self.here
         assert here is not None
         case = self.case.at(fewer(self.case.resolution, self.case.settings))
@@ -294,9 +293,9 @@ class NodeSweep:
         self.state = replace(self.state, reference=(moved or here,), n_nodes=0)
 
     def _choose_resolution(self) -> float:
-        """Give the nodes the harmonics and samples that the current state needs, as far as they are automatic.
+        """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
 
-        Returns the estimated relative error of the response, 0 where it is not asked for.
+        Returns the estimated relative error of the response, 0 for fixed settings.
         """
         here = self.here
         assert here is not None
@@ -314,7 +313,7 @@ class NodeSweep:
         return refined.estimate.response
 
     def _change_case(self, case: Case) -> None:
-        """Both sweeps go on with other harmonics and samples, which the current node has already."""
+        """Give both sweeps other harmonics and samples, which the current node has already."""
         old, before = self.reference_path.case, self.state.reference
         reference = case.at(fewer(case.resolution, case.settings))
         self._take_cases(case, reference)
@@ -333,7 +332,7 @@ class NodeSweep:
         self.state = replace(self.state, resolution=case.resolution, reference_resolution=reference.resolution)
 
     def _save(self) -> None:
-        """Keep the current node: the sweep goes on as another one would that knows no more than this."""
+        """Save the current node, and drop all that a resumed sweep would not have."""
         state = self.state
         self.state = replace(
             state,
@@ -346,5 +345,5 @@ class NodeSweep:
         self.saved = self.state
 
     def _forget(self) -> None:
-        """Give up the factorisations that are kept from node to node, and the next node."""
+        """Drop the factorisations that are kept from node to node, and the next node."""
         self.solver, self.reference_solver, self.ahead = JacobianSolver(), JacobianSolver(), None

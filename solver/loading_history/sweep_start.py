@@ -1,9 +1,9 @@
-"""Where a sweep begins: a frequency that depends on the scene and on the point alone, not on the others of a study.
+"""The first frequency of a sweep, which depends on the scene and on the point but not on the other points of a study.
 
-A machine that is run up or down passes the frequencies before the point, and the joint remembers. So a sweep
-begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85
-times. It is the same for all points of a quarter octave, and it begins where the vibration loads the stuck joint least,
-so that it does not begin at a resonance.
+In a run-up or run-down a machine passes other frequencies before the point, and the joint keeps their history. So a
+sweep begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and
+1.85 times. All points of a quarter octave have one first frequency: the one at which the vibration loads the stuck
+joint least, so that no sweep begins at a resonance.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ Sweep = Literal["up", "down", "ramp"]
 @packable
 @dataclass(frozen=True)
 class Origin:
-    """Where the sweep to a point begins, all in Hz.
+    """Start of the sweep to a point.
 
-    starts: frequencies at which a first state is sought, the preferred one first; empty for "ramp", which begins at the
-    point itself. penalty: where the penalty of the contact law is taken, that of no point of the cell is lower.
-    cell: what all points have in common that are passed by the same sweep.
+    starts: frequencies at which a first state is sought, Hz, the preferred one first; empty for "ramp", which begins at
+        the frequency of the point.
+    penalty: frequency at which the penalty of the contact law is taken, Hz: the upper end of the cell.
+    cell: number of the frequency interval (cell). One sweep passes all points of a cell.
     """
 
     starts: tuple[float, ...]
@@ -44,7 +45,7 @@ def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
     if sweep == "ramp":
         return Origin((), high, cell)
     width = 2.0 ** (1.0 / LOADING.cells_per_octave)
-    # where no state is found at the quiet frequency, the edge of the cell and one nearer to the points are tried
+    # further attempts where no state is found at the quiet frequency
     near, away = (
         ((1.0 - LOADING.begin_away) * low, 1.0 / width) if sweep == "up" else ((1.0 + LOADING.begin_away) * high, width)
     )
@@ -61,6 +62,6 @@ def _quiet(model: ReducedModel, far: float, near: float) -> float:
             loads.append(float(np.linalg.norm(structure.harmonic_force)))
         except np.linalg.LinAlgError:
             loads.append(math.inf)
-    # the farthest of those that are as good: round-off must not choose
+    # of equally good frequencies the farthest: round-off must not decide
     least = min(loads)
     return next(float(at) for at, load in zip(frequencies, loads, strict=True) if load <= least * (1.0 + 1e-6))

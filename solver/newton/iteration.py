@@ -1,4 +1,4 @@
-"""Globalised semismooth Newton's method. Knows nothing of contact."""
+"""Globalised semismooth Newton's method, without any knowledge of contact."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from solver.newton.options import NEWTON
 
 
 class HasResidual(Protocol):
-    """What an evaluation must offer: its residual norm, over scales that may be held fixed, and those scales."""
+    """Required of an evaluation: the scales of its residual, and the residual norm over its own or given scales."""
 
     @property
     def scale(self) -> tuple[float, float]:
-        """Scales of the residual, in its unit."""
+        """Scales of the residual, in the unit of the residual."""
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
         """Norm of the residual, dimensionless."""
@@ -28,7 +28,12 @@ EvaluationT = TypeVar("EvaluationT", bound=HasResidual)
 
 @dataclass(frozen=True)
 class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration: the last unknown and its evaluation, whether the tolerance was met, and the iterations."""
+    """End of an iteration.
+
+    converged: whether the tolerance was met.
+    unknown, evaluation: last unknown and its evaluation; the ones of the lowest norm where not converged.
+    iterations: number of iterations.
+    """
 
     converged: bool
     unknown: FloatArray
@@ -45,9 +50,9 @@ def solve_newton(
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` until the scaled residual is below the tolerance.
 
-    The residual is piecewise smooth: a full step that raises it often ends in the piece that holds the solution, and a
-    line search at every kink takes very short steps. So full steps come first, as long as the lowest norm so far is
-    improved once in `NEWTON.full_steps` iterations; then the iteration returns to the best point and halves its steps
+    The residual is piecewise smooth. A full step that raises the residual often ends in the piece with the solution,
+    while a line search takes very short steps at every kink. So full steps come first, as long as the lowest norm is
+    improved once in `NEWTON.full_steps` iterations. Then the iteration returns to the best point and halves its steps
     until the norm decreases.
 
     Parameters
@@ -59,7 +64,7 @@ def solve_newton(
     start : array
         Unknown to begin with.
     tolerance : float
-        Of the scaled residual, dimensionless.
+        Tolerance of the scaled residual, dimensionless.
     most_iterations : int, optional
         `NEWTON.iterations` by default.
 

@@ -1,8 +1,8 @@
-"""Krylov methods for operators that are only known by their products: GMRES, and eigenvalues by Arnoldi's method.
+"""Krylov methods for operators that are only known by their products: GMRES, and Arnoldi's method for eigenvalues.
 
-Bases are orthogonalised twice: the operator may be singular, as that of a joint that slips as a whole, and one pass
-of Gram-Schmidt then leaves a basis that is not orthogonal. A right-hand side may also lie outside the range of such an
-operator: `solve_gmres` ends where it stagnates, with the least-squares solution that has no part along the null space.
+The operator may be singular, as for a joint that slips as a whole. One pass of Gram-Schmidt then leaves a basis that is
+not orthogonal, so each basis is orthogonalised twice. A right-hand side may lie outside the range of a singular
+operator: `solve_gmres` then stops at stagnation, with the least-squares solution without a part in the null space.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ Product = Callable[[FloatArray], FloatArray]
 
 @dataclass
 class Recycled:
-    """What earlier solves with an operator A say of solves with one that is nearly A.
+    """A correction from earlier solves with an operator A, for later solves with an operator near A.
 
-    A cycle of GMRES ends with `A Z = C` for as many orthonormal vectors C as it has taken products. Put in front of A,
-    the correction `E = 1 + (Z - C) C^T` makes the operator the identity on the span of C and leaves all else. The
-    corrections of several solves are one product of low rank, `E = 1 + U W^T`.
+    A cycle of GMRES ends with `A Z = C` for as many orthonormal vectors C as there were products. In front of A,
+    the correction `E = 1 + (Z - C) C^T` makes the operator the identity on the span of C and changes nothing else.
+    The corrections of several solves are one product of low rank, `E = 1 + U W^T`.
 
     - moves, images (k, n): rows of `U^T` and `W^T`.
     """
@@ -40,7 +40,7 @@ class Recycled:
         return vector + (self.images @ vector) @ self.moves
 
     def learn(self, basis: FloatArray, triangle: FloatArray, rotations: FloatArray) -> None:
-        """Take in a cycle of GMRES with A E: basis (k + 1, n), triangle (k, k) and Givens rotations (k, 2)."""
+        """Add the correction of a GMRES cycle with A E: basis (k + 1, n), triangle (k, k), Givens rotations (k, 2)."""
         size = np.abs(np.diag(triangle))
         if not size.min() > NEWTON.null_space * size.max():
             return
@@ -57,7 +57,7 @@ class Recycled:
         through = moves + (moves @ self.images.T) @ self.moves
         before = (images @ self.images.T) @ self.moves
         if len(self.moves) + len(moves) > NEWTON.recycled_directions:
-            # the oldest are those of Jacobians that have changed most
+            # the oldest corrections belong to the Jacobians that have changed most
             self.moves, self.images = through - images, images
         else:
             self.moves = np.concatenate([self.moves, through - images - before])
@@ -78,17 +78,17 @@ def solve_gmres(
     Parameters
     ----------
     product : callable
-        The operator applied to a vector (n,); it may be a little wrong.
+        The operator applied to a vector (n,), with small errors allowed.
     right : array (n,)
         Right-hand side.
     rtol : float
-        Relative residual that is wanted.
+        Wanted relative residual.
     restart, cycles : int
-        Products of one cycle, and the number of cycles. One that converges, but by wrong products, does not count.
+        Most products of one cycle, and most cycles. A cycle that converges with inexact products only does not count.
     exact : callable, optional
-        The operator itself, `product` by default; applied once a cycle.
+        The exact operator, `product` by default; applied once in a cycle.
     recycled : Recycled, optional
-        What earlier solves have left; where this one converges, its first cycle is taken in.
+        Correction of earlier solves. A converged solve adds its first cycle.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def solve_gmres(
         if n_columns == 0:
             break
         first = first or cycle
-        # where the residual is not met, a direction of the null space would only make the solution large
+        # without convergence, directions of the null space would only make the solution large
         least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
         weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
         solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
@@ -131,8 +131,9 @@ class _Cycle:
     """One cycle of GMRES after k products.
 
     - basis (k + 1, n): orthonormal.
-    - triangle (k, k), rotations (k, 2): of the QR factorisation of the Hessenberg matrix, by Givens rotations.
-    - projected (k,): the residual at the start in the terms of the triangle.
+    - triangle (k, k): triangular factor of the Hessenberg matrix.
+    - rotations (k, 2): cosine and sine of the Givens rotations to this factor.
+    - projected (k,): first residual on the basis, after the rotations.
     """
 
     basis: FloatArray
@@ -167,25 +168,25 @@ def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: f
 def ritz_values(
     product: Product, start: FloatArray, most: int, enough: Callable[[ComplexArray, FloatArray], bool] | None = None
 ) -> tuple[ComplexArray, FloatArray]:
-    """Ritz values of a real operator by Arnoldi's method; outliers of the spectrum are found first.
+    """Ritz values of a real operator by Arnoldi's method; outliers of the spectrum appear first.
 
     Parameters
     ----------
     product : callable
         The operator applied to a vector (n,).
     start : array (n,)
-        Vector to begin with.
+        First vector.
     most : int
-        Products.
+        Most products.
     enough : callable, optional
-        Whether values and residuals will do; asked every few products. By default the end is after `most`.
+        Whether values and residuals suffice, called every few products. By default there are `most` products.
 
     Returns
     -------
     values : array (k,)
-        k is the number of products, or less where the space ended before; NaN where the operator overflows.
+        k is the number of products; less where the Krylov space ended before. NaN where the operator overflows.
     residuals : array (k,)
-        Norms of `A x - value x` for their vectors of norm 1.
+        Norms of `A x - value x` for the Ritz vectors x of norm 1.
     """
     size = min(most, start.size)
     basis = np.zeros((size + 1, start.size))
@@ -212,8 +213,8 @@ def ritz_values(
 def extend_basis(basis: FloatArray, k: int, image: FloatArray, round_off: float) -> tuple[FloatArray, bool]:
     """Next vector k + 1 of an orthonormal basis (most + 1, n) from the image (n,) of vector k, in place.
 
-    Returns the components (k + 2,) of the image on the new basis, and whether nothing new was in it: less than
-    `round_off` of its length.
+    Returns the components (k + 2,) of the image on the new basis, and whether the new part of the image is round-off:
+    less than `round_off` of its length.
     """
     column = np.zeros(k + 2)
     length = np.linalg.norm(image)
@@ -232,9 +233,9 @@ def extend_basis(basis: FloatArray, k: int, image: FloatArray, round_off: float)
 
 @njit(cache=True)
 def rotate_column(column: FloatArray, rotations: FloatArray, k: int) -> bool:
-    """Column k (k + 2,) of a Hessenberg matrix to that of a triangle, in place, by Givens rotations (most, 2).
+    """Turn column k (k + 2,) of a Hessenberg matrix into one of a triangle, in place, by Givens rotations (most, 2).
 
-    The last of them is made here. False where the column is zero.
+    Rotation k is computed here. Returns False where the column is zero.
     """
     for place in range(k):
         above, below = column[place], column[place + 1]

@@ -1,6 +1,7 @@
 """Newton directions: solves with the exact Jacobian, Eqs. (16) and (17).
 
-Directly where it is small; otherwise by GMRES, preconditioned with a factorisation that is kept from solve to solve.
+A small Jacobian is factorised. A large one is solved by GMRES, with a factorisation kept from solve to solve as the
+preconditioner.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class JacobianSolver:
         return step
 
     def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Steps (n_rel, m) for two right sides; a small system is factorised once."""
+        """Steps (n_rel, m) for two right-hand sides; a small system is factorised once."""
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
         if not rows.size or rows.size * first.shape[1] > NEWTON.dense_unknowns:
@@ -63,10 +64,10 @@ class JacobianSolver:
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        Where the slip space is large it is the sign of the kept factorisation P times (-1)^k, k the number of real
-        negative eigenvalues of J P^-1. Most of these are near 1, and Arnoldi's method finds the outliers first. Where
-        they do not settle, a factorisation of this Jacobian takes the place of the kept one; where they still do not,
-        the whole slip space is factorised, unless it is too large.
+        For a large slip space, the sign is that of the kept factorisation P times (-1)^k, with k the number of real
+        negative eigenvalues of J P^-1. Most eigenvalues are near 1, and Arnoldi's method finds the outliers first.
+        Where the outliers do not converge, this Jacobian is factorised instead of the kept one. Where they still do
+        not, the whole slip space is factorised, unless it is too large.
         """
         kept = self._factor
         if kept is not None and not kept.exact:
@@ -81,16 +82,16 @@ class JacobianSolver:
         return sign if whole is None else build_slip_factor(tangent, whole).sign
 
     def _judge(self, factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
-        """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these have settled."""
+        """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these eigenvalues have converged."""
         shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
 
         def product(vector: FloatArray) -> FloatArray:
             return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
 
-        # a fixed start: the answer must not depend on what was computed before
+        # a fixed start: the result must not depend on earlier computations
         start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
         values, residuals = ritz_values(product, start, NEWTON.products, _settled)
-        # complex ones come in pairs of one real part and do not change the sign
+        # complex eigenvalues come in conjugate pairs and do not change the sign
         negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
         return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
@@ -99,7 +100,7 @@ class JacobianSolver:
         return factor
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Solution (n_rel, m) in the rows of the active pairs, with a kept factorisation while products are few."""
+        """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
         if self._factor is not None:
             products = NEWTON.exact_products if self._factor.exact else NEWTON.products
             solution, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
@@ -108,16 +109,16 @@ class JacobianSolver:
         factor = self._keep(build_factor(tangent))
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
-        # not to the end perhaps: Newton's method judges by the true residual
+        # convergence is not required: Newton's method judges by the true residual
         return self._iterate(factor, tangent, right, rtol, NEWTON.products, NEWTON.restarts)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
-        """Solution by a factorisation of this Jacobian; a second solve removes the effect of `NEWTON.neutral_shift`."""
+        """Solution by a factorisation of this Jacobian; a second solve corrects for `NEWTON.neutral_shift`."""
         rest = _passive_rows(tangent)
         right = right.copy()
         right[rest] = 0.0
         first = factor.solve(right)
-        # the rows of all other pairs follow from these
+        # the rows of all other pairs follow from the rows of the active ones
         first[rest] = 0.0
         left = right - tangent.apply(first)
         left[rest] = 0.0
@@ -147,7 +148,7 @@ class JacobianSolver:
 
         wanted = right.copy()
         wanted[rest] = 0.0
-        # preconditioned from the right, so that the residual that GMRES watches is the true one
+        # preconditioned from the right: the residual of GMRES is the true one
         solution, found = solve_gmres(product, wanted.ravel(), rtol, products, restarts, exact, self._recycled)
         return precondition(solution), found
 
@@ -166,8 +167,9 @@ def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solution of a small system, the shortest one where the matrix is singular: Newton goes on and judges by the
-    residual.
+    """Solution of a small system; for a singular matrix the shortest least-squares solution.
+
+    Newton's method goes on and judges by the residual.
     """
     try:
         solution = cast("FloatArray", np.linalg.solve(matrix, right))

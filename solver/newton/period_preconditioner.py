@@ -1,25 +1,27 @@
 """An approximate inverse of the balance's Jacobian by a march through the period, for joints that slip and open.
 
-With the state `x` of a pair (normal: the part of the predicted force that is no contact force; tangents: lambda_x of
-Eqs. (11)-(15)), which moves the pair by `x / eps`, the Jacobian maps a step `dp` to `dp + (Z_r / eps - 1) dx`. If Z_r
-were one real stiffness Z in all harmonics, this would hold sample by sample,
+The state `x` of a pair moves the pair by `x / eps`. Normal component of x: predicted force minus contact force.
+Tangential components: lambda_x of Eqs. (11)-(15). The Jacobian maps a step `dp` to `dp + (Z_r / eps - 1) dx`. If Z_r
+were one real stiffness Z in all harmonics, this equation would hold sample by sample,
 
     dp(t) + (Z / eps - 1) dx(t) = r(t),      dx(t) = A(t) dp(t) + B(t) dx(t - 1),
 
-with A and B the derivatives of the contact law at a sample, blocks of the pairs; B is the history. So
+with A and B the derivatives of the contact law at a sample with respect to dp and to the history; both have one block
+for each pair. So
 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
-is a march with one small system a sample, whatever the number of harmonics that the pairs couple. A is zero where a
-pair sticks and closed: the system has the rows of those alone that slip or are open at the sample, and the state does
-not change but where a pair does so at some sample. `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. The
-stiffness of an elastic joint hardly changes with the harmonic, except for
-resonances of the structure behind it: each adds a term of rank two, `U V^T`, to the harmonics that are near it. With T
-the march to `dp` and T_x that to `dx`, the Woodbury identity
+is a march with one small system at each sample, whatever the number of harmonics that the pairs couple. A is zero where
+a pair sticks. So the system has only the rows of pairs that slip or are open at the sample, and the state of all other
+pairs does not change. `dp = r - (Z / eps - 1) dx` follows in all harmonics at once.
+
+The stiffness of an elastic joint hardly changes with the harmonic, except near resonances of the structure: each adds a
+term of rank two, `U V^T`, to the harmonics near the resonance. With T the march to `dp` and T_x the march to `dx`, the
+Woodbury identity
 
     J^-1 r = T r - T U (1 + V^T T_x U)^-1 V^T T_x r
 
-accounts for them. The truncation of the series is neglected: its effect is smaller.
+accounts for these terms. The truncation of the series is neglected, its effect is smaller.
 """
 
 from __future__ import annotations
@@ -47,11 +49,16 @@ from solver.structure.rough_forms import SingleArray
 class SampleMarch:
     """Matrices of the march through N samples, for the n pairs that slip or are open at one of them.
 
-    pairs (n,). own (N, n, 3, 3), carried (N, n, 2, 2): A, B. coupling (n_rel, 3n): `Z / eps - 1`; columns of
-    displacements that a pair does not have are zero. row (k,): those of A that are not zero at a sample, `3 place +
-    component` with the place among `pairs`, sample by sample. first (N + 1,): where the rows of a sample begin.
-    swept (2 n k,): `A (Z / eps - 1)`, these rows, tangential columns. inverse: of `1 + A (Z / eps - 1)` in these rows
-    and columns, one sample after the other, which begin at `inverse_first` (N + 1,).
+    joint, basis: the joint, and the Fourier basis of the N samples.
+    pairs (n,): indices of these pairs.
+    own (N, n, 3, 3): A.
+    carried (N, n, 2, 2): B.
+    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
+    row (k,): nonzero rows of A, sample by sample, as `3 place + component` with the place among `pairs`.
+    first (N + 1,): index in `row` of the first row of each sample.
+    swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
+    inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
+    inverse_first (N + 1,): index in `inverse` of the first value of each sample.
     """
 
     joint: Joint
@@ -68,7 +75,7 @@ class SampleMarch:
 
     @property
     def sign(self) -> float:
-        """Sign of the product of the determinants of all samples' systems."""
+        """Sign of the product of the determinants of the systems of all samples."""
         ends = zip(self.inverse_first[:-1], self.inverse_first[1:], np.diff(self.first), strict=True)
         systems = (self.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
         return float(np.prod([np.linalg.slogdet(system)[0] for system in systems]))
@@ -94,8 +101,11 @@ class SampleMarch:
 class PeriodFactor:
     """The march, and k directions in which the harmonics differ.
 
-    seen (k, n_rel (2H+1)): `V^T`. bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`. resonance (k, k): the matrix in
-    brackets.
+    march: T and T_x.
+    seen (k, n_rel (2H+1)): `V^T`.
+    bent (n_rel (2H+1), k): `T U (1 + V^T T_x U)^-1`.
+    resonance (k, k): `1 + V^T T_x U`.
+    exact: False, for this factor is an approximation.
     """
 
     march: SampleMarch
@@ -106,11 +116,11 @@ class PeriodFactor:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of its inverse, 0 where that is singular.
+        """Sign of the determinant of the matrix that this factor inverts, 0 where the matrix is singular.
 
-        The march through one period is a product of the samples' systems, and its start, which is that of a second
-        period, does not change the determinant. That the harmonics left out do not change its sign is not known: the
-        eigenvalues of the Jacobian times this tell.
+        The determinant of the march through one period is the product of those of all samples. The start from a
+        previous period does not change this product. The truncation of the harmonics may change the sign: the
+        eigenvalues of the Jacobian times this factor decide (`JacobianSolver.determinant_sign`).
         """
         return self.march.sign * float(np.linalg.slogdet(self.resonance)[0])
 
@@ -121,7 +131,7 @@ class PeriodFactor:
 
 
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
-    """Factor of a Jacobian; None where it has none: a sample's system is singular, or pairs are marched with masses."""
+    """Factor of a Jacobian; None for pairs with sliding masses, or where the system of a sample is singular."""
     joint = tangent.joint
     if joint.penalty.inertial.any():
         return None
@@ -138,9 +148,9 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
 
 
 def build_march(tangent: Linearisation) -> SampleMarch:
-    """March of a Jacobian. Raises numpy.linalg.LinAlgError where a sample's system is singular."""
+    """March of a Jacobian. Raises numpy.linalg.LinAlgError where the system of a sample is singular."""
     joint = tangent.joint
-    # every sample costs a system: as few as tell the harmonics apart
+    # every sample costs a system: the fewest samples that resolve the harmonics
     n_samples, highest = joint.basis.n_samples, max(joint.basis.orders, default=0)
     while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
         n_samples //= 2
@@ -155,7 +165,7 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     whole[:, joint.component_index] = stiffness_of_most(joint) / joint.relative_penalty
     whole[np.arange(size), joint.component_index] -= 1.0
     coupling = np.ascontiguousarray(whole[:, components])
-    # rows of displacements that a pair does not have are zero, as their columns
+    # rows of displacements that a pair does not have are zero, like the columns
     square = np.zeros((3 * joint.contact.n_contact, components.size))
     square[joint.component_index] = coupling
     blocks = square[components].reshape(pairs.size, 3, components.size)
@@ -166,7 +176,7 @@ def build_march(tangent: Linearisation) -> SampleMarch:
         product = np.matmul(sample.reshape(-1, 1, 3)[row], blocks[row // 3])[:, 0]
         matrix = product[:, row]
         matrix[np.diag_indices(row.size)] += 1.0
-        # in single precision: the matrices are read from memory at every solve, and this is only a preconditioner
+        # single precision suffices for a preconditioner and halves the memory read in a solve
         inverse.append(np.linalg.inv(matrix.astype(np.float32)).ravel())
         swept.append(product[:, tangential].astype(np.float32).ravel())
         rows.append(row)
@@ -179,10 +189,10 @@ def build_march(tangent: Linearisation) -> SampleMarch:
 
 
 def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
-    """Low-rank difference `U V^T` of the stiffness over the penalty from that of most harmonics.
+    """Low-rank difference `U V^T`, over the penalty, of the stiffness of the harmonics to their median stiffness.
 
-    For each harmonic it has the singular values above `NEWTON.resonant_difference`, at most `NEWTON.resonances` of
-    them, found by two powers of the difference on fixed vectors: large singular values stand out.
+    For each harmonic `U V^T` holds the singular values above `NEWTON.resonant_difference`, at most `NEWTON.resonances`
+    of them, found by two power iterations of the difference on fixed vectors.
 
     Returns
     -------
@@ -193,11 +203,11 @@ def resonances(joint: Joint) -> tuple[FloatArray, FloatArray]:
 
 
 def stiffness_of_most(joint: Joint) -> FloatArray:
-    """Real stiffness (n_rel, n_rel), N/m, of most harmonics: the median ignores those near a resonance."""
+    """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
     return _stiffness_of_most(Identity(joint.structure))
 
 
-# a march asks for those of the same structures again and again
+# the marches of one history need the stiffness of a few structures only
 @lru_cache(maxsize=STRUCTURE.kept_structures)
 def _stiffness_of_most(of: Identity) -> FloatArray:
     structure = cast("CondensedStructure", of.objects[0])
@@ -225,7 +235,7 @@ def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tup
             if place == 0:
                 both[:, 0, :, 0] = force.real, motion.real
             else:
-                # an amplitude `cosine - i sine`: real and imaginary part of its product with the motion
+                # real and imaginary part of the product of an amplitude `cosine - i sine` with the motion
                 cosine, sine = 2 * place - 1, 2 * place
                 both[0, :, :, cosine], both[0, :, :, sine] = (force.real, -force.imag), (-force.imag, -force.real)
                 both[1, :, :, cosine], both[1, :, :, sine] = (motion.real, motion.imag), (motion.imag, -motion.real)
@@ -247,7 +257,7 @@ def march_samples(
     inverse_first: IntArray,
     periods: int,
 ) -> FloatArray:
-    """March through the samples of some periods, without any change of the state before the first one.
+    """March through the samples of some periods, from a state without change.
 
     Parameters
     ----------
@@ -256,7 +266,7 @@ def march_samples(
     own, carried, row, first, swept, inverse, inverse_first : array
         As in `SampleMarch`.
     periods : int
-        Times that the period is marched through; the last one counts.
+        Number of periods; the result is that of the last one.
 
     Returns
     -------

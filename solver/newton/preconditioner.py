@@ -1,11 +1,11 @@
-"""The factorisation of the balance's Jacobian that preconditions GMRES, chosen by the state.
+"""The factorisation of the Jacobian of a balance, as a preconditioner of GMRES. The choice depends on the state:
 
-- In the space in which the pairs slip or open, where that is small (`slip_preconditioner`): exact.
-- By a march through the period, where that space is large (`period_preconditioner`).
-- In the largest directions of that space, where the march does not apply: for masses on sliders, and where the system
-  of a sample is singular.
+- A small space of slip and separation is factorised exactly (`slip_preconditioner`).
+- For a large space, the factorisation is a march through the period (`period_preconditioner`).
+- Where the march does not apply, the largest directions of the space are factorised: for masses on sliders, and where
+  the system of a sample is singular.
 
-Each has the sign of the determinant of the Jacobian, or that of a matrix near it.
+Each factorisation gives the sign of the determinant of the Jacobian, or of a matrix near the Jacobian.
 """
 
 from __future__ import annotations

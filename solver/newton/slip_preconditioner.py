@@ -1,17 +1,17 @@
-"""A factorisation of the balance's Jacobian in the space in which its pairs slip or open.
+"""A factorisation of the Jacobian of a balance in the space in which the pairs slip or open.
 
-The Jacobian, Eqs. (16)-(17) in the unknown p, differs from the identity by the part of the predicted force that the
-pairs do not transmit, `S = I - d lambda/dp`, and by their motion (`Linearisation`):
+The Jacobian, Eqs. (16)-(17) in the unknown p, differs from the identity by two terms: the part of the predicted force
+that the pairs do not transmit, `S = I - d lambda/dp`, and the motion of the pairs (`Linearisation`):
 
     J = I - S + Z_r D,      D = d u/dp
 
-S and D are zero where a pair sticks all period long. Where it slips or opens for a part of the period their rank is
-low: the slip does not change throughout a phase of sticking. With an orthonormal basis V of the rows of S and D of
-each pair, `S = S V V^T` and `D = D V V^T`, so that with y = V^T x
+S and D are zero for a pair that sticks throughout the period. For a pair that slips or opens during a part of the
+period the rank of both is low: the slip does not change during a phase of sticking. With an orthonormal basis V of the
+rows of S and D of each pair, `S = S V V^T` and `D = D V V^T`. With y = V^T x, the equations
 
     (I + V^T (Z_r D V - S V)) y = V^T b,      x = b - (Z_r D V - S V) y
 
-solves `J x = b` by a matrix whose size is the sum of the ranks and whose determinant is that of J. Directions of small
+solve `J x = b`. The size of the matrix is the sum of the ranks, its determinant is that of J. Directions of small
 singular values may be left out where the factorisation is only a preconditioner.
 """
 
@@ -29,7 +29,7 @@ from solver.model import BoolArray, FloatArray, IntArray
 from solver.newton.options import NEWTON
 from solver.structure.joint import Joint
 
-# without the wrappers of scipy, which take as long as the factorisation of one pair
+# direct calls of LAPACK: the wrappers of scipy take as long as the factorisation of one pair
 _PIVOTED_QR, _ORTHOGONAL = scipy.linalg.get_lapack_funcs(("geqp3", "orgqr"), dtype=np.float64)
 
 
@@ -37,8 +37,9 @@ _PIVOTED_QR, _ORTHOGONAL = scipy.linalg.get_lapack_funcs(("geqp3", "orgqr"), dty
 class SlipSpace:
     """Orthonormal bases of the part of the predicted force that the pairs do not transmit.
 
-    pairs (n,): those with such a part. bases: for each the basis (3m, r), zero where a pair has no such displacement.
-    exact: whether nothing is left out.
+    pairs (n,): pairs with such a part.
+    bases: basis (3m, r) for each of these pairs, zero along displacements that a pair does not have.
+    exact: whether all directions are included.
     """
 
     pairs: IntArray
@@ -83,7 +84,7 @@ def _held_back_rows(tangent: Linearisation) -> tuple[IntArray, FloatArray]:
     present[joint.component_index] = True
     columns = np.repeat(present.reshape(-1, 3), m, axis=1)
     held_back = np.eye(3 * m) - tangent.force_tangent
-    # the static normal motion carries the wear, which is one more row
+    # one more row for the wear, which the static normal motion carries
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
     rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
     pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NEWTON.round_off)
@@ -91,9 +92,9 @@ def _held_back_rows(tangent: Linearisation) -> tuple[IntArray, FloatArray]:
 
 
 def _directions(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal basis (3m, r) of the rows (k, 3m) of a pair, the largest direction first, and their sizes (r,).
+    """Orthonormal basis (3m, r) of the rows (k, 3m) of a pair, the largest direction first, and the sizes (r,).
 
-    Rows that are not finite have none.
+    The basis of rows that are not finite is empty.
     """
     width = rows.shape[1]
     if not np.all(np.isfinite(rows)):
@@ -108,8 +109,11 @@ def _directions(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
 class SlipFactor:
     """Factorisation of `I + V^T (Z_r D V - S V)` with the maps to the slip space and back.
 
-    there (n, r_most, 3m): `V^T` of each pair of the space, filled up with zeros to the largest rank. kept
-    (n, r_most): which of these rows exist. back (n, 6m, r_most): `D V` and `S V`.
+    joint, space: the joint and the slip space.
+    there (n, r_most, 3m): `V^T` of each pair of the space, filled up with zeros to the largest rank.
+    kept (n, r_most): rows of `there` that are not filled up.
+    back (n, 6m, r_most): `D V` and `S V`.
+    factor: LU factors and pivots of the matrix.
     """
 
     joint: Joint
@@ -121,7 +125,7 @@ class SlipFactor:
 
     @property
     def exact(self) -> bool:
-        """Whether this is the Jacobian itself."""
+        """Whether the factorisation is that of the complete Jacobian."""
         return self.space.exact
 
     @property
@@ -130,7 +134,7 @@ class SlipFactor:
         return sign_of(self.factor)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Approximate (where `exact`: the) solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
+        """Solution (n_rel, 2H+1), approximate unless `exact`, for a right-hand side (n_rel, 2H+1)."""
         joint, pairs, m = self.joint, self.space.pairs, right.shape[1]
         if not pairs.size:
             return right.copy()
@@ -167,7 +171,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
         matrix[place : place + rank, place : place + rank] -= basis.T @ own
         place += rank
     with warnings.catch_warnings():
-        # an exactly singular matrix: Newton's method goes on and judges by the residual
+        # no warning for a singular matrix: Newton's method goes on and judges by the residual
         warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
         factor = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
     most = max((basis.shape[1] for basis in space.bases), default=0)

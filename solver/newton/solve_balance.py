@@ -1,4 +1,4 @@
-"""Newton's method on a harmonic balance, and what a computation may spend on it."""
+"""Newton's method on a harmonic balance, and the budget of a computation."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ from solver.structure.joint import Case, Joint
 
 
 def _silent(_: str) -> None:
-    """For computations of which nobody asks what they are at."""
+    """Report no progress."""
 
 
 @dataclass
 class Budget:
-    """Newton iterations of one computation, counted over all its parts.
+    """Budget of one computation with all its parts.
 
-    limit: iterations after which a branch is given up. deadline: CPU time of the thread, s, after which the whole
-    computation is. tell: called with what the computation is at, in words, as often as that changes.
+    iterations: Newton iterations so far.
+    limit: iterations after which the search along a branch ends.
+    deadline: CPU time of the thread, s, after which the whole computation ends.
+    tell: called with a description of the progress, in words, at every change.
     """
 
     iterations: int = 0
@@ -37,17 +39,17 @@ class Budget:
 
     @property
     def exhausted(self) -> bool:
-        """Whether no more steps are to be begun."""
+        """Whether the limit is passed and no new step may begin."""
         return self.iterations > self.limit
 
     def check_time(self) -> None:
-        """Raises OutOfTimeError behind the deadline."""
+        """Raise OutOfTimeError after the deadline."""
         if self.deadline < np.inf and computing_time() > self.deadline:
             raise OutOfTimeError
 
 
 class OutOfTimeError(Exception):
-    """A computation has used up its CPU time; its caller reports that as an outcome."""
+    """A computation has used up its CPU time; the caller turns this error into an outcome."""
 
 
 def solve_balance(
@@ -65,25 +67,25 @@ def solve_balance(
     balance : Balance
         The problem.
     start : array (n_rel, 2H+1)
-        Predicted force to begin with, N.
+        First predicted force, N.
     solver : JacobianSolver
         Keeps its factorisation from one solve to the next.
     tolerance : float
-        Of the scaled residual, dimensionless.
+        Tolerance of the scaled residual, dimensionless.
     budget : Budget
-        Where the iterations are counted.
+        Counts the iterations.
     most : int, optional
-        Iterations, `NEWTON.iterations` by default.
+        Most iterations, `NEWTON.iterations` by default.
 
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the budget.
+        After the deadline of the budget.
     """
 
     def direction(at: Evaluation) -> FloatArray:
         budget.check_time()
-        # no more products than the tolerance needs
+        # a direction no more accurate than the tolerance needs
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(at.scaled_residual(), tolerance))
         return solver.solve(balance.linearise(at), -at.residual, rtol)
 
@@ -93,7 +95,7 @@ def solve_balance(
 
 
 def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, budget: Budget) -> PathPoint | None:
-    """The same state with the harmonics and samples of another case (joint: of that case); None where not found."""
+    """The state with the harmonics and samples of another case; joint: of this case. None where not found."""
     balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
     result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
     if not result.converged:

@@ -1,1 +1,1 @@
-"""What the solver hands out: states, histories, loops; and from the steps of a march to the counts asked for."""
+"""The results of the solver: states, histories, fretting loops, and the verdict on a history."""

@@ -1,4 +1,4 @@
-"""Whether the contact reaches an edge of the modelled pairs at which the bodies go on: then its scar is cut off."""
+"""Detection of a cut off contact: pressure or wear at an edge of the modelled pairs at which the bodies go on."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from solver.results.options import RESULTS
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
-    """First of the counts at which a pair at an edge of the modelled contact carries load or has worn, NaN if never.
+    """First count at which a pair at an edge of the modelled contact carries load or has worn, NaN if never.
 
     Parameters
     ----------
     contact
-        The pairs; `edge` says which are at such an edge.
+        The pairs; `edge` marks those at such an edge.
     cycles
-        (n_output,), counts.
+        (n_output,), cycle counts.
     pressure, depth
         (n_output, n_contact), Pa and m, NaN at counts without a state.
     """
@@ -34,13 +34,13 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
 
 
 def judge_cut_off(history: WearHistory) -> WearHistory:
-    """A history that was computed to its end, but of a contact that is cut off, says so by its outcome."""
+    """The history, with the outcome CONTACT_CUT_OFF where it is complete but its contact is cut off."""
     if math.isnan(history.cut_off_cycle) or not history.outcome.complete:
         return history
     return replace(history, outcome=Outcome.CONTACT_CUT_OFF, message=describe_cut_off(history.cut_off_cycle))
 
 
 def describe_cut_off(cycle: float) -> str:
-    """From which count on it is cut off; inf for a final state that was found without slow time."""
+    """Sentence with the first count of a cut off contact; cycle: inf for a final state found without slow time."""
     when = "in the final state" if math.isinf(cycle) else f"at cycle {cycle:.6g}" + (" already" if cycle else "")
     return f"pairs at the edge of the modelled contact carry load or have worn {when}"

@@ -1,4 +1,4 @@
-"""Frozen results that the solver hands out."""
+"""The result classes of the solver, immutable."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from solver.settings import Resolution
 class PeriodicState:
     """One periodic state of the joint.
 
-    omega: angular frequency, rad/s. excitation_amplitude: N.
+    omega: angular frequency, rad/s.
+    excitation_amplitude: N.
     displacement_h (n_contact, 3, 2H+1): relative displacement, m, harmonics ordered 0, cos 1, sin 1, ...
-    contact_force_h (n_contact, 3, 2H+1): force that the contact takes up, N, compression positive.
-    start_history (n_contact, 2): corrected slip X_T that the state was found from, m. With it the state is reproduced;
-        the period itself ends at the slip that the next state starts from.
+    contact_force_h (n_contact, 3, 2H+1): contact force, N, compression positive.
+    start_history (n_contact, 2): corrected slip X_T at the start of the solution, m, which reproduces the state. The
+        next state starts from the slip at the end of the period.
     wear_depth (n_contact,): m.
     """
 
@@ -39,14 +40,17 @@ class PeriodicState:
 class StartState:
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
-    coarse: the state that a sweep in steps twice as long has come to, with the same harmonics and samples; None where
-    it has found none. penalty_omega: rad/s, the frequency that the penalty was taken at, the same for all points of a
-    quarter octave. resolution: harmonics and samples of the state. response_error, wear_rate_error: its estimated
-    relative errors, what the steps of the sweep leave wrong included.
-    newton_iterations and run_time (CPU seconds of the computing thread) are those spent up to this frequency.
-    branch: number of folds that the sweep has jumped over since it began; 0 on its first branch.
-    fold_frequency: Hz, the last of them; NaN if none, and for a ramp, whose folds are none of the frequency.
-    message: what an unexpected error said, see `Outcome.EXCEPTION`.
+    outcome: whether the state is a result.
+    state: the state; None where there is none.
+    penalty_omega: rad/s, frequency at which the penalty is taken, common to all points of a quarter octave.
+    resolution: harmonics and samples of the state.
+    response_error, wear_rate_error: estimated relative errors of the state, errors by the steps of the sweep included.
+    newton_iterations: iterations spent since the last frequency.
+    run_time: CPU seconds of the computing thread since the last frequency.
+    branch: number of folds that the sweep has jumped over since its start; 0 on its first branch.
+    fold_frequency: Hz, frequency of the last such fold; NaN if none. NaN for a ramp, whose folds are load factors.
+    message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came.
+    coarse: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
 
     outcome: Outcome
@@ -67,35 +71,50 @@ class StartState:
 class WearHistory:
     """A point of a study on the slow time scale, at `n_output` cycle counts.
 
-    cycles (n_output,); worn_volume (n_output,) m3; wear_rate (n_output,) m3 per cycle; wear_depth, mean_pressure (Pa),
-    slip_range (m), open_fraction (n_output, n_contact); response (n_output, n_response) complex first harmonic, m;
-    response_peak (n_output, n_response) m. Output counts that were not reached hold NaN, whole numbers 0 there.
-    last_cycle: count up to which the point was computed, whatever ended it; NaN where there is no state at all.
-    loop_displacement, m, loop_force, N (n_output, n_loops, n_phase, 3): fretting loops of the pairs asked for, as
-        `solver.results.loops.contact_loops` has them.
-    jump_cycle: first cycle count at which the branch was lost, NaN if never. cycles_to_target: count at which the wear
-        asked for was reached, NaN if never or if none was asked for; the march ends with the step that reached it.
-    worn_volume_error (n_output,): estimated relative error of the worn volume: steps with their propagation, harmonics,
-        samples and start state; 0 where nothing has worn. wear_depth_error (n_output, n_contact): the same of the
-        depths, m. error_estimate: `worn_volume_error` at the last count that was reached.
-    residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,): the
-        certificate of the states, all relative; NaN where not estimated. stable (n_output,): bool.
+    At output counts that were not reached, real values are NaN and whole numbers 0.
+
+    cycles (n_output,): cycle counts.
+    worn_volume (n_output,): m3.
+    wear_rate (n_output,): m3 per cycle.
+    wear_depth (n_output, n_contact): m.
+    mean_pressure (n_output, n_contact): Pa.
+    slip_range (n_output, n_contact): m.
+    open_fraction (n_output, n_contact): fraction of the period.
+    response (n_output, n_response): complex first harmonic, m.
+    response_peak (n_output, n_response): m.
+    last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
+    loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
+        `solver.results.loops.contact_loops`.
+    jump_cycle: first cycle count at which the branch was lost, NaN if never.
+    cycles_to_target: count at which the target of the wear was reached, NaN if never or without a target. The history
+        ends with the step that reaches the target.
+    worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
+        harmonics, samples and start state; 0 where nothing has worn.
+    wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
+    error_estimate: `worn_volume_error` at the last count that was reached.
+    residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
+        certificate of the states, all relative; NaN where not estimated.
+    stable (n_output,): bool.
     harmonics_used, samples_used (n_output,): int, 0 where there is no state.
     run_time: CPU seconds of the computing thread, start state included.
-    branch, fold_frequency: those of the start state.
-    step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf where
-        there is none.
-    oscillates: the wear rate went up and down from step to step without calming, as in an unstable explicit scheme.
-    final_method: "active_set" or "march", how the scheme "final" has found the final state; empty with the others. A
-        final state of an active set has the count inf, and nothing is known between the unworn one and it.
-    cut_off_cycle: first of the counts at which a pair at an edge of the modelled contact carries load or has worn
-        (`ContactInterface.edge`), NaN if never.
-    reference_volume (n_output,): m3, worn volume of the reference solution; NaN where it has not come to.
+    branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
+    step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
+        there is no limit.
+    oscillates: whether the wear rate went up and down from step to step without decay, as in an unstable explicit
+        scheme.
+    final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
+        other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
+        final one is known.
+    cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries load
+        or has worn, NaN if never.
+    reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
     inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
-        never. inaccurate_in, inaccurate_error: of what, and the largest error from there on.
+        never.
+    inaccurate_in: name of the inaccurate result.
+    inaccurate_error: largest error from `inaccurate_from` on.
     held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    message: what the outcome does not say by itself: an unexpected error, the cycle from which on something holds no
-        longer and the error reached; empty where there is nothing to add.
+    message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
+        reached; empty where there is nothing to add.
     """
 
     outcome: Outcome

@@ -1,11 +1,12 @@
-"""Fretting loops: force over relative displacement of a contact pair through one period, at phases of their own.
+"""Fretting loops: contact force over relative displacement of a pair through one period, at phases of their own.
 
-The force is that of the law in time (`solver.contact`), not a series: it has corners and, where a mass turns on its
-slider, jumps, and a series would overshoot there. Between the samples of the state it is interpolated linearly, so that
-it stays within the friction cone; where a phase is one of the samples it is that sample. The displacement is the series
-of the state, which is exact at any phase. Pairs whose mass is marched (`rigid_slider`) move by all harmonics, of which
-the series has the lowest: the march gives the place at the ends of its steps, and the series how it goes on between
-them.
+Force: the values of the contact law in time (`solver.contact`), linearly interpolated between the samples of the state.
+A Fourier series would overshoot at corners and at jumps, where a mass turns on its slider. The interpolated force is
+within the friction cone and equals the sample where a phase is that of a sample.
+
+Displacement: the series of the state, which is exact at any phase. A pair with a sliding mass (`rigid_slider`) moves
+with all harmonics, of which the series holds the lowest. For such a pair the integration through the period gives the
+displacement at the ends of its time steps, and the series gives the course between them.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from solver.structure.fourier import synthesis
 from solver.structure.joint import Joint
 
 LOOP_PHASES = 128
-"""Phases of a loop, equally spaced over a period, the first 0; the same whatever the samples of a state are."""
+"""Number of phases of a loop, equally spaced over a period from 0 on, whatever the number of samples of a state is."""
 
 
 def loop_phases() -> FloatArray:
@@ -27,21 +28,21 @@ def loop_phases() -> FloatArray:
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Fretting loops of some pairs of a state.
+    """Fretting loops of chosen pairs of a state.
 
     Parameters
     ----------
     joint, evaluation
         The joint and its converged state.
     pairs
-        Indices of pairs.
+        Indices of the chosen pairs.
 
     Returns
     -------
     tuple of two FloatArray
         Relative displacement, m, and contact force, N, both (n_pairs, LOOP_PHASES, 3). Components: normal, first and
-        second tangent; positive where the pair closes and in compression. A displacement that a pair does not have is
-        0, and so is the force along it but for the constant normal load.
+        second tangent; closing and compression are positive. Along a direction in which a pair has no displacement,
+        displacement and force are 0, but for a constant normal load.
     """
     chosen = list(pairs)
     orders, n_samples = joint.basis.orders, joint.basis.n_samples
@@ -52,7 +53,7 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
             # sample n lies in the middle of step n
             ends = 2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples
             beyond = evaluation.state_t[pair, :, :-1] - series[place, 1:] @ synthesis(orders, ends)
-            # the march counts from where it starts: the mean place is that of the series
+            # the march begins at an arbitrary position: the mean comes from the series
             beyond -= beyond.mean(axis=1, keepdims=True)
             displacement[place, 1:] += at_phases(beyond, 0.5)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
@@ -63,8 +64,8 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
 def at_phases(values_t: FloatArray, lead: float) -> FloatArray:
     """Values (..., LOOP_PHASES) at the phases of a loop, by linear interpolation of periodic samples (..., N).
 
-    lead: 0 where the first sample is at phase 0, 0.5 where it is half a step before. Whole numbers say where a phase
-    lies among the samples, so that one that is a sample is that sample to the last bit.
+    lead: 0 where the first sample is at phase 0, 0.5 where the first sample is half a step before.
+    The positions of the phases are whole numbers: a phase of a sample gives this sample to the last bit.
     """
     n_samples = values_t.shape[-1]
     whole, rest = np.divmod(2 * n_samples * np.arange(LOOP_PHASES) + round(2 * lead) * LOOP_PHASES, 2 * LOOP_PHASES)

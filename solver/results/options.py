@@ -1,4 +1,4 @@
-"""Tuning constants of what is reported."""
+"""Tuning constants of the reported results."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
-"""The resonance of a vibration: at which frequency its force and its motion would be a quarter of a period apart.
+"""The resonance of a vibration: the frequency at which force and motion would be a quarter of a period apart.
 
-With x and F the first harmonics of all displacements and of the excitation, `x^H` times the equation of motion (1) is
+With x and F, the first harmonics of all displacements and of the excitation, `x^H` times the equation of motion (1) is
 
-    w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F,
+    w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F.
 
-and what the motion x with its contact forces lambda would need for no part of F in phase with it is the frequency
+At the resonance w_r the motion x with its contact forces lambda needs no part of F in phase with x:
 
     w_r^2 = w^2 + Re (x^H F) / (x^H M x).
 
-Of a linear oscillator this is the natural frequency, whatever w is; of a joint that slips and opens it is that of the
-vibration as it is, a Rayleigh quotient with the contact forces of the state. It costs one product with the matrices.
+For a linear oscillator w_r is the natural frequency, whatever w is. For a joint that slips and opens w_r is a Rayleigh
+quotient with the contact forces of the state, hence the resonance of the present vibration. The cost is one product
+with the matrices.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from solver.structure.joint import Joint
 
 
 def resonance_frequency(joint: Joint, evaluation: Evaluation) -> float:
-    """w_r, rad/s, of a converged state; NaN where nothing with mass moves, or where no frequency would do."""
+    """w_r, rad/s, of a converged state; NaN where no mass moves, or where w_r^2 is not positive."""
     linear, conjugate = joint.model.harmonic_structure(1)
     mass, damping, stiffness, shape = (
         np.conj(part) if conjugate else part

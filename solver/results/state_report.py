@@ -1,4 +1,4 @@
-"""What is reported of a converged state: pressures, slip, responses, loops, its certificate."""
+"""Reported values of a converged state: pressures, slip, responses, loops, certificate."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from solver.structure.joint import Joint
 
 
 def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
-    """The frozen state that is handed on, in physical units; its arrays lie in rows, as when read from a file."""
+    """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
     at = point.evaluation
     return PeriodicState(
         omega=joint.omega,
@@ -38,10 +38,9 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 @packable
 @dataclass(frozen=True)
 class StateReport:
-    """What is reported of a state; units and shapes as in `WearHistory`, without the cycle dimension.
+    """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
-    resonance: as `resonance_frequency`, rad/s,
-    NaN where it was not asked for.
+    resonance: `resonance_frequency`, rad/s; NaN where it was not asked for.
     """
 
     wear_depth: FloatArray
@@ -65,16 +64,16 @@ def report_state(
     *,
     with_resonance: bool = False,
 ) -> StateReport:
-    """Pressures, slip and responses of a converged state; all of its slip work wears.
+    """Pressures, slip and responses of a converged state.
 
     Parameters
     ----------
     joint, evaluation, certificate
-        The joint, its state, and what this violates.
+        The joint, its state, and the certificate of the state.
     loops
-        Pairs whose fretting loops are reported, too.
+        Pairs with reported fretting loops.
     with_resonance
-        Whether the resonance of the vibration is.
+        Whether the resonance of the vibration is reported.
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))

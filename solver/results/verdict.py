@@ -1,4 +1,4 @@
-"""The outcome of a wear history and its sentence, for the history itself and for those that are read from it."""
+"""The outcome of a wear history and its sentence, for the history itself and for histories that are read from it."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from solver.results.options import RESULTS
 
 
 def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0) -> tuple[Outcome, str]:
-    """How a history that was computed to its end came out, judged by some of its counts, and a sentence about this.
+    """Outcome of a complete history, judged at some of its counts, and a sentence about the outcome.
 
     Parameters
     ----------
     history
         The history that was integrated.
     rows
-        Its counts that are judged, ascending: all of them, or those of another history that is read from it.
+        Indices of the judged counts, ascending: all counts, or those of another history that is read from this one.
     rtol
-        Relative error that was aimed at.
+        Wanted relative error.
     slower
-        Wear coefficient of the other history over that of the integrated one: its counts are so many times larger.
+        Ratio of the wear coefficients of the other and the integrated history: counts of the integrated history are
+        so many times larger.
     """
     if not rows.size:
         return Outcome.CONVERGED, ""
@@ -33,7 +34,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
         return Outcome.SENSITIVE, "; ".join((_two_volumes(history, last, error, rtol), *remarks))
-    # the count of a final state is inf, which is what never comes, too
+    # inf means "never", but is the count of a final state, too
     if math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
         said = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
@@ -42,7 +43,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
 
 
 def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> str:
-    """What a worn volume says that is hardly known: that of the history, and that of its reference solution."""
+    """Sentence about an uncertain worn volume: the values of the history and of its reference solution."""
     volume, other = 1e9 * history.worn_volume[row], 1e9 * history.reference_volume[row]
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     coarser = "with longer steps, fewer harmonics and a coarser sweep"
@@ -55,14 +56,14 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
 
 
 def _remarks(history: WearHistory, count: float, slower: float) -> list[str]:
-    """What else is to be said of a history that was computed up to a count of its own."""
+    """Further sentences about a history up to a count of its own."""
     if math.inf > history.held_from <= count:
         return [describe_hold(history.held_from / slower)]
     return []
 
 
 def describe_hold(cycle: float) -> str:
-    """From which count on a joint that slides as a whole is held."""
+    """Sentence with the count from which on a joint that slides as a whole is held."""
     return (
         f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
         f" position is held there, by at most {RESULTS.held_force:g} of the friction"

@@ -1,1 +1,1 @@
-"""Wear on slow time: the march, Euler and BDF2 steps, step limits, loss of a branch, and the error of it all."""
+"""Wear on the slow time scale: integration by Euler and BDF2 steps, step limits, loss of a branch, estimated errors."""

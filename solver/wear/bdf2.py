@@ -36,7 +36,8 @@ from solver.wear.wearing_joint import WearingJoint
 class Attempt:
     """A BDF2 step that was solved.
 
-    point: its end. error (n_contact,): local error of the depth, m, as signed.
+    point: end of the step.
+    error (n_contact,): local error of the depth with its sign, m.
     """
 
     point: PathPoint
@@ -44,7 +45,7 @@ class Attempt:
 
 
 def bdf2_attempt(work: WearingJoint, state: WearState, length: float) -> Attempt | None:
-    """A step of the backward differences of second order (`solver.wear.bdf2`); None where its end is not found."""
+    """One BDF2 step of `length` cycles; None where its end is not found."""
     joint, depth, rate = work.at(state), state.depth, work.rate(state.point.evaluation)
     base, factor, grown, ratio = depth, 1.0, np.zeros_like(depth), 0.0
     if state.previous is not None:

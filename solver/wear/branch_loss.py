@@ -1,4 +1,4 @@
-"""The branch of a joint that wears has ended: the stable state beyond, at which the vibration goes on."""
+"""The stable state beyond the end of a branch, at which the vibration of a wearing joint goes on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from solver.wear.euler import held_wear
 
 
 def is_stable_when_held(joint: Joint, evaluation: Evaluation, solver: JacobianSolver) -> bool:
-    """Whether a state is stable with its wear held."""
+    """Whether a state is stable at fixed wear depth."""
     held = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
     return is_stable(held.linearise(evaluation), solver)
 
@@ -24,13 +24,15 @@ def is_stable_when_held(joint: Joint, evaluation: Evaluation, solver: JacobianSo
 def state_after_fold(
     case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
 ) -> PathPoint | Outcome:
-    """A stable state at the depths `worn` (n_contact,), m, just beyond the end of the branch of `last`; why there is
-    none. Raises OutOfTimeError.
+    """A stable state just beyond the end of the branch of `last`, or the reason why there is none.
+
+    worn (n_contact,): wear depth of this state, m.
+    Raises OutOfTimeError.
     """
     for landed in states_after_fold(case, joint, last, worn, solver, budget):
         if isinstance(landed, Outcome):
             return landed
-        # a walk along the frequency has not moved the depth: it has to hold beyond the end of the old branch
+        # a search along the frequency keeps the old depth: the state has to exist at the depths `worn`, too
         balance_at = held_wear(joint, landed.evaluation.wear_depth, worn)
         start = PathPoint(0.0, landed.evaluation, landed.history)
         point, arrived = follow_naturally(

@@ -1,4 +1,4 @@
-"""Whether a state of a wearing joint may be reported: certificate, harmonics and samples, stability."""
+"""Check of a state of a wearing joint before it is reported: certificate, harmonics and samples, stability."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from solver.wear.wearing_joint import WearingJoint
 
 @dataclass(frozen=True)
 class Checked:
-    """A state that may be reported, possibly with other harmonics than before the check, and what is reported of it."""
+    """A state that passed the check, possibly with other harmonics than before, and its report."""
 
     state: WearState
     report: StateReport
@@ -34,23 +34,23 @@ class Checked:
 
 @dataclass(frozen=True)
 class FullCheck:
-    """The check of a history that is handed out.
+    """The check of a reported history.
 
-    loops: pairs whose fretting loops are reported.
-    with_resonance: whether the resonance of the vibration is.
+    loops: pairs with reported fretting loops.
+    with_resonance: whether the resonance of the vibration is reported.
     """
 
     loops: tuple[int, ...] = ()
     with_resonance: bool = False
 
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
-        """The state with its report, or why it is none. Raises OutOfTimeError, LinAlgError."""
+        """The state with its report, or the reason of a rejection. Raises OutOfTimeError, LinAlgError."""
         anew = chosen_for_another(work, state)
         if anew:
             state = choose_anew(work, state)
         checked = self._report(work, state)
         if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
-            # more harmonics or samples may be all that the state needs
+            # more harmonics or samples may suffice
             state, anew = choose_anew(work, state), True
             checked = self._report(work, state)
         if isinstance(checked, Failure):
@@ -66,7 +66,7 @@ class FullCheck:
         return replace(checked, state=state)
 
     def _report(self, work: WearingJoint, state: WearState) -> Checked | Failure:
-        """Report with certificate, whose errors are those for which the harmonics were chosen."""
+        """Report with certificate; its estimated errors come from the last choice of the harmonics."""
         joint, at, estimate = work.at(state), state.point.evaluation, state.choice.estimate
         certificate = replace(
             certify(joint, at),
@@ -80,22 +80,22 @@ class FullCheck:
 
 @dataclass(frozen=True)
 class PlainCheck:
-    """The check of a reference solution: none but that its harmonics follow those of the history.
+    """No check, for a reference solution: its harmonics only follow a given schedule.
 
-    resolutions: count from which on, harmonics and samples, ascending by count; the first count is 0.
+    resolutions: cycle count from which on a resolution holds, and this resolution; ascending counts, the first 0.
     """
 
     resolutions: tuple[tuple[float, Resolution], ...]
 
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
-        """The state, with the harmonics wanted at its count where it is found with them."""
+        """The state with the harmonics wanted at its count, or unchanged where no such state is found."""
         wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
         state = with_harmonics(work, state, wanted) or state
         return Checked(state, report_state(work.at(state), state.point.evaluation, NOT_CERTIFIED))
 
 
 def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:
-    """The state with other harmonics and samples; None where it is not found."""
+    """The state solved with other harmonics and samples; None where it is not found."""
     if resolution == state.resolution:
         return state
     work.at(state)
@@ -106,10 +106,10 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
-    """Whether harmonics and samples were chosen for a state so different that they are to be chosen again.
+    """Whether the state differs so much from the last choice of harmonics and samples that a new choice is necessary.
 
-    What of the contact force is left out grows with the error of the state. So harmonics are chosen again where this
-    part has grown so much that the error may be above rtol, and where it has become so small that fewer may do.
+    The part of the contact force in harmonics that are left out grows with the error of the state. A new choice is
+    necessary where this part is so large that the error may be above rtol, or so small that fewer harmonics may do.
     """
     choice, at, settings = state.choice, state.point.evaluation, work.case.settings
     if not settings.automatic:
@@ -120,7 +120,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
     if not np.isfinite(error):
         return _vibrates_otherwise(state)
     if error == 0.0:
-        # chosen for a joint in which nothing slips or opens
+        # the last choice was for a joint without slip and separation
         return now > ACCURACY.asymmetric_force
     if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
@@ -128,7 +128,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
-    """Whether the vibration is another one than that whose stability was judged last."""
+    """Whether the vibration differs from the vibration of the last stability check."""
     if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
         return True
     before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
@@ -136,7 +136,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
 
 
 def choose_anew(work: WearingJoint, state: WearState) -> WearState:
-    """The state with the harmonics and samples that it needs."""
+    """The state with harmonics and samples chosen anew."""
     work.at(state)
     refined = refine(
         work.case, work.omega, work.excitation_amplitude, state.point, work.budget, usual_work=work.usual_work
@@ -148,9 +148,9 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState:
 
 
 def _note_accuracy(state: WearState) -> WearState:
-    """With the count from which on the harmonics no longer suffice."""
+    """The state with the count from which on its harmonics do not suffice, and with the largest error since."""
     estimate = state.choice.estimate
-    # NaN where harmonics and samples are given and no state with others was found to compare with
+    # NaN for given harmonics and samples, where no state with others was found for a comparison
     known = not np.isnan(estimate.largest)
     if state.choice.accurate and known:
         return state
@@ -161,16 +161,16 @@ def _note_accuracy(state: WearState) -> WearState:
 
 
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
-    """Why the vibration does not stay at a state by its multipliers; every: as in `find_instability`."""
+    """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
     joint = work.at(state)
     unstable = find_instability(work.case, joint, state.point.evaluation, work.budget, every)
     return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
 
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
-    """Why the vibration does not stay at the last state of a history; None where it does."""
+    """Instability of the last state of a history, None if stable."""
     joint, at = work.at(state), state.point.evaluation
-    # of a joint that is free to slide the determinant is zero, and its sign round-off
+    # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not is_stable_when_held(joint, at, work.solver):
         return Failure(Outcome.UNSTABLE)
     return _multipliers(work, state, every=True)

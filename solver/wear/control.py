@@ -1,6 +1,6 @@
-"""Lengths of the steps on the slow time scale: given, by the largest depth, growing, by the local error, or of a list.
+"""Lengths of the steps on the slow time scale: given, growing, by the largest depth, or by the local error.
 
-A control takes a state and gives a step, or a failure. The length of the next step is kept in the state.
+A control takes a state and gives a step or a failure. The state keeps the length of the next step.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from solver.wear.wearing_joint import WearingJoint
 
 
 class Control(Protocol):
-    """What plans the steps of an integration."""
+    """Plans the steps of an integration."""
 
     def begin(self, work: WearingJoint, state: WearState, /) -> WearState:
         """The unworn state with the length of its first step."""
@@ -33,13 +33,13 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class GivenSteps:
-    """Euler steps of one length, or explicit ones by the largest-depth rule, Eq. (22).
+    """Euler steps of one length, or explicit Euler steps by the largest-depth rule, Eq. (22).
 
     scheme: "explicit" or "implicit".
     length: h, cycles.
-    end: last cycle count, which the last step is shortened to. Without end (inf) steps grow so that each wears as much
-        as the first one, at most to twice the last one.
-    largest_depth: m, which the deepest pair may wear in a step; None where `length` holds.
+    end: last cycle count, at which the last step ends. Without an end (inf) steps grow so that each wears as much as
+        the first one; a step is at most twice as long as the one before.
+    largest_depth: m, wear of the fastest pair in an explicit step; None for steps of `length`.
     """
 
     scheme: Scheme
@@ -59,7 +59,7 @@ class GivenSteps:
             planned = min(WEAR.largest_step_ratio * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
-        # a remainder below round-off of the count is no step of its own
+        # no extra step for a remainder below the round-off of the count
         reach = self.end if state.cycle + planned >= self.end * (1.0 - 1e-12) else state.cycle + planned
         return bounded_euler_step(work, replace(state, length=planned), reach - state.cycle, self.scheme)
 
@@ -68,9 +68,10 @@ class GivenSteps:
 class AdaptiveSteps:
     """BDF2 steps with a relative error of the worn volume near `rtol`.
 
-    The steps know neither the last cycle count nor the wear coefficient but through `k_w h`. They go beyond the last
-    count, which is interpolated, and histories that differ in k_w alone take equal steps.
+    The steps depend neither on the last cycle count, which is interpolated, nor on the wear coefficient alone, but on
+    `k_w h`. So histories that differ in k_w only take equal steps in `k_w h`.
 
+    rtol: relative error of the worn volume.
     bounded: whether a step that moves many times the normal forces is refused.
     """
 
@@ -83,15 +84,15 @@ class AdaptiveSteps:
         fastest, length = float(work.rate(at).max(initial=0.0)), 1.0
         if fastest > 0.0:
             moved = float(np.abs(at.displacement_h[:, :, 1:]).max())
-            # the limit is far off where next to nothing slips
+            # the limit is no bound where almost nothing slips
             length = min(WEAR.first_step * state.step_limit, WEAR.first_depth * moved / fastest)
         return replace(state, length=length, first_length=length)
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
-        """One step that is accurate enough.
+        """One step within the allowed error.
 
-        Steps are not cut below half the length to which the end of a branch is known. Where the vibration changes over
-        a step of that length, or none is found, an Euler step finds out whether the branch ends there.
+        The shortest step is half of the accuracy to which the end of a branch is located. Where the vibration changes
+        much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there.
         """
         length = state.length
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
@@ -102,7 +103,7 @@ class AdaptiveSteps:
                 size = float(np.abs(tried.error) @ work.area)
                 ratio = size / self._allowed(work, state, tried.point.evaluation.wear_depth, length)
                 wanted = WEAR.step_safety / np.sqrt(max(ratio, 1e-12))
-                # down there the wear rate has a corner, or the branch ends, which shows in the vibration
+                # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 calm = vibration_change(state.point.evaluation, tried.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
                     ahead = length * float(np.clip(wanted, WEAR.refused_step_ratio, WEAR.largest_step_ratio))
@@ -115,7 +116,7 @@ class AdaptiveSteps:
             length = max(shorter * length, 0.999 * shortest)
 
     def _allowed(self, work: WearingJoint, state: WearState, depth: FloatArray, length: float) -> float:
-        """Error of a step that is accurate enough, m3; depth (n_contact,): at its end, m."""
+        """Allowed error of a step, m3; depth (n_contact,): at the end of the step, m."""
         worn, before = float(depth @ work.area), float(state.depth @ work.area)
         at_mean_rate = worn * length / (state.cycle + length)
         return max(WEAR.step_error_fraction * self.rtol * max(worn - before, at_mean_rate), 1e-300)

@@ -1,4 +1,4 @@
-"""What an Euler step is solved for: the balance at a fraction of it, with depths that are given or that grow."""
+"""The balance of an Euler step, at any fraction of the step: with given depths, or with depths that grow."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solver.structure.joint import Joint
 
 
 def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
-    """Depths (n_contact,), m, held: from `before` at fraction 0 of the step to `after` at 1, Eqs. (20), (23)."""
+    """Balance at given depths (n_contact,), m, linear from `before` to `after` over the step, Eqs. (20), (23)."""
 
     def balance_at(fraction: float, history: FloatArray) -> Balance:
         return Balance.frozen(joint, history, before + fraction * (after - before))
@@ -21,9 +21,10 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
 
 
 def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray, wearing: WearingWork) -> BalanceAt:
-    """Depths that grow by `gain` (n_contact,), m/J, times the wearing work of the state sought, Eqs. (24) to (26).
+    """Balance with growth of the depths by `gain` times the wearing work of the new state, Eqs. (24) to (26).
 
-    gain: `archard.wear_gain` of the whole step.
+    before (n_contact,): depths at the start of the step, m.
+    gain (n_contact,): `archard.wear_gain` of the whole step, m/J.
     """
 
     def balance_at(fraction: float, history: FloatArray) -> Balance:
@@ -35,25 +36,25 @@ def implicit_wear(joint: Joint, before: FloatArray, gain: FloatArray, wearing: W
 def euler_balance(
     joint: Joint, scheme: Scheme, before: Evaluation, length: float, wear_coefficient: float, wearing: WearingWork
 ) -> BalanceAt:
-    """What a step from a state is solved for: Eqs. (20), (23) if explicit, else Eqs. (24) to (26).
+    """Balance of a step from a state: Eqs. (20), (23) for the explicit scheme, else Eqs. (24) to (26).
 
     Parameters
     ----------
     joint, before
         The joint and its state at the start of the step.
     scheme
-        The adaptive scheme takes implicit Euler steps.
+        "explicit", "implicit", or "adaptive" for an implicit Euler step.
     length
         h, cycles.
     wear_coefficient
         k_w, 1/Pa.
     wearing
-        What of the slip work wears.
+        Part of the slip work that wears.
 
     Returns
     -------
     BalanceAt
-        The balance at a fraction of the step, for a start history.
+        The balance at a fraction of the step and for a tangential history.
     """
     area, depth = joint.contact.area, before.wear_depth
     if scheme == "explicit":

@@ -1,14 +1,16 @@
-"""A joint that slides all over: what holds its mean position where its structure does not.
+"""A joint that slides as a whole: a soft hold of its mean position in the direction without stiffness.
 
-A root in a prismatic slot is held along it by friction alone. Where every pair slips at some time of the period,
-nothing remembers the mean position along the slot: the Jacobian is singular, and the mean friction along this direction
-has to be zero by itself. It is, where the joint is symmetric; but pairs that have worn unequally, if only by 1e-5 of
-their depth, leave a small force (dovetail, friction 0.3, 1 N: up to 5e-7 of the friction). Strictly no periodic state
-is left: the root creeps. A force g over the friction F turns the directions of slip by g / F, so that it moves
-by about g / F of its slip path in a period, some 1e-12 m here, while motion and wear change by g / F at most.
+Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
+the mean position along the slot: the Jacobian is singular, and the mean friction along the slot has to be zero.
 
-So a soft spring holds the mean position from there on, and what it holds is what drives the creep. Where that is no
-longer next to nothing there is no periodic state in earnest: ADRIFT.
+- In a symmetric joint the mean friction is zero.
+- Pairs with unequal wear, even by 1e-5 of their depth, leave a small force g (dovetail, friction 0.3, 1 N: up to 2e-6
+  of the friction F). Strictly, no periodic state exists: the root creeps. The force turns the directions of slip by
+  g / F. So the root moves by about g / F of its slip path in a period, here 1e-12 m, and motion and wear change by
+  g / F at most.
+
+So a soft spring holds the mean position from there on. Its force is the force g that drives the creep. Where g / F is
+no longer negligible there is no periodic state, and the outcome is ADRIFT.
 """
 
 from __future__ import annotations
@@ -31,13 +33,14 @@ from solver.wear.options import WEAR
 
 
 def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
-    """Hold of the mean position of a state, where every pair slips at some time and the structure is free to slide in
-    one direction; None elsewhere.
+    """Hold of the mean position of a state.
+
+    None unless every pair slips at some time and the structure is free to slide in one direction.
     """
     if (at.status_t == STICK).all(axis=1).any() or joint.penalty.inertial.any():
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
-    # spin softening may leave small negative ones
+    # spin softening may give small negative eigenvalues
     free = np.abs(stiffness) < WEAR.free_stiffness * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
@@ -48,7 +51,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
 
 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
-    """Whether a hold takes up so much that the joint would not stay where it is held."""
+    """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.friction_coefficient @ at.force_h[:, 0, 0])
     return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > RESULTS.held_force * friction
 
@@ -58,7 +61,7 @@ def held_on(
 ) -> tuple[Hold, PathPoint] | None:
     """The hold of a joint, and the held state at the depths `worn` (n_contact,), m, just beyond the last state.
 
-    None where the joint does not slide all over, or where the vibration beyond is another one: then a branch has ended.
+    None where the joint does not slide as a whole, or where the vibration changes: then a branch has ended.
     """
     hold = free_slide(joint, last.evaluation)
     if hold is None:

@@ -1,4 +1,4 @@
-"""One wear history: integrated over the slow time, held against its reference solution, and judged."""
+"""One wear history: integration over the slow time, comparison with the reference solution, outcome."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ def integrate_wear(
     Parameters
     ----------
     model, friction_coefficient, settings, start
-        The case, and the unworn state that the history starts from.
+        The case, and the unworn state at the start of the history.
     asked
-        What is computed.
+        Scheme, counts and wear law of the history.
     keep
-        Called now and then with the progress.
+        Called from time to time with the progress.
     resume
-        Such progress of a history with equal arguments, from which this one goes on: the result is the same to the last
-        bit, but for `run_time`.
+        Progress, as given to `keep`, of a history with equal arguments, which goes on from there. The result is equal
+        to the last bit, except `run_time`.
 
     Returns
     -------
     WearHistory
-        As far as it was computed; its outcome says how it ended. No error is raised for a history that fails.
+        The history as far as computed, with its outcome. A history that fails raises no error.
     """
     if start.state is None:
         return _without_state(model, start, asked)
@@ -62,7 +62,7 @@ def integrate_wear(
             _without_state(model, failed, asked), newton_iterations=start.newton_iterations + fine.iterations
         )
     reference = None
-    # of a joint that takes no step the errors of its start state are known
+    # without a step the errors of the start state suffice
     stepped = len(fine.output.course.ends) > 1
     if stepped and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
         reference = solutions.reference(fine)
@@ -77,7 +77,7 @@ def integrate_wear(
 
 
 def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> WearHistory:
-    """What is handed out, from the outputs of a history and of its reference solution."""
+    """The result, from the outputs of a history and of its reference solution."""
     start, asked, model, state = solutions.start, solutions.asked, solutions.case.model, fine.state
     assert state is not None
     counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
@@ -108,12 +108,12 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         last_cycle=min(last, float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
-        # adaptive steps go beyond the end
+        # adaptive steps go beyond the last count
         jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
         cycles_to_target=target if target <= asked.end else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
-        # what alternates with the other schemes are small corners of the wear rate, not the steps
+        # other schemes are stable: only small corners of the wear rate alternate there
         oscillates=asked.scheme == "explicit" and state.rates.oscillate(WEAR.oscillation_round_off * state.most_rate),
         inaccurate_from=state.inaccurate_from,
         inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
@@ -123,7 +123,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
 
 
 def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str, Any]) -> dict[str, Any]:
-    """Values of the reference solution at counts, NaN at all counts where there is none; like: those of the history."""
+    """Values of the reference solution at counts, NaN where there is none; like: values of the history."""
     found = {} if output is None else output.read(counts)
     if found:
         return found
@@ -135,7 +135,7 @@ def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str,
 
 
 def _without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> WearHistory:
-    """History of a point whose start state there is not, or is none: NaN everywhere."""
+    """History of a point without a valid start state: NaN everywhere."""
     counts = np.zeros(asked.cycles.n_outputs) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
     own = no_output(counts.size, model.contact.n_contact, len(model.response_names), len(asked.loops))
     nothing = own["wear_rate"]

@@ -1,4 +1,4 @@
-"""The loop over the slow time: step, jump where the branch ends, check, keep, save."""
+"""The loop over the slow time: step, jump where the branch ends, check, output, save."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from solver.wear.wearing_joint import WearingJoint
 T = TypeVar("T")
 
 Check = Callable[[WearingJoint, WearState], Checked | Failure]
-"""Whether a state may be kept, and what is reported of it."""
+"""Function that checks a state and reports it, or gives the reason of a rejection."""
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:
-    """What is computed, or the error that broke it off as a failure."""
+    """Result of a computation, or its error as a failure."""
     try:
         return compute()
     except np.linalg.LinAlgError:
@@ -36,21 +36,21 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
     except OutOfTimeError:
         return Failure(Outcome.TIME_LIMIT)
     except Exception as error:
-        # one bad point is one bad point: the study goes on
+        # an error spoils one point only: the study goes on
         return Failure(Outcome.EXCEPTION, describe_error(error))
 
 
 class Stop(Protocol):
-    """What ends an integration after a state; None goes on."""
+    """Decides after each state whether the integration ends."""
 
     def __call__(self, work: WearingJoint, state: WearState, output: DenseOutput) -> Failure | None:
-        """An end as it should be has the outcome CONVERGED."""
+        """None to go on, else the end; a regular end has the outcome CONVERGED."""
 
 
 @packable
 @dataclass(frozen=True)
 class Progress:
-    """Where an integration is: all that it goes on from. n_steps: steps so far."""
+    """Progress of an integration, from which the integration goes on. n_steps: steps so far."""
 
     state: WearState
     n_steps: int
@@ -58,14 +58,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Integration:
-    """What an integration is made of.
+    """An integration over the slow time, and its parts.
 
     control: plans the steps.
-    check: judges each state.
+    check: checks each state.
     stop: ends the integration.
-    output: takes the states.
-    save: called with the progress now and then.
-    most_iterations: Newton iterations beside `step_iterations` for each step, after which the history leads nowhere.
+    output: stores the states.
+    save: called from time to time with the progress.
+    most_iterations: most Newton iterations, in addition to `step_iterations` for each step.
     bounded: whether a jump that moves many times the normal forces is refused.
     """
 
@@ -78,7 +78,7 @@ class Integration:
     bounded: bool = True
 
     def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
-        """Check and keep the first state."""
+        """Check and store the first state."""
         checked = self.check(work, state)
         if isinstance(checked, Failure):
             return checked
@@ -86,7 +86,7 @@ class Integration:
         return Progress(self.control.begin(work, checked.state), 0)
 
     def run(self, work: WearingJoint, progress: Progress) -> tuple[WearState, Failure]:
-        """Steps until the end: the last state and how the integration ended."""
+        """Integrate to the end: last state and reason of the end."""
         state, n_steps, saved = progress.state, progress.n_steps, work.budget.iterations
         while (ended := self.stop(work, state, self.output)) is None:
             n_steps += 1
@@ -97,7 +97,7 @@ class Integration:
                 return state, after
             state = after
             if work.budget.iterations >= saved + WEAR.iterations_per_save:
-                # with or without anybody who keeps the progress, so that all histories go on from equal numbers
+                # done in every history, so that an interrupted one gives equal numbers
                 state, saved = in_rows(state), work.budget.iterations
                 work.drop_factor()
                 self.save(Progress(state, n_steps))
@@ -111,7 +111,7 @@ class Integration:
         if step.arrived:
             return self._kept(work, step.state, step.error)
         if step.state.cycle > state.cycle:
-            # what was reached of the step is a state, too
+            # the last state before the end of the branch counts, too
             reached = self._kept(work, step.state, step.error)
             if isinstance(reached, Failure):
                 return reached
@@ -120,7 +120,7 @@ class Integration:
         return landed if isinstance(landed, Failure) else self._kept(work, landed, 0.0)
 
     def _kept(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
-        """A state that has been checked and taken by the output."""
+        """Check a state and store it in the output."""
         checked = self.check(work, state)
         if isinstance(checked, Failure):
             return checked

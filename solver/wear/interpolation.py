@@ -19,19 +19,19 @@ def depth_within(
 ) -> FloatArray:
     """Worn depth within a step.
 
-    Linear, or smooth: Hermite's cubic with slopes that are cut so that wear never falls; a cubic is monotone where both
-    slopes are at most three times the mean one (Fritsch and Carlson 1980).
+    Linear, or a cubic Hermite polynomial. The slopes of the cubic are limited so that the depth never falls: a cubic is
+    monotone where both slopes are at most three times the mean slope (Fritsch and Carlson 1980).
 
     Parameters
     ----------
     fraction
-        (n,), of the step.
+        (n,), fractions of the step.
     length
-        Of the step, cycles.
+        Length of the step, cycles.
     before, after
         Depth, m, and wear rate, m per cycle, both (n_contact,), at the ends of the step.
     smooth
-        Whether the cubic is taken.
+        True for the cubic, False for the line.
 
     Returns
     -------
@@ -48,17 +48,19 @@ def depth_within(
 
 
 def bent_within(grown: FloatArray, length: float, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the depth at both ends of a step of `length` cycles, over the step, m; none so steep that it falls.
+    """Slopes of the cubic at both ends of a step, times its length, m, limited so that the depth never falls.
 
-    grown: depth that the step wears, m. first, last: wear rates at its ends, m per cycle. All (n_contact,).
+    grown (n_contact,): growth of the depth over the step, m.
+    length: length of the step, cycles.
+    first, last (n_contact,): wear rates at the ends of the step, m per cycle.
     """
     return np.minimum(first * length, 3.0 * grown), np.minimum(last * length, 3.0 * grown)
 
 
 def fraction_where(value: float, volume: Callable[[float], float]) -> float:
-    """Fraction of a step at which a function of the fraction that never falls comes to a value.
+    """Fraction of a step at which a monotone function of the fraction reaches a value.
 
-    volume: the function, at 1 at least the value.
+    volume: the function, never falling; 0 or 1 is returned for a value beyond its ends.
     """
     if volume(0.0) >= value or volume(1.0) <= value:
         return 0.0 if volume(0.0) >= value else 1.0

@@ -1,4 +1,4 @@
-"""The branch of the vibration has ended while the joint wears: on to a stable state a little beyond."""
+"""A jump: from the end of the branch of the vibration to a stable state a little beyond, while the joint wears."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from solver.wear.wearing_joint import WearingJoint
 
 
 def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failure:
-    """A stable state a little beyond the end of the branch that a step has come to.
+    """A stable state a little beyond the end of the branch that a step has reached.
 
-    The state beyond is that of a joint whose mean position is held, where the branch ends because the whole joint
-    slips (`free_slide`); else another branch (`branch_loss`).
+    Where the branch ends because the joint slides as a whole, the state has a hold of the mean position (`free_slide`).
+    Otherwise the state belongs to another branch (`branch_loss`).
 
     bounded: whether a jump that moves many times the normal forces is refused.
     """
@@ -41,7 +41,7 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
 
 
 def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
-    """The vibration with the mean position of the joint held; None where the joint does not slide as a whole."""
+    """The state with a hold of the mean position; None where the joint does not slide as a whole."""
     if state.hold is not None:
         return None
     found = held_on(work.case, work.at(state), state.point, worn, work.solver, work.budget)
@@ -57,7 +57,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     if not isinstance(landed, PathPoint):
         return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     if vibration_change(state.point.evaluation, landed.evaluation) <= WEAR.jump_change:
-        # a corner at which the branch folds back a little is no jump, and there may be many corners
+        # a small fold of the branch at a corner is no jump, and there may be many corners
         return replace(state, point=landed)
     first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
     return replace(state, point=landed, jump_cycle=first)

@@ -1,4 +1,4 @@
-"""Tuning constants of the integration over the slow time: steps, their limits, loss of a branch, output."""
+"""Tuning constants of the integration over the slow time: steps and their limits, loss of a branch, output."""
 
 from __future__ import annotations
 
@@ -7,117 +7,121 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class WearOptions:
-    """Lengths and limits; each with its meaning, unit (none: a ratio) and the evidence for its value."""
+    """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
     # adaptive steps
     step_error_fraction: float = 0.5
-    """Of rtol: error of a step over what it has worn, or would have worn at the mean rate so far."""
+    """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
+    rtol."""
     largest_step_ratio: float = 2.0
-    """Of two steps; BDF2 is zero-stable below 1 + sqrt(2)."""
+    """Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2)."""
     smallest_step_ratio: float = 0.25
-    """By which a step is cut whose end was not found; one that was refused is not cut by more."""
+    """Factor on a step whose end was not found, and smallest factor on a step that was refused."""
     step_safety: float = 0.85
-    """Of the length at which the error would be the one allowed."""
+    """Length of a step over the length with the allowed error."""
     refused_step_ratio: float = 0.8
-    """A step that was refused is cut by at least so much, one that was taken by at most."""
+    """Largest factor on a step that was refused, and smallest factor from an accepted step to the next."""
     first_step: float = 0.05
-    """Of the explicit step limit: length of the first step, before anything is known of its error."""
+    """Length of the first step, whose error is not known, as a fraction of the explicit step limit."""
     first_depth: float = 0.01
-    """Of the largest relative motion: what the first step wears at most."""
+    """Largest wear of the first step, as a fraction of the largest relative motion."""
     shortest_slow_step: float = 1e-4
-    """Of the first step."""
+    """Shortest step, as a fraction of the first step."""
     step_iterations: int = 10
-    """Newton iterations of a step: one that takes more is shortened. What a march may spend grows by them each step."""
+    """Most Newton iterations of a step before it is shortened. Each step adds as many to the budget of a history."""
 
     # Euler steps
     arnoldi_products: int = 16
     """Linear solves for the limit of the explicit step."""
     largest_moved_load: float = 10.0
-    """Of the normal forces, in their norm, that a step may move; with less the error of the worn volume tells (27 %
-    with 0.6)."""
+    """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of
+    the worn volume is a sufficient warning (27 % with 0.6)."""
     advised_moved_load: float = 0.1
-    """Of the normal forces, of a step that is advised: the usual one of the dovetail root moves 0.001 to 0.01."""
+    """Change of the normal forces in a recommended step; a usual step of the dovetail root has 0.001 to 0.01."""
 
     # history
     history_iterations: int = 3000
-    """Newton iterations of a history beside `step_iterations` for each step, and of its reference solution beside those
-    of the history: more lead nowhere. A travelling wave at its resonance: 1400 in a corner within 500 cycles."""
+    """Most Newton iterations of a history, in addition to `step_iterations` for each step, and of its reference
+    solution, in addition to those of the history. A travelling wave at its resonance: 1400 in a corner within 500
+    cycles."""
     iterations_per_save: int = 100
-    """Newton iterations after which the factorisation kept from step to step is given up, so that a march can be kept
-    on disk and go on to the same numbers; one factorisation in so many iterations costs next to nothing."""
+    """Newton iterations after which a history is saved and its factorisation dropped, so that a resumed history is
+    equal to the last bit. The cost of one more factorisation is negligible."""
     left_out_grown: float = 1.5
-    """Part of the contact force in harmonics that are left out, over that for which harmonics were chosen, from which
-    on they may be chosen again. Dovetail, 211.5, 211.75, 212.5 Hz: it stays within 0.8 to 1.4 over 1e5 cycles."""
+    """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
+    which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
     left_out_fallen: float = 0.2
-    """The same, below which fewer harmonics are tried."""
+    """Ratio of this part to the one at the last choice of harmonics, below which fewer harmonics are tried."""
     alternations: int = 4
-    """Increments of a wear rate that alternate in sign and do not shrink, from where on the rate oscillates."""
+    """Number of increments of a wear rate with alternating sign and without decay that make an oscillation."""
     noticeable_oscillation: float = 1e-3
-    """Of the largest wear rate of the joint: smaller increments are no oscillation."""
+    """Fraction of the largest wear rate of the joint: smaller increments are no oscillation."""
     calming: float = 0.98
-    """Increment over the one before, below which an oscillation calms."""
+    """Ratio of two successive increments below which an oscillation decays."""
     oscillation_round_off: float = 1e-9
-    """Of the wear rate if all pairs slipped as far as they move: smaller changes are no oscillation."""
+    """Fraction of `WearState.most_rate`, the rate if all pairs slipped as far as they move: less is no oscillation."""
     no_wear: float = 1e-12
-    """Of the same: a joint that wears less sticks."""
+    """Fraction of `WearState.most_rate`: a joint that wears less sticks."""
 
     # steady state
     steady_rate: float = 0.01
-    """Relative change of the wear rate of a joint that slips everywhere, over the last nine tenths of its worn volume,
-    below which it has become steady and does not end."""
+    """Relative change of the wear rate of a joint that slips everywhere, over the last nine tenths of its worn volume.
+    Below, the wear rate is steady and the wear does not end."""
     acted_back: float = 100.0
-    """Of the normal force of a pair: what its depth would move by itself, all others held, before a rate counts as
-    steady: less may not have acted back on the joint yet. Long waves of n pairs are about n times as soft."""
+    """Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this
+    pair. A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n
+    pairs are about n times as soft."""
     bears: float = 1e-9
-    """Of the largest normal force: a pair with less does not bear the joint."""
+    """Fraction of the largest normal force: a pair with less does not bear the joint."""
     steps_to_the_end: int = 20_000
-    """Of a march that comes to no end; a joint takes 2 to 10 steps a pair."""
+    """Most steps of a history without a steady state; a joint takes 2 to 10 steps a pair."""
     longest_march: float = 1e25
-    """Cycles, the same."""
+    """Most cycles of a history without a steady state."""
 
     # final state without slow time
     off_margin: float = 10.0
-    """Of the overlap of all pairs, each as if it alone gave way: how far a pair is taken off, so that it stays open
-    while others are taken off; what comes out does not depend on it."""
+    """Distance by which a pair is opened, over the overlap of all pairs (each as if it alone gave way). The pair
+    remains open while others are opened; the result does not depend on the distance."""
     off_tolerance: float = 1e-3
-    """Of the tolerance of a state: depths are read from this one, which takes an iteration more (a sphere: 3e-6 of its
-    depth off without it)."""
+    """Tolerance of the state that gives the depths, as a fraction of the tolerance of a state: one more iteration
+    (a sphere without it: error of 3e-6 of the depth)."""
     off_attempts: int = 4
-    """With ten times the margin each."""
+    """Most attempts, each with ten times the margin of the last one."""
     loss_of_rate: float = 0.5
-    """Of what its own wear changes of the wear rate of a pair, that the wear of the others may take of it: more, and it
-    may stick again. A cylinder in partial slip: they add 0.4 to 0.9; a sphere: they take 0.2 at the edge of the stick
-    zone unworn, and add later."""
+    """Largest reduction of the wear rate of a pair by the wear of the others, over the change by its own wear. Above,
+    the pair may stick again. Cylinder in partial slip: the others add 0.4 to 0.9. Sphere: they reduce the rate by 0.2
+    at the edge of the stick zone in the unworn state, and add later."""
     same_depth: float = 1e-3
-    """Of the deepest pair, by how much the final depths may differ with the friction that another way leaves."""
+    """Largest difference of the final depths after different histories of friction, as a fraction of the largest
+    depth."""
     tested_states: int = 3
-    """Between the unworn and the final state, the first included, at which this is tested."""
+    """Number of states from the unworn to the final one, the first included, at which the loss of rate is tested."""
 
     # loss of a branch
     fold_resolution: float = 0.01
-    """Of the cycle count: how exactly the end of a branch is found."""
+    """Accuracy of the end of a branch, as a fraction of the cycle count."""
     smallest_fold_resolution: float = 2.0**-10
-    """Of a step: the same, at the finest."""
+    """Finest accuracy of the end of a branch, as a fraction of a step."""
     jump_change: float = 0.05
-    """Relative change of the vibration beyond the end of a branch that is a jump: corners at which the branch folds
-    back a little are none, and there may be many of them."""
+    """Relative change of the vibration at the end of a branch above which the change is a jump. Corners at which the
+    branch folds back a little are no jumps, and there may be many of them."""
     jump_iterations: int = 800
-    """Newton iterations of the search for the state behind a jump: one that takes more leads nowhere."""
+    """Most Newton iterations of the search for the state after a jump."""
 
-    # joints that slide all over
+    # joints that slide as a whole
     free_stiffness: float = 1e-9
-    """Of the largest eigenvalue of the static stiffness: a direction with less is free. Of the dovetail the free one
-    has 1e-15, the next one, by spin softening, -1.6e-6."""
+    """Fraction of the largest eigenvalue of the static stiffness: a direction with less is free. Dovetail: 1e-15 for
+    the free direction, -1.6e-6 for the next one, by spin softening."""
     free_closing: float = 1e-6
-    """Largest closing part of a free direction of norm 1: sliding closes nothing."""
+    """Largest closing component of a free direction of norm 1, for sliding closes no pair."""
 
     # output
     kept_steps: int = 800
-    """Steps of a history to the steady state that are kept to be read, at most; half as many after those that go the
-    least way were left out. A result has 101 outputs by default."""
+    """Most stored steps of a history to the steady state; half as many after the steps with the least progress are
+    dropped. A result has 101 outputs by default."""
     course_steps: int = 256
-    """Ends of steps at which a history is compared with its reference solution, at most; an adaptive history of 1e5
-    cycles has about 100."""
+    """Most ends of steps at which a history is compared with its reference solution; an adaptive history of 1e5 cycles
+    has about 100."""
 
 
 WEAR = WearOptions()

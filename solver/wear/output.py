@@ -1,4 +1,4 @@
-"""Dense output of a wear history: the steps are kept as far as they are needed, and read at any counts between them."""
+"""Dense output of a wear history: stored steps, interpolated at any cycle counts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ INTERPOLATED = (
     "loop_displacement",
     "loop_force",
 )
-"""What of a report lies between those of the two ends of a step."""
+"""Reported values that are interpolated between the ends of a step."""
 
 CERTIFIED = (
     "residual",
@@ -39,7 +39,7 @@ CERTIFIED = (
     "response_error",
     "wear_rate_error",
 )
-"""What of a certificate is the larger of both ends of a step."""
+"""Values of the certificate; within a step, the larger value of both ends holds."""
 
 
 @packable
@@ -47,8 +47,8 @@ CERTIFIED = (
 class Node:
     """The end of a step.
 
-    cycle: count.
-    report: of the state.
+    cycle: cycle count.
+    report: report of the state.
     rate (n_contact,): wear rates, m per cycle.
     local: sum of the local errors of the steps so far, as worn volume, m3.
     """
@@ -62,12 +62,13 @@ class Node:
 @packable
 @dataclass(frozen=True)
 class Course:
-    """How a history went from step to step.
+    """The course of a history over its steps.
 
-    ends (n_steps,): counts at the ends of all steps; the first is that of the first state.
-    cycles (n,), depths (n, n_contact), rates (n,): count, depth, m, and wear rate of the joint, m3 per cycle, at the
-        ends of steps, thinned where the steps are many.
-    resolutions: count from which on, harmonics and samples.
+    ends (n_steps,): counts at the first state and at the ends of all steps.
+    cycles (n,): counts at the ends of steps, thinned where the steps are many.
+    depths (n, n_contact): depths at these counts, m.
+    rates (n,): wear rates of the joint at these counts, m3 per cycle.
+    resolutions: cycle count from which on a resolution holds, and this resolution.
     """
 
     ends: tuple[float, ...] = ()
@@ -77,7 +78,7 @@ class Course:
     resolutions: tuple[tuple[float, Resolution], ...] = ()
 
     def after(self, cycle: float, depth: FloatArray, rate: float, resolution: Resolution) -> Course:
-        """With the end of another step."""
+        """The course with the end of another step."""
         kept = slice(0, None, 2 if len(self.cycles) >= WEAR.course_steps else 1)
         changed = not self.resolutions or self.resolutions[-1][1] != resolution
         return Course(
@@ -92,10 +93,10 @@ class Course:
 @packable
 @dataclass(frozen=True)
 class OutputState:
-    """What a dense output has taken so far: data.
+    """Data of a dense output.
 
-    nodes: ends of the steps that are kept, ascending; no count that is read lies in a gap between two of them.
-    course: of all steps.
+    nodes: ends of the stored steps, ascending; the counts to be read lie within these steps.
+    course: course of all steps.
     reached: count at which the target was reached, NaN until then.
     """
 
@@ -105,19 +106,19 @@ class OutputState:
 
 
 class DenseOutput:
-    """Takes the state after every step and keeps what is read later.
+    """Takes the state after every step and stores the steps that are read later.
 
-    Between the ends of a step values are linear in the fraction of the step. With adaptive steps the depth follows
-    cubics with the wear rates at both ends, and all other values are linear in the worn volume, of which the state is a
-    function. Fretting loops are interpolated phase by phase: so they close, stay within the friction cone and have the
-    mean pressure that is reported at the same count.
+    Euler steps: all values are linear over the step. Adaptive steps: the depth is a cubic with the wear rates at both
+    ends, and all other values are linear in the worn volume, of which the state is a function. Fretting loops are
+    interpolated phase by phase. So they close, lie within the friction cone and agree with the interpolated mean
+    pressure.
 
     area (n_contact,): m2.
-    counts (n_output,): ascending counts that will be read; only steps that contain one of them are kept. None where the
-        counts are not known beforehand: then steps are kept evenly along the history.
-    smooth: whether the depth follows cubics.
-    target: wear whose count is looked for within the steps; None for none.
-    taken: what was taken so far.
+    counts (n_output,): ascending counts to be read; only steps that contain one of them are stored. None for counts not
+        known beforehand: then steps are stored evenly along the history.
+    smooth: whether the depth is a cubic within a step.
+    target: wear whose count is sought within the steps; None for none.
+    taken: data stored so far.
     """
 
     def __init__(
@@ -142,9 +143,9 @@ class DenseOutput:
         Parameters
         ----------
         cycle
-            Count at the end of the step; it never falls.
+            Count at the end of the step, never lower than the last one.
         report
-            Of the state.
+            Report of the state.
         rate
             (n_contact,), wear rates of the state, m per cycle.
         error
@@ -165,7 +166,7 @@ class DenseOutput:
         self.taken = OutputState(tuple(nodes), course, reached)
 
     def _is_read(self, before: float, cycle: float) -> bool:
-        """Whether a count that is read lies behind `before` and not behind `cycle`."""
+        """Whether a count to be read is larger than `before` and at most `cycle`."""
         if self.counts is None:
             return True
         place = int(np.searchsorted(self.counts, before, "right"))
@@ -181,7 +182,7 @@ class DenseOutput:
             shifts = [abs(node.report.resonance / first - 1.0) for node in (start, end)]
             if not shifts[1] >= wanted:
                 return math.nan
-            # a function of the state, which is a function of what is worn, as all else that is reported
+            # linear in the wear within the step, like all reported values
             share = (wanted - shifts[0]) / (shifts[1] - shifts[0]) if shifts[1] > shifts[0] else 0.0
             worn = [self._worn(node.report.wear_depth) for node in (start, end)]
             wanted = worn[0] + max(share, 0.0) * (worn[1] - worn[0])
@@ -194,7 +195,7 @@ class DenseOutput:
         return start.cycle + fraction_where(wanted, worn_at) * (end.cycle - start.cycle)
 
     def _worn(self, depth: FloatArray) -> float:
-        """What tells how far wear is: the largest depth, m, or the volume, m3, of depths (n_contact,), m."""
+        """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
         assert self.target is not None
         if self.target.quantity == "wear_depth":
             return float(depth.max(initial=0.0))
@@ -206,11 +207,14 @@ class DenseOutput:
         return depth_within(fraction, end.cycle - start.cycle, ends[0], ends[1], self.smooth)
 
     def read(self, counts: FloatArray) -> dict[str, Any]:
-        """All values at ascending counts (n,), by name, the first axis that of the counts.
+        """All values at ascending counts (n,), by name; the first axis is that of the counts.
 
-        With the names of `INTERPOLATED` and `CERTIFIED` as in `WearHistory`; `wear_rate`, m3 per cycle, and of each
-        pair `depth_rate`, m per cycle; `local`, m3; `harmonics_used`, `samples_used`, `stable`. Values behind the last
-        step are NaN, whole numbers 0.
+        - `INTERPOLATED` and `CERTIFIED`, `harmonics_used`, `samples_used`, `stable`: as in `WearHistory`.
+        - `wear_rate` (n,): m3 per cycle.
+        - `depth_rate` (n, n_contact): wear rate of each pair, m per cycle.
+        - `local` (n,): sum of the local errors, m3.
+
+        Values beyond the last step are NaN, whole numbers 0.
         """
         nodes = self.taken.nodes
         cycles = np.array([node.cycle for node in nodes])
@@ -239,18 +243,17 @@ class DenseOutput:
         between["wear_rate"] = float(between["depth_rate"] @ self.area)
         between["local"] = end.local
         for name in CERTIFIED:
-            # what holds for both states holds in between
+            # within a step, the larger violation of its two ends
             between[name] = np.fmax(getattr(one.certificate, name), getattr(other.certificate, name))
         between["harmonics_used"], between["samples_used"] = other.resolution.highest, other.resolution.samples
         between["stable"] = other.certificate.stable
         return between
 
     def even_counts(self, n_outputs: int) -> FloatArray:
-        """Counts (n_outputs,) that divide the way of the history evenly, to its end or to where it reached its target.
+        """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
 
-        The way from one count to the next is what wears over all that has worn, and the cycles over all cycles: so
-        neither a burst of wear nor the long calm behind it falls between two outputs, and straight lines between them
-        show the history.
+        The progress is the fraction of the worn volume plus the fraction of the cycles. So neither a burst of wear nor
+        a long calm phase is missed, and straight lines between the outputs show the history.
         """
         nodes = self.taken.nodes
         end = self.taken.reached if self.reached_target else nodes[-1].cycle
@@ -284,7 +287,7 @@ class DenseOutput:
         return np.array([node.report.wear_depth @ self.area for node in nodes])
 
     def _thinned(self, nodes: list[Node]) -> list[Node]:
-        """Without the steps that go a little way."""
+        """The nodes without those of little progress, see `even_counts`."""
         at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
         least, kept = 2.0 * way[-1] / WEAR.kept_steps, [0]
@@ -295,9 +298,10 @@ class DenseOutput:
 
 
 def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:
-    """Values of one name at all counts: NaN, or 0 where they are whole numbers, at counts that are not reached.
+    """Values of one name at all counts; NaN at counts that are not reached, or 0 for whole numbers.
 
-    reached (n,): which counts are reached.
+    values: values at the counts that are reached.
+    reached (n,): whether a count is reached.
     """
     found = np.array(values)
     column = np.full((reached.size, *found.shape[1:]), np.nan if found.dtype.kind in "fc" else 0, found.dtype)
@@ -306,7 +310,7 @@ def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:
 
 
 def no_output(n_outputs: int, n_contact: int, n_response: int, n_loops: int) -> dict[str, Any]:
-    """What `DenseOutput.read` gives where there is no state at all."""
+    """Values as from `DenseOutput.read` for a history without any state."""
     of_pairs, of_responses = np.full((n_outputs, n_contact), np.nan), np.full((n_outputs, n_response), np.nan)
     loops, whole = np.full((n_outputs, n_loops, LOOP_PHASES, 3), np.nan), np.zeros(n_outputs, np.int64)
     found: dict[str, Any] = dict.fromkeys(

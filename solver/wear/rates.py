@@ -1,4 +1,4 @@
-"""Wear rates from step to step: the largest so far, and whether unstable steps make the rates go up and down."""
+"""Wear rates from step to step: largest values, and oscillations by unstable steps."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from solver.wear.options import WEAR
 class WearRates:
     """Wear rates of the pairs and, as the last entry, of all pairs together (n,), m3 per cycle.
 
-    An explicit Euler step beyond its stable length turns the sign of an error and enlarges the error. A physical rise
+    An explicit Euler step beyond the stable length changes the sign of an error and enlarges the error. A physical rise
     and fall of the rate takes many steps.
 
     value (n,): rates of the current state, NaN before the first state.
     increment (n,): change of the rates in the last step.
-    n_alternating (n,): steps in a row in which the increment has changed its sign without becoming smaller.
+    n_alternating (n,): number of successive steps in which the increment changed its sign without decay.
     last (alternations - 1, n): sizes of the last increments.
     largest (n,): largest rates so far.
-    strongest (n,): the smallest increment of a row of `alternations` alternating ones, where it was largest.
+    strongest (n,): amplitude of the strongest oscillation: the smallest of its `alternations` successive increments.
     """
 
     value: FloatArray
@@ -36,12 +36,12 @@ class WearRates:
 
     @classmethod
     def none(cls, n: int) -> WearRates:
-        """Before the first state; n: pairs and one more."""
+        """Rates before the first state. n: number of pairs plus one."""
         nothing, unknown = np.zeros(n), np.full(n, np.nan)
         return cls(unknown, unknown, np.zeros(n, np.int64), np.zeros((WEAR.alternations - 1, n)), nothing, nothing)
 
     def after(self, rates: FloatArray) -> WearRates:
-        """With the rates (n,) of the state after the next step."""
+        """The rates after another step. rates (n,): of the new state."""
         increment = rates - self.value
         size = np.abs(increment)
         alternates = (self.increment * increment < 0.0) & (size >= WEAR.calming * np.abs(self.increment))
@@ -58,9 +58,9 @@ class WearRates:
         )
 
     def oscillate(self, least: float = 0.0) -> bool:
-        """Whether a rate went up and down `alternations` times in a row without calming.
+        """Whether a rate went up and down `alternations` times in a row without decay.
 
-        A pair at the edge of the slip zone that wears next to nothing does so at any step. So the increments have to
-        be larger than `least`, m3 per cycle, and than a fraction of the wear rate of the whole joint.
+        The tiny rate of a pair at the edge of the slip zone alternates with steps of any length. So the increments must
+        be larger than `least`, m3 per cycle, and larger than a fraction of the wear rate of the whole joint.
         """
         return bool(self.strongest.max(initial=0.0) > max(WEAR.noticeable_oscillation * self.largest[-1], least))

@@ -33,18 +33,18 @@ from solver.wear.wearing_joint import WearingJoint
 
 @dataclass(frozen=True)
 class SlowTime:
-    """What is asked of a wear history, Eqs. (20) to (26).
+    """Scheme, counts and wear law of a wear history, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa.
     scheme: "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.bdf2`).
-    cycles (n_output,): ascending counts to report, the first 0. Between two steps they are interpolated, and the last
-        Euler step is shortened to end on the last of them. Or `ToTheEnd`: until nothing wears any more, at counts that
-        are found on the way; then steps grow without bound, which explicit steps must not.
+    cycles (n_output,): ascending counts to report, the first 0. Values are interpolated within the steps; the last
+        Euler step ends at the last count. Or `ToTheEnd`: until nothing wears any more, at counts chosen from the
+        result. Then the steps grow without bound, which is not allowed for explicit steps.
     step: h, cycles; the adaptive scheme chooses its own steps.
-    largest_depth: m; where given, the explicit scheme takes its step from Eq. (22) instead of `step`.
-    law: what of the slip work wears.
-    until: wear at which the history ends before its last count, with the step that reaches it.
-    loops: pairs whose fretting loops are kept at every count.
+    largest_depth: m; if given, the steps of the explicit scheme follow from Eq. (22) instead of `step`.
+    law: part of the slip work that wears.
+    until: target of the wear; the history ends with the step that reaches the target. None for no target.
+    loops: pairs with reported fretting loops.
     """
 
     wear_coefficient: float
@@ -65,7 +65,13 @@ class SlowTime:
 @packable
 @dataclass(frozen=True)
 class Ended:
-    """An integration that has come to its end: last state, how it ended, its output, Newton iterations spent."""
+    """A finished integration.
+
+    state: last state; None where there is no first state.
+    failure: reason of the end; the outcome CONVERGED for a regular end.
+    output: data of the output.
+    iterations: Newton iterations spent.
+    """
 
     state: WearState | None
     failure: Failure
@@ -76,10 +82,10 @@ class Ended:
 @packable
 @dataclass(frozen=True)
 class Saved:
-    """The progress of a history: all that it goes on from.
+    """The progress of the computation of a history, from which the computation goes on.
 
-    progress, output, iterations: of the integration under way.
-    fine: the history itself, where its reference solution is under way; else None.
+    progress, output, iterations: state of the present integration.
+    fine: the finished history, while its reference solution is integrated; else None.
     spent: CPU seconds so far.
     """
 
@@ -94,11 +100,11 @@ class Saved:
 class Solutions:
     """Integrates a history and its reference solution, one after the other.
 
-    case, start, asked: as in `history.integrate_wear`; the start state is one.
-    keep: called with the packed progress now and then; None for nobody.
+    case, start, asked: as in `history.integrate_wear`; the start state exists.
+    keep: called from time to time with the packed progress; None for no calls.
     saved: progress to go on from; None to begin.
     began: CPU time, s, at which the computation would have begun without an interruption.
-    fine: the history itself, where an earlier run has come to its end.
+    fine: the history, if finished before an interruption.
     """
 
     case: Case
@@ -121,7 +127,7 @@ class Solutions:
         return computing_time() - self.began
 
     def history(self) -> Ended:
-        """The history itself."""
+        """Integrate the history."""
         if self.fine is not None:
             return self.fine
         asked, settings = self.asked, self.case.settings
@@ -154,7 +160,7 @@ class Solutions:
         return replace(ended, failure=unstable or ended.failure, iterations=work.budget.iterations)
 
     def reference(self, fine: Ended) -> Ended:
-        """The reference solution of a history, at all counts at which the two are compared or read."""
+        """Integrate the reference solution of a history, for all counts at which both are compared or read."""
         course = fine.output.course
         assert fine.state is not None
         assert self.start.state is not None
@@ -201,14 +207,14 @@ class Solutions:
         return np.unique(counts[counts <= reached])
 
     def _joint(self) -> WearingJoint:
-        """The joint, with what is left of the limit of time."""
+        """The joint, with the rest of the time limit."""
         assert self.start.state is not None
         work = WearingJoint.of(self.case, self.start.state, self.asked.wear_coefficient, self.asked.law)
         work.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
     def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
-        """An integration from its first state, or from where it was saved, to the count `end` (inf: open)."""
+        """Run an integration from its first or its saved state to the count `end` (inf: open)."""
         progress: Progress | Failure
         if self.saved is not None:
             work.budget.iterations, integration.output.taken = self.saved.iterations, self.saved.output
@@ -225,7 +231,7 @@ class Solutions:
         return Ended(state, failure, integration.output.taken, work.budget.iterations)
 
     def _save(self, integration: Integration, work: WearingJoint, progress: Progress, fine: Ended | None) -> None:
-        """Hand out the progress of an integration."""
+        """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
             saved = Saved(progress, integration.output.taken, work.budget.iterations, fine, self.spent)
             self.keep(pack(saved))
@@ -234,10 +240,10 @@ class Solutions:
 def begin_reference(work: WearingJoint, start: StartState, step_limit: float) -> WearState:
     """The unworn state of the reference solution.
 
-    The state of the reference sweep differs from the start state in its tangential history. Whether a pair goes on
-    slipping while the joint wears may be decided by differences that both sweeps hardly show. So the state is solved
-    for twice that difference (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082,
-    twice their difference to 0.097). Where this state is not found, that of the reference sweep is taken.
+    The state of the reference sweep differs from the start state in its tangential history. Even a small difference may
+    decide whether a pair goes on slipping while the joint wears. So the state is solved with twice the difference
+    (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
+    0.097). Where this state is not found, the state of the reference sweep is taken.
     """
     fine, coarse = start.state, start.coarse
     assert fine is not None

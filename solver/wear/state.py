@@ -1,4 +1,4 @@
-"""The state of a joint that wears: data that a step takes and gives, and from which a history goes on."""
+"""The state of a wearing joint: data at the start and the end of a step, from which a history goes on."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from solver.wear.rates import WearRates
 @packable
 @dataclass(frozen=True)
 class Choice:
-    """The state for which harmonics and samples were chosen last.
+    """The last choice of harmonics and samples, and the state for which they were chosen.
 
-    left_out: part of its contact force that lies in harmonics which are left out (`period_events.left_out`).
+    left_out: fraction of the contact force of this state in harmonics that are left out (`period_events.left_out`).
     estimate: errors of response and wear rate with these harmonics and samples.
-    accurate: whether these errors are below rtol; always true where harmonics and samples are given.
+    accurate: whether these errors are below rtol; always true for given harmonics and samples.
     """
 
     left_out: float
@@ -34,27 +34,26 @@ class Choice:
 class WearState:
     """A wearing joint at one cycle count.
 
-    Everything that the next step depends on is here. A factorisation that is kept from one solve to the next only
-    makes the solve faster.
+    The next step depends on this state only. A factorisation that is kept between two solves only saves time.
 
-    cycle: count.
+    cycle: cycle count.
     point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
     resolution: harmonics and samples of the periodic state.
-    choice: for which state these were chosen.
+    choice: last choice of the resolution.
     rates: wear rates so far.
-    most_rate: m3 per cycle, the rate if every pair slipped as far as it moves; rates far below are round-off.
-    step_limit: cycles, largest stable explicit step at the first state that wears; NaN as long as nothing wears.
-    change: length, cycles, of the last step and change (n_rel, 2H+1), N, of the predicted force in this step. The next
-        state is extrapolated from them; None behind a jump and with other harmonics.
-    previous: length, cycles, of the last step and depth (n_contact,), m, at its start, for BDF2; None behind a jump.
-    length: cycles, of the next step; the control of the steps plans this length.
-    first_length: cycles, of the first step.
-    judged_h (n_rel, 2H+1): predicted force, N, of the state whose stability was judged last; None before.
-    hold: soft hold of the mean position of a joint that slides all over; None for none.
+    most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle; rates far below are round-off.
+    step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
+    change: length of the last step, cycles, and change of the predicted force in this step (n_rel, 2H+1), N, for the
+        extrapolation to the next state; None after a jump and after a change of the harmonics.
+    previous: length of the last step, cycles, and depth at its start (n_contact,), m, for BDF2; None after a jump.
+    length: length of the next step, cycles, planned by the control.
+    first_length: length of the first step, cycles.
+    judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
+    hold: soft hold of the mean position of a joint that slides as a whole; None for none.
     held_from: count from which on the joint is held, NaN if never.
     jump_cycle: count of the first jump to another branch, NaN if none.
     inaccurate_from: count from which on harmonics and samples no longer bring the errors below rtol, inf if never.
-    worst: the largest errors from there on.
+    worst: largest errors from `inaccurate_from` on.
     """
 
     cycle: float
@@ -81,14 +80,14 @@ class WearState:
         return self.point.evaluation.wear_depth
 
     def planned(self, length: float) -> WearState:
-        """With another length of the next step, cycles."""
+        """The state with another length of the next step, cycles."""
         return replace(self, length=length)
 
 
 @packable
 @dataclass(frozen=True)
 class Failure:
-    """Why a history does not go on; message: what the outcome does not say by itself."""
+    """Reason for the end of a history. message: addition to the outcome."""
 
     outcome: Outcome
     message: str = ""

@@ -1,4 +1,4 @@
-"""One step on the slow time scale: from a state to the next, or as far as the branch of the vibration goes."""
+"""One Euler step on the slow time scale: to the next state, or to the end of the branch of the vibration."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from solver.wear.wearing_joint import WearingJoint
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was taken.
+    """Result of a step.
 
-    state: behind the step, or where the branch of the vibration ends in it.
+    state: state at the end of the step, or the last one before the end of the branch of the vibration.
     error: estimated local error, as worn volume, m3.
-    length: of the step that was tried, cycles.
+    length: length of the attempted step, cycles.
     arrived: False where the branch ends within the step.
-    end_known_to: cycles, how exactly the end of the branch is known.
+    end_known_to: accuracy of the end of the branch, cycles.
     """
 
     state: WearState
@@ -38,10 +38,10 @@ class Step:
 
 
 def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step:
-    """One Euler step, Eq. (20) or (24); the adaptive scheme takes implicit ones.
+    """One Euler step, Eq. (20) for the explicit scheme, else Eq. (24).
 
-    Where the branch of the vibration ends within the step, the state of the result is the last stable one, to within
-    `fold_resolution`.
+    Where the branch of the vibration ends within the step, the result has the last stable state, located with the
+    accuracy `fold_resolution`.
     """
     joint, tolerance = work.at(state), work.case.settings.tolerance
     base = PathPoint(0.0, state.point.evaluation, state.point.history)
@@ -53,14 +53,14 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
         if found.converged:
             point = PathPoint(0.0, found.evaluation, final_history(whole, found.evaluation))
             return _euler(work, state, point, length)
-    # the end of a branch is to be known to a fraction of the count; in the first step to that of the step
+    # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
     shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
     last, arrived = follow_naturally(
         balance_at, base, 1.0, work.solver, tolerance, work.budget, keep_history=True, shortest=shortest
     )
     if not is_stable_when_held(joint, last.evaluation, work.solver):
-        # where the vibration has become unstable is not known: the jump is made from the start of the step
+        # the place of the loss of stability is not known: the jump begins at the start of the step
         last, arrived = base, False
     if not arrived and last.parameter <= 0.0:
         return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
@@ -71,14 +71,14 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
 
 
 def _euler(work: WearingJoint, state: WearState, point: PathPoint, length: float) -> Step:
-    """An Euler step that has come to a state."""
+    """The result of an Euler step that ends at a state."""
     after = work.accepted(state, point, length)
     change = abs(float(after.rates.value[-1] - state.rates.value[-1]))
     return Step(after, euler_error(length, change), length)
 
 
 def bounded_euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | Failure:
-    """One Euler step, refused where what the step wears would move many times the normal forces."""
+    """One Euler step, rejected where its wear would move many times the normal forces."""
     step = euler_step(work, state, length, scheme)
     ahead = step.state.cycle - state.cycle
     said = too_long(work.at(state), state.point.evaluation, step.state.depth, state.cycle, ahead)

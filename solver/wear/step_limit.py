@@ -1,18 +1,18 @@
 """Limits of a step on the slow time scale: where the explicit scheme becomes unstable, and where no step is a result.
 
-The explicit limit is predicted from the exact tangents. The wear rate g(W) of the joint falls where wear takes load off
-a pair. An explicit Euler step, Eq. (20), multiplies a disturbance of W by 1 + h dg/dW: it grows where h exceeds 2 / mu,
-mu the largest positive eigenvalue of -dg/dW. With an implicit step the Jacobian of the balance is J_h = J + h Z E G,
-where E puts the depths into the static normal displacements and G dp = dg, and the motion follows the depth as
-dp = -J^-1 Z E dW. So -dg/dW = G J^-1 Z E, whose eigenvalues other than zero are those of J^-1 (J_h - J) / h: no other
-matrix is needed than the two Jacobians.
+Explicit limit, from the exact tangents: the wear rate g(W) of the joint falls where wear takes load off a pair. An
+explicit Euler step, Eq. (20), multiplies a disturbance of W by 1 + h dg/dW. The disturbance grows where h exceeds
+2 / mu, with mu the largest positive eigenvalue of -dg/dW. The Jacobian of the balance of an implicit step is
+J_h = J + h Z E G, where E puts the depths into the static normal displacements and G dp = dg. The motion follows the
+depth as dp = -J^-1 Z E dW. So -dg/dW = G J^-1 Z E, and its nonzero eigenvalues are those of J^-1 (J_h - J) / h: the two
+Jacobians suffice.
 
-Whether a step is a result is judged by how much of the preload it moves. Worn depth lets the parts come nearer to each
-other where it is uniform, and takes the load off a pair where it is not. A step is no result where what it wears would
-move many times all normal forces at once: an explicit step then wears by a wear rate that its pairs had long lost, and
-an implicit one by one that they have only where they are left.
-This fraction is that of the linear static structure, with the tangents of pairs that slip free: it asks nothing of the
-vibration, which may change at will where a branch ends, and it is zero where wear does not act back on the joint.
+Largest meaningful step: uniform wear brings the parts closer, nonuniform wear takes load off a pair. A step is rejected
+where its wear would move many times all normal forces at once. An explicit step then uses a wear rate that the pairs
+have lost during the step. An implicit step uses a wear rate that the pairs only have at its end. The moved fraction of
+the normal forces is computed with the linear static structure, with free tangents of pairs that slip. So the fraction
+does not depend on the vibration, which may change arbitrarily at the end of a branch, and the fraction is zero where
+wear does not act back on the joint.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def explicit_step_limit(
 ) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
-    The eigenvalues are those that Arnoldi's method knows after `arnoldi_products` solves; complex ones count where the
-    real part is the larger one.
+    The eigenvalues come from Arnoldi's method with `arnoldi_products` solves. A complex eigenvalue counts where its
+    real part is larger than its imaginary part.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ def explicit_step_limit(
     gain
         (n_contact,), `archard.wear_gain` of one cycle, m/J.
     wearing
-        What of the slip work wears. How a table itself depends on the depth is left out: only what the motion does.
+        Part of the slip work that wears. Its own dependence on the depth is neglected.
     solver
         Solves with the Jacobian of the state.
 
     Returns
     -------
     float
-        h, cycles; inf where the wear rate falls nowhere.
+        h, cycles; inf where the wear rate of no pair falls.
     """
     rate = gain * wearing.work(*worn_by(at))
     if not rate.max(initial=0.0) > 0.0:
@@ -75,22 +75,24 @@ def explicit_step_limit(
     n_wearing = int(np.count_nonzero(rate))
     values = ritz_values(product, start, min(WEAR.arnoldi_products, n_wearing))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
-    # below round-off of the largest there is nothing
+    # a value below the round-off of the largest one is zero
     fastest = float(falling.max(initial=0.0))
     return 2.0 * step / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
 
 
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> float:
-    """Fraction of the mean normal forces, in their norm, that wear down to `wear_depth` (n_contact,), m, moves.
+    """Change of the mean normal forces by wear, relative to these forces, both as norms.
 
-    before: state at the start of the step. Pairs that are open all period long carry nothing and hold nothing, tangents
-    of pairs that slip follow.
+    Pairs that are open throughout the period carry no force. The tangents of pairs that slip are free.
+
+    before: state at the start of the step.
+    wear_depth (n_contact,): depth at the end of the step, m.
     """
     normal, free, worn, preload = _parts(joint, before, wear_depth)
     stiffness = joint.structure.static_stiffness
     force = stiffness @ worn
     if free.any():
-        # a root that is free to slide along its slot has no stiffness there, and no force either
+        # a root that is free to slide along its slot has neither stiffness nor force in this direction
         followed = np.linalg.lstsq(stiffness[np.ix_(free, free)], force[free])[0]
         force = force - stiffness[:, free] @ followed
     moved = float(np.linalg.norm(force[normal]))
@@ -98,7 +100,7 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> 
 
 
 def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[BoolArray, BoolArray, FloatArray, float]:
-    """Rows of pressed normals, rows that follow, worn depth on the rows, m, and norm of the normal forces, N."""
+    """Rows of the normals in contact, free rows, worn depth on the rows, m, and norm of the normal forces, N."""
     pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
     opened = (before.status_t == SEPARATED).all(axis=1)
@@ -109,7 +111,7 @@ def _parts(joint: Joint, before: Evaluation, wear_depth: FloatArray) -> tuple[Bo
 
 
 def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> str | None:
-    """Why a step, or a jump, that wears down to a depth is no result; None where it is one.
+    """Reason to reject a step or a jump because of its wear; None where there is no reason.
 
     Parameters
     ----------
@@ -123,10 +125,10 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
     Returns
     -------
     str or None
-        A sentence with the length of a step that would do.
+        A sentence with the length of a step that would be accepted.
     """
     normal, _, worn, preload = _parts(joint, before, wear_depth)
-    # with all tangents held: then none need be followed
+    # a bound without free tangents, which is cheaper
     held = float(np.linalg.norm((joint.structure.static_stiffness @ worn)[normal]))
     if held <= WEAR.largest_moved_load * preload:
         return None

@@ -1,8 +1,8 @@
-"""What ends a wear history: a last count or a target, nothing that wears any more, or wear without end.
+"""Ends of a wear history: a last count, a target, a steady state, or wear without end.
 
-In a steady state no pair slips, or carries a force while it slips. A history comes near to this state as fast as its
-slowest pair lets it: it ends where the wear rate of every pair is below a share of the largest rate of this pair. A
-joint that slips everywhere under a load that nothing else bears has no such state: it wears at a constant rate.
+In a steady state every pair that slips carries no force. The slowest pair determines how fast a history approaches this
+state. So the history ends where the wear rate of every pair is below a fraction of the largest rate of this pair. A
+joint that slips everywhere under a load that nothing else carries has no steady state: its wear rate is constant.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from solver.wear.state import Failure, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 AS_ASKED = Failure(Outcome.CONVERGED)
-"""The end of a history that was computed as far as it was asked for."""
+"""The regular end of a history."""
 
 
 @dataclass(frozen=True)
 class AtCount:
-    """The end at a cycle count, or before where the target is reached or nothing wears."""
+    """End at a cycle count, or before at the target or without wear."""
 
     end: float
 
@@ -36,7 +36,7 @@ class AtCount:
 
 @dataclass(frozen=True)
 class InSteadyState:
-    """The end where nothing wears any more, or where wear goes on without end.
+    """End where nothing wears any more, or where wear goes on without end.
 
     share: `settings.ToTheEnd.final_share`.
     """
@@ -57,14 +57,15 @@ class InSteadyState:
         return None
 
     def _is_over(self, state: WearState) -> bool:
-        """Whether the rate of every pair is below its share of the largest."""
+        """Whether the rate of every pair is below the fraction `share` of its largest rate."""
         rates, largest = state.rates.value[:-1], state.rates.largest[:-1]
         floor = self.share * float(largest.max(initial=0.0))
         return bool((rates <= self.share * np.maximum(largest, floor)).all())
 
     def _is_steady(self, work: WearingJoint, state: WearState, output: DenseOutput) -> bool:
-        """Whether the joint slips at every pair that bears it and its wear rate is constant, though what it has worn is
-        so much that it has acted back.
+        """Whether wear goes on without end.
+
+        Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
         """
         joint, at = work.at(state), state.point.evaluation
         normal = at.force_h[:, 0, 0]

@@ -1,4 +1,4 @@
-"""A joint that wears: what all states of one history have in common, and a factorisation kept between solves."""
+"""A joint that wears: the data common to all states of a history, and a factorisation kept between solves."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ from solver.wear.step_limit import explicit_step_limit
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model, friction and settings; its resolution and hold are those of the last state asked for.
-    omega, excitation_amplitude: rad/s, N.
+    case: model, friction and settings, with the resolution and the hold of the last state that was used.
+    omega: angular frequency, rad/s.
+    excitation_amplitude: N.
     wear_coefficient: 1/Pa.
-    wearing: what of the slip work wears.
-    budget: iterations spent, and the limit of time.
+    wearing: part of the slip work that wears.
+    budget: counts the iterations and limits the time.
     solver: keeps a factorisation from one solve to the next.
-    usual_work: N m, slip work against which a smaller one is judged when harmonics are chosen.
+    usual_work: N m, lower bound of the slip work to which errors are relative in the choice of harmonics.
     """
 
     case: Case
@@ -59,7 +60,7 @@ class WearingJoint:
         return self.case.model.contact.area
 
     def joint(self, resolution: Resolution, hold: Hold | None) -> Joint:
-        """The joint with these harmonics and samples. Others than before give up the factorisation."""
+        """The joint with these harmonics and samples; a change of them drops the factorisation."""
         if self._joint is None or resolution != self.case.resolution or hold is not self.case.hold:
             case = self.case if hold is self.case.hold else self.case.held(hold)
             self.case = case.at(resolution)
@@ -72,7 +73,7 @@ class WearingJoint:
         return self.joint(state.resolution, state.hold)
 
     def drop_factor(self) -> None:
-        """Give up the kept factorisation: what follows depends on the state alone."""
+        """Drop the kept factorisation, so that the next solve depends on the state alone."""
         self.solver = JacobianSolver()
 
     def wearing_work(self, at: Evaluation) -> FloatArray:
@@ -84,11 +85,11 @@ class WearingJoint:
         return wear_rate(self.wear_coefficient, self.area, self.wearing_work(at))
 
     def gain(self, cycles: float) -> FloatArray:
-        """Growth of the depth (n_contact,), m/J, per wearing work in so many cycles."""
+        """Growth of the depth over wearing work (n_contact,), m/J, in a number of cycles."""
         return wear_gain(self.wear_coefficient, self.area, cycles)
 
     def wears(self, state: WearState) -> bool:
-        """Whether anything wears, more than round-off of the slip that the static load has caused."""
+        """Whether the wear rate is above the round-off of the slip by the static load."""
         return bool(state.rates.value[-1] > WEAR.no_wear * state.most_rate)
 
     def begin(
@@ -102,8 +103,9 @@ class WearingJoint:
     ) -> WearState:
         """The unworn state. The start state is evaluated here, not solved again.
 
-        estimate, accurate: errors of the start state, and whether they are below rtol.
-        step_limit: cycles, largest stable explicit step, where it is known.
+        estimate: estimated errors of the start state.
+        accurate: whether these errors are below rtol.
+        step_limit: largest stable explicit step, cycles; NaN if unknown.
         """
         joint = self.joint(resolution, None)
         balance = Balance.frozen(joint, start.start_history, start.wear_depth)
@@ -112,21 +114,21 @@ class WearingJoint:
         choice = Choice(left_out(resolution.orders, at), estimate, accurate)
         point = PathPoint(0.0, at, final_history(balance, at))
         rates = WearRates.none(n_rates)
-        # the stability of a start state has been judged
+        # the stability of a start state has been checked
         begun = WearState(0.0, point, resolution, choice, rates, step_limit=step_limit, judged_h=at.predicted_h)
         return self.noted(begun)
 
     def accepted(self, state: WearState, point: PathPoint, length: float) -> WearState:
-        """The state behind a step of so many cycles that has come to `point`."""
+        """The state after a step of `length` cycles that ends at `point`."""
         change = length, point.evaluation.predicted_h - state.point.evaluation.predicted_h
         after = replace(state, cycle=state.cycle + length, point=point, change=change, previous=(length, state.depth))
         return self.noted(after)
 
     def noted(self, state: WearState) -> WearState:
-        """With the wear rates of the state, and at the first state that wears with the limit of the explicit step."""
+        """The state with its wear rates, and with the limit of the explicit step from the first state that wears on."""
         at = state.point.evaluation
         volumes = self.rate(at) * self.area
-        # with the static slip: where all pairs stick the vibration of the joint itself is round-off
+        # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
         most = volume_rate(self.wear_coefficient, self.wearing.largest_factor * moved)
@@ -138,7 +140,7 @@ class WearingJoint:
         return state
 
     def predicted(self, state: WearState, balance: Balance, length: float) -> FloatArray:
-        """Predicted force (n_rel, m), N, to begin a solve with: extrapolated over the last step, or of the state."""
+        """First predicted force of a solve (n_rel, m), N: extrapolated from the last step, or that of the state."""
         now = state.point.evaluation.predicted_h
         if state.change is None:
             return now

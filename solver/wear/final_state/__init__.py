@@ -1,1 +1,1 @@
-"""The state at which nothing wears any more: whether a march has come to it, or never will."""
+"""The final state, in which nothing wears any more: computed directly by an active set, or by a wear history."""

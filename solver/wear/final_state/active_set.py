@@ -1,13 +1,16 @@
-"""The final state of a joint without slow time: pairs that slip under pressure are worn off until none is left.
+"""The final state of a joint without slow time: pairs that slip under pressure are opened until no such pair is left.
 
-In the final state no pair slips, or carries a force while it slips. Many depths are such a state. Where wear at a pair
-only raises the wear rates of the others (`dg_i/dW_j >= 0`, cooperative), a march from the unworn joint comes to the
-least of them, whatever its wear law and its rates: a pair that slips under pressure goes on to do so however deep the
-others are worn, until it carries nothing. So all pairs that slip under pressure are taken off, the state without them
-is solved for, and so on while others begin to slip; none comes back. Their depth is that at which they just graze: the
-largest closing displacement over a period less the gap. At most as many rounds are needed as there are pairs.
+In a final state every pair that slips carries no force. Many depths give such a state. A joint is cooperative where
+wear at a pair only raises the wear rates of the others (`dg_i/dW_j >= 0`). Then a wear history of the unworn joint
+leads to the least of these depths, whatever the wear law and its rates are: a pair that slips under pressure goes on
+to slip, however deep the others are worn, until the pair carries no force.
 
-Whether the joint is cooperative is tested at states between the unworn and the final one (`cooperation`).
+So all pairs that slip under pressure are opened, and the state without these pairs is solved. This is repeated while
+further pairs begin to slip; no pair comes back. The final depth of an opened pair is the depth at which the pair just
+grazes: the largest closing displacement over a period minus the gap. The number of rounds is at most the number of
+pairs.
+
+The condition of a cooperative joint is tested at states between the unworn and the final one (`cooperation`).
 """
 
 from __future__ import annotations
@@ -30,16 +33,16 @@ from solver.wear.wearing_joint import WearingJoint
 
 
 class NoActiveSetError(Exception):
-    """The construction has come to no state; its text says why."""
+    """The active set gives no final state; the text is the reason."""
 
 
 @dataclass(frozen=True)
 class WornOff:
-    """The joint without its worn pairs.
+    """Result of an active set.
 
-    state: in which the worn pairs just graze.
-    off (n_contact,): the worn pairs.
-    n_rounds: how often pairs were taken off.
+    state: state in which the worn pairs just graze.
+    off (n_contact,): whether a pair is worn.
+    n_rounds: number of rounds in which pairs were opened.
     """
 
     state: WearState
@@ -48,24 +51,24 @@ class WornOff:
 
 
 def least_rate(state: WearState, share: float) -> float:
-    """Wear rate of a pair, m3 per cycle, that counts as none, as in `solver.wear.stop` and `WearingJoint.wears`."""
+    """Wear rate of a pair that counts as zero, m3 per cycle, as in `solver.wear.stop` and `WearingJoint.wears`."""
     largest = float(state.rates.largest[:-1].max(initial=0.0))
     return max(share**2 * largest, WEAR.no_wear * state.most_rate)
 
 
 def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray, share: float) -> WornOff:
-    """Take off pairs that slip under pressure until none is left.
+    """Open pairs that slip under pressure until there is no such pair.
 
     Parameters
     ----------
     work, state
-        The joint at its unworn state, or at the state without some pairs.
+        The joint at its unworn state, or at a state with open worn pairs.
     unworn
-        (n_contact,), m, depth to begin with.
+        (n_contact,), m, depth of the unworn state.
     off
-        (n_contact,), pairs that are off already, where their depth is to be found anew.
+        (n_contact,), pairs that are worn already, whose depth is computed anew.
     share
-        `settings.ToTheEnd.final_share`: a wear rate below its square of the largest is none.
+        `settings.ToTheEnd.final_share`: below its square times the largest wear rate, nothing wears.
 
     Raises
     ------
@@ -91,17 +94,17 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
 
 
 def grazing_depth(joint: Joint, at: Evaluation, unworn: FloatArray, off: BoolArray) -> FloatArray:
-    """Depth (n_contact,), m: that at which the pairs that are off just graze, `unworn` of the others."""
+    """Depth (n_contact,), m, at which the worn pairs `off` just graze; `unworn` for the others."""
     return np.where(off, np.maximum(closing(joint, at), unworn), unworn)
 
 
 def closing(joint: Joint, at: Evaluation) -> FloatArray:
-    """Depth (n_contact,), m, at which pairs just graze: largest closing displacement at a sample, less the gap."""
+    """Depth (n_contact,), m, at which pairs just graze: largest closing displacement at a sample, minus the gap."""
     return np.asarray((at.displacement_h[:, 0] @ joint.basis.synthesis).max(axis=1) - joint.contact.gap)
 
 
 def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray) -> PathPoint:
-    """State in which the pairs that are off are open all period long. Raises NoActiveSetError."""
+    """State in which the worn pairs `off` are open throughout the period. Raises NoActiveSetError."""
     joint, last, tolerance = work.at(state), state.point, work.case.settings.tolerance
     rows = np.flatnonzero(joint.component_index % 3 == 0)
     stiffness = np.zeros(unworn.size)

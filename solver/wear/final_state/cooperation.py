@@ -1,19 +1,19 @@
-"""Whether wear at a pair lets the others wear on: what the final state of an active set relies on.
+"""Test whether a joint is cooperative (wear at a pair lets the others wear on), as an active set requires.
 
-Tested are states between the unworn and the final one, at fractions of the final depths. At each of them
+The test uses states between the unworn and the final one, at fractions of the final depths. Conditions at each state:
 
-- no pair wears that the final state leaves unworn;
-- every pair that the final state takes off slips where it is pressed;
-- by the exact derivatives the wear of the others, at the rates that they have, raises the wear rate of each pair, or
-  takes less of it than a part of what the wear of the pair itself changes:
+- No pair wears that is unworn in the final state.
+- Every pair that is worn in the final state slips where the pair is pressed.
+- By the exact derivatives, the wear of the other pairs at their present rates raises the wear rate of each pair, or
+  reduces this rate by less than a fraction of the change by the wear of the pair itself:
 
       sum over j != i of dg_i/dW_j g_j  >=  - `loss_of_rate` |dg_i/dW_i| g_i.
 
-At the end the walk has to arrive where nothing wears, and from there, with the friction that the walk has left in the
-joint, the pairs that are off have to graze at the same depths.
+Conditions at the final depths: nothing wears, and the worn pairs graze at equal depths with the friction that this
+history of states has left in the joint.
 
-All `dg_i/dW_j >= 0` would be more than is needed: beside a stick zone the pressure that a pair takes over from others
-makes it slip less at first, and it wears off all the same. This is a test of some states, not of all of them.
+The condition `dg_i/dW_j >= 0` for all pairs would be too strict: next to a stick zone, a pair that takes over pressure
+slips less at first and wears off all the same. The test covers some states only.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from solver.wear.wearing_joint import WearingJoint
 def work_slopes(
     joint: Joint, at: Evaluation, wearing: WearingWork, solver: JacobianSolver, pairs: IntArray
 ) -> FloatArray:
-    """Derivatives (n_contact, n_pairs), J/m, of the wearing work of all pairs to the depths of some.
+    """Derivatives (n_contact, n_pairs), J/m, of the wearing work of all pairs with respect to the depths of some pairs.
 
-    With `R(p, W) = 0` of the balance the predicted force follows a depth as `dp = -J^-1 Z E dW`, E the static normal
-    displacements; how a table itself depends on the depth is left out.
+    From the balance `R(p, W) = 0`, the predicted force follows a depth as `dp = -J^-1 Z E dW`, with E the static normal
+    displacements. The dependence of a tabulated wear law itself on the depth is neglected.
     """
     tangent = Balance.frozen(joint, at.history, at.wear_depth).linearise(at)
     force_tangent, slip_work_tangent = law_tangent(joint, at)
@@ -58,9 +58,9 @@ def work_slopes(
 
 
 def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float) -> str:
-    """Why the final state of an active set is not that of a wear history, as far as the tests say; empty if it is.
+    """Reason why the final state of an active set may differ from that of a wear history; empty if all tests hold.
 
-    unworn: state that a history begins at, with the harmonics and samples of the final one.
+    unworn: first state of a history, with the harmonics and samples of the final state.
     """
     joint, tolerance, solver = work.at(unworn), work.case.settings.tolerance, JacobianSolver()
     before, after = unworn.depth, final.state.depth
@@ -72,7 +72,7 @@ def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float)
         if not arrived:
             return f"the vibration does not go on to {100 * fraction:.0f} % of the final depths"
         at = point.evaluation
-        # m3 per cycle of each pair
+        # of each pair, m3 per cycle
         rate = work.wear_coefficient * work.wearing.work(*worn_by(at))
         largest = np.maximum(largest, rate)
         floor = max(least_rate(final.state, share), share**2 * float(largest.max(initial=0.0)))

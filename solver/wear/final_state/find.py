@@ -1,4 +1,4 @@
-"""The final state by an active set where the joint is cooperative, by a wear history to the end where it is not."""
+"""The final state by an active set for a cooperative joint, by a wear history to the steady state for any other."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ def find_final_state(
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> WearHistory:
-    """The state at which nothing wears any more; arguments as of `integrate_wear`.
+    """The state in which nothing wears any more; arguments as for `integrate_wear`.
 
-    asked: with `ToTheEnd` in place of cycles; where there is no active set, its scheme integrates the history.
+    asked: `cycles` is a `ToTheEnd`; the scheme is used where the active set does not apply.
 
     Returns
     -------
     WearHistory
-        `final_method` says how the state was found. "active_set": the first output is the unworn state, the last the
-        final one, whose count is inf; those in between are NaN. "march": the history of the scheme, and its message
-        says why and what the active set has instead.
+        `final_method` is the method. "active_set": the first output is the unworn state, the last output is the final
+        state with the count inf, and the outputs between are NaN. "march": the history of the scheme; the message gives
+        the reason and the result of the active set.
     """
     direct: WearHistory | None = None
     reason, spent = "", 0.0
@@ -63,7 +63,7 @@ def find_final_state(
         except OutOfTimeError:
             reason = "it was not found in solver.time_limit"
         except Exception as error:
-            # the history is there all the same
+            # the history is integrated instead
             reason = describe_error(error)
         spent = computing_time() - began
     if direct is not None and not reason:
@@ -80,7 +80,7 @@ def find_final_state(
 
 @dataclass(frozen=True)
 class _Found:
-    """The final state of an active set, its unworn state and the outputs of both."""
+    """Final and unworn state of an active set, the output of both, and the reason of a rejection, empty if none."""
 
     unworn: WearState
     final: WornOff
@@ -89,7 +89,7 @@ class _Found:
 
 
 def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHistory, str]:
-    """The history by the active set, and why it is not to be taken. Raises NoActiveSetError where there is none."""
+    """The history by the active set, and the reason of a rejection. Raises NoActiveSetError where there is none."""
     assert start.state is not None
     assert isinstance(asked.cycles, ToTheEnd)
     began, share = computing_time(), asked.cycles.final_share
@@ -99,7 +99,7 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     state = work.begin(start.state, start.resolution, estimate, accurate=start.outcome is Outcome.CONVERGED)
     found = _solved(work, state, FullCheck(asked.loops), share)
     depth = found.final.state.depth
-    # no depth is known better than the states are solved
+    # no depth is more accurate than the solution of the states
     error = np.abs(_reference_depth(work, start, found, share) - depth) + case.settings.tolerance * depth
     history = _assembled(work, start, asked, found, error)
     spent = replace(
@@ -111,13 +111,13 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
 
 
 def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float) -> _Found:
-    """The unworn and the final state, both checked, and why they are not to be taken; empty where they are."""
+    """The unworn and the final state, both checked, and the reason of a rejection."""
     first = check(work, state)
     if isinstance(first, Failure):
         raise NoActiveSetError(f"{first.outcome.meaning} at the unworn state")
     unworn, output = first.state, DenseOutput(work.area, None, smooth=False)
     output.add(0.0, first.report, work.rate(unworn.point.evaluation), 0.0)
-    # the wear rate of the final state is round-off: its error counts for what it is beside that of the unworn one
+    # the wear rate of the final state is round-off: its error is relative to the unworn state
     work.usual_work = float(unworn.point.evaluation.slip_work.sum())
     final = wear_off(work, unworn, unworn.depth, np.zeros(unworn.depth.size, bool), share)
     reason = failure(work, unworn, final, share)
@@ -125,7 +125,7 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
     for _ in range(WEAR.off_attempts):
         if isinstance(last, Failure) or last.state.resolution == final.state.resolution:
             break
-        # other harmonics move the pairs otherwise, and they graze at other depths
+        # with other harmonics the pairs graze at other depths
         final = wear_off(work, last.state, unworn.depth, final.off, share)
         last = check(work, final.state)
     if isinstance(last, Failure):
@@ -137,8 +137,9 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
 
 
 def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share: float) -> FloatArray:
-    """Final depths (n_contact,), m, of the reference solution, which starts from the state of the reference sweep with
-    fewer harmonics; NaN if not found.
+    """Final depths (n_contact,), m, of the reference solution; NaN if not found.
+
+    The reference solution starts from the state of the reference sweep, with fewer harmonics.
     """
     first = begin_reference(work, start, found.unworn.step_limit)
     state = with_harmonics(work, first, coarser(found.final.state.resolution))
@@ -152,10 +153,10 @@ def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share
 
 
 def _assembled(work: WearingJoint, start: StartState, asked: SlowTime, found: _Found, error: FloatArray) -> WearHistory:
-    """The history of the unworn and the final state. error (n_contact,): m, of the final depths."""
+    """The history of the unworn and the final state. error (n_contact,): error of the final depths, m."""
     assert isinstance(asked.cycles, ToTheEnd)
     counts = np.full(asked.cycles.n_outputs, np.nan)
-    # the output has the final state at count 1
+    # count 1 of the output is the final state
     counts[0], counts[-1] = 0.0, 1.0
     own, state, area = found.output.read(counts), found.final.state, work.area
     cut_off = first_cut_off(work.case.model.contact, counts, own["mean_pressure"], own["wear_depth"])
