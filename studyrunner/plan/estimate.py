@@ -12,8 +12,8 @@ from pathlib import Path
 ITERATIONS_AT_FIRST = 250
 """Newton iterations to the first state of a sweep (the dovetail to the foot of its resonance 80, to its top 240)."""
 
-ITERATIONS_OF_RAMP = 400
-"""Newton iterations to the only state of a ramp (30 and 52 pairs: 404 and 417)."""
+ITERATIONS_OF_RAMP = 180
+"""Newton iterations to the only state of a ramp (1 and 48 pairs: 221 and 146)."""
 
 ITERATIONS_A_STATE = 50
 """Newton iterations for each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the

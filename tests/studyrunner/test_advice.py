@@ -60,7 +60,7 @@ def test_harmonics_that_are_given_are_what_is_wrong_with_the_states() -> None:
     given = Used("adaptive", "up", harmonics=1)
     assert advise_error(0.05, [0.04, 0.0], given) == 'harmonics = "auto"'
     # what comes later may be an error of the steps
-    assert advise_error(0.05, [0.01, 0.04], given) == "rtol = 0.002"
+    assert advise_error(0.05, [0.005, 0.04], given) == "rtol = 0.002"
 
 
 def test_an_end_is_asked_for_that_is_none_yet() -> None:
