@@ -19,8 +19,8 @@ class ContinuationOptions:
     (impacts, sliders, random scenes, dovetail) eight needed all ten."""
     smooth_change: float = 0.2
     """Largest change over a smooth step of a branch. A step with a larger change is divided. A fold with a larger
-    change is a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the value leads to
-    equal states."""
+    change is a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the
+    value leads to equal states."""
 
     # natural steps
     linear_change: float = 1.0
@@ -103,8 +103,8 @@ class ContinuationOptions:
     """Largest number of steps of one relaxation."""
     transient_effort: int = 800
     """Budget of Newton iterations of one relaxation, including the iterations for the periodic state. A jump at a fold
-    of vibro-impact takes 400 to 500. A motion that does not settle (a blade whose 16 pairs all slip and lift) would take
-    thousands."""
+    of vibro-impact takes 400 to 500. A motion that does not settle (a blade whose 16 pairs all slip and lift) would
+    take thousands."""
     transient_tolerance: float = 1e-6
     """Scaled residual of a step. A step is no result, so that a loose tolerance is enough."""
     shortest_transient: float = 1.0 / 64.0
