@@ -64,7 +64,7 @@ def frequency_response(
     Parameters
     ----------
     model
-        As `build_model`, `studies.build_scene` and `studies.read_scene` give it.
+        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency
         (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
     excitation_amplitude

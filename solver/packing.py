@@ -86,7 +86,7 @@ def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
     """JSON of a value; its arrays are appended to `arrays`."""
     if isinstance(value, Outcome):
         return {"outcome": int(value)}
-    # np.float64 is a float; as a plain one it would divide by zero differently
+    # np.float64 is a float too, but a plain float divides by zero differently
     if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, np.generic)):
         return value
     if isinstance(value, np.ndarray | np.generic):

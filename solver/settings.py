@@ -38,7 +38,7 @@ class ToTheEnd:
     - n_outputs: number of states that are kept, the first and the last included, spaced evenly in worn volume and
       cycles; at least 2.
     - final_share: the history ends where the wear rate of each pair is below this share of its own largest wear rate so
-      far. This largest rate is taken as at least the same share of the largest of all pairs.
+      far. The largest wear rate of a pair counts as at least `final_share` of the largest of all pairs.
     """
 
     n_outputs: int

@@ -45,9 +45,9 @@ def march_wear(
     Parameters
     ----------
     model
-        As `build_model`, `studies.build_scene` and `studies.read_scene` give it.
+        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency
-        Hz.
+        Frequency of the excitation, Hz.
     excitation_amplitude
         Amplitude, N. It multiplies the unit harmonic load of the model.
     friction_coefficient

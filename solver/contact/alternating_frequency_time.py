@@ -33,8 +33,8 @@ class Marched:
     - status_t (n_contact, N): SEPARATED, STICK or SLIP.
     - periods (n_contact,): number of periods that were marched.
     - periodicity_error: change of the tangential state over the last period, N.
-    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. The wear is proportional to
-      it; it is no work of a force (`solver.contact.archard`).
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. Archard's wear is
+      proportional to this integral, which is no work of a force (`solver.contact.archard`).
     """
 
     predicted_t: FloatArray

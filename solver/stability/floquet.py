@@ -89,8 +89,8 @@ def find_instability(
     budget
         Counts the Newton iterations.
     every
-        False tests only small joints that open and close. This is for states between the first and the last of a wear
-        history, where only impacts change the motion of a joint suddenly.
+        False leaves out large joints and joints that do not open and close, where a pair slips. This is for states
+        between the first and the last of a wear history, where only impacts change the motion of a joint suddenly.
 
     Raises
     ------

@@ -13,7 +13,7 @@ So a negative determinant at sigma = 0 means an odd number of real, positive gro
 real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
 
 The test costs next to nothing beside a Newton iteration and is made at each state of a branch. The test sees neither an
-even number of such multipliers nor multipliers elsewhere outside the unit circle: `floquet` computes all multipliers of
+even number of such multipliers nor multipliers elsewhere outside the unit circle: `floquet` computes the multipliers of
 reported states. Disturbances of friction are taken as slow, with the closure over one period.
 """
 

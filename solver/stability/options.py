@@ -17,7 +17,7 @@ class StabilityOptions:
     """Samples of the law in a period, for larger joints, whose largest multipliers belong to few modes: within 0.003 of
     the multipliers with 512 samples (48 pairs)."""
     samples_a_vibration: int = 40
-    """Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 % meanwhile."""
+    """Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 %."""
     most_marched_samples: int = 4096
     """Largest number of samples in a period."""
     opening_harmonics: int = 19
