@@ -3,8 +3,8 @@
 The other wear laws replace the slip work by another work (`solver.contact.wear_law`). These functions are plain Python;
 the kernels compile them.
 
-The wear depth of a pair grows by `k_w / alpha` times normal force times slip, Eq. (7). The growth in a cycle is, Eq.
-(21):
+The wear depth of a pair grows by `k_w / alpha` times normal force times slip, Eq. (7). The growth in a cycle is,
+Eq. (21):
 
     g = k_w / alpha * slip work,      slip work = integral over a period of lambda_N |dX_T|
 

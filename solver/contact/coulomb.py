@@ -115,7 +115,7 @@ def advance_monodromy(
     """Multiply the monodromy (2, 2) by the derivative of one sample that slips or is separated, in place.
 
     The monodromy is the derivative of the state with respect to the state at the start of the period. Arguments as in
-    `contact_tangent`. Slip leaves only changes of the state across the slip direction.
+    `contact_tangent`. Slip leaves only changes of the state across the slip direction, separation leaves none.
     """
     limit = friction_limit(friction, normal)
     if status == SEPARATED or limit == 0.0:
@@ -239,7 +239,7 @@ def sample_tangents(
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
     """Mean normal force over the half step towards a neighbour, and its derivatives to both predicted forces.
 
-    force: predicted normal force at the sample, positive. neighbour: predicted normal force at the next sample.
+    force: predicted normal force at the sample, positive. neighbour: predicted normal force at the neighbour.
 
     The predicted normal force is linear between two samples, and the pair opens or closes at its zero. The half step
     next to an opening is weighted by the closed fraction of the step. Without this weight each change of a status is a

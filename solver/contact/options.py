@@ -10,8 +10,8 @@ class ContactOptions:
     """End of the march through the period; each option with its meaning, unit and the evidence for its value."""
 
     periodicity: float = 1e-10
-    """Of the largest friction limit: a tangential state with a smaller change over a period is periodic. A hundredth of
-    the usual tolerance of the residual, 1e-8, so that the residual does not show the change."""
+    """Change of the tangential state over a period, over the largest friction limit, below which the state is periodic.
+    A hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change."""
     most_periods: int = 400
     """Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction
     need up to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""

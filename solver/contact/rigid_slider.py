@@ -10,8 +10,8 @@ where p is the predicted force of the pair. The harmonics of p up to H are the u
 defines their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`, without truncation. The harmonics of lambda
 above H act on the mass m in the march, as in the structure, up to a relative error of `k / (n w)^2 m`.
 So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the march supplies the
-harmonics above H. The drag c removes the influence of the start of the period. It is part of p and of the march, and
-cancels up to H.
+harmonics above H. The drag c removes the influence of the start of the period. The drag is part of p and of the
+march, and cancels up to H.
 
 In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
 which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.

@@ -27,12 +27,12 @@ class ContinuationOptions:
     """Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
     resonance is a change of 2."""
     shortest_fraction: float = 1.0 / 64.0
-    """Of the range to the target: shortest step. Where a shorter step is needed, the branch is assumed to fold."""
+    """Shortest step over the range to the target. Where a shorter step is needed, the branch is assumed to fold."""
     natural_failures: int = 25
     """Steps that may fail to converge; a branch with more corners is left to arc length. With half the number no static
     state of the dovetail is found at a friction coefficient of 1000."""
     target_round_off: float = 1e-9
-    """Of the range: a step that ends nearer to the target ends at the target."""
+    """Distance to the target over the range. A step that ends nearer to the target ends at the target."""
 
     # arc length, in unknowns divided by the norm of the first predicted force
     arc_steps: int = 250
@@ -43,7 +43,7 @@ class ContinuationOptions:
     """Newton iterations of a corrector. Through the folds of vibro-impact half the number takes 25 % more iterations in
     total, twice the number 40 % more."""
     arc_wander: float = 4.0
-    """Of the length of the step: a corrector farther from its start is given up."""
+    """Distance of a corrector from its start over the length of the step, above which the corrector is given up."""
     first_arc: float = 0.02
     """Length of the first step."""
     longest_arc: float = 0.2
@@ -64,17 +64,17 @@ class ContinuationOptions:
     backward_cosine: float = 0.99
     """Cosine to the backward tangent above which a point lies on the branch before the corner."""
     target_distance: float = 2.0
-    """Of the chord between the neighbours: largest distance of the state at the target from this chord."""
+    """Largest distance of the state at the target from the chord between its neighbours, over this chord."""
     target_slack: float = 1e-6
-    """Of the norm of the predicted force: added to that distance, because chords may be as short as round-off."""
+    """Addition to that distance, over the norm of the predicted force: chords may be as short as round-off."""
     fold_points: int = 3
     """Points added around a fold. One moves a fold of vibro-impact by 1e-3, six move it by 2e-4."""
     vertex_reach: float = 0.9
-    """Of the distance to a neighbour: farthest vertex of the parabola through a fold."""
+    """Farthest vertex of the parabola through a fold, over the distance to a neighbour."""
     vertex_resolution: float = 1e-3
-    """Of the distance between both neighbours: a vertex nearer to the middle point adds nothing."""
+    """Distance of a vertex to the middle point over the distance of both neighbours; a nearer vertex adds nothing."""
     vertex_offset: float = 0.1
-    """Of the distance to the farther neighbour: place of the point that is added instead of such a vertex."""
+    """Place of the point that is added instead of such a vertex, over the distance to the farther neighbour."""
 
     # first state
     load_steps: int = 20
@@ -116,15 +116,15 @@ class ContinuationOptions:
     largest_change: float = 0.6
     """Change over a step above which the step is repeated with `transient_cut` of its length."""
     transient_cut: float = 0.35
-    """Of the length, see `largest_change`. With half the value a jump at a fold takes 2.5 times the iterations."""
+    """Factor of the length, see `largest_change`. Half the value takes 2.5 times the iterations of a jump at a fold."""
     transient_growth: tuple[float, float] = (0.5, 2.5)
     """Limits of the ratio of two successive lengths."""
     relaxed_change: float = 0.02
     """Change over a step below which a periodic state is sought."""
     renewed_attempt: float = 0.3
-    """Of the change at the last attempt: below this change the periodic state is sought again."""
+    """Change over the change at the last attempt, below which the periodic state is sought again."""
     relaxed_distance: float = 0.1
-    """Of the motion: a periodic state at a larger distance belongs to another motion."""
+    """Distance of a periodic state from the motion, over the motion; a farther state belongs to another motion."""
     runaway: float = 1e3
     """Mean relative displacement over the largest displacement of vibration and start; above it parts run away."""
 
@@ -133,7 +133,7 @@ class ContinuationOptions:
     """Largest number of shifts of the mean positions. Each shift removes at least two thirds of the ratcheting
     (measured), in one to six iterations."""
     fold_search_length: float = 0.01
-    """Of the frequency: natural length of the frequency in the search behind a fold."""
+    """Natural length of the frequency in the search behind a fold, over the frequency."""
 
 
 CONTINUATION = ContinuationOptions()

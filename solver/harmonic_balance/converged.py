@@ -41,8 +41,8 @@ def history_at_rest(joint: Joint, point: PathPoint) -> FloatArray:
     """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
 
     When the range of slip of a pair shrinks to zero, the pair comes to stick in the middle of the range. So the history
-    of a slipping pair is the middle of its slip in the closed samples. A pair that goes on slipping has no memory of the
-    history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
+    of a slipping pair is the middle of its slip in the closed samples. A pair that goes on slipping does not remember
+    its history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
     with `final_history`, for an equal number of states.
     """
     evaluation, history = point.evaluation, point.history.copy()

@@ -36,7 +36,7 @@ class StabilityOptions:
     smallest_growth: float = 1e-3
     """Growth in a period, beyond 1, that counts. Sliding pairs that stick have multipliers of 1."""
     indefinite: float = 1e-10
-    """Of the largest diagonal entry of a matrix: negative eigenvalues up to this size count as round-off."""
+    """Negative eigenvalue over the largest diagonal entry of a matrix that still counts as round-off."""
 
 
 STABILITY = StabilityOptions()

@@ -18,7 +18,7 @@ class StructureOptions:
     rough_directions: int = 48
     """Largest number of motions that carry mass, and damping not proportional to stiffness, in rough products."""
     rough: float = 1e-3
-    """Of the stiffness: part that a rough product may leave out. Does not change results."""
+    """Part of the stiffness that a rough product may leave out. Does not change results."""
     kept_structures: int = 8
     """Size of the caches of condensed structures of a case and of low-rank differences of their harmonics. A wear
     history with its errors uses six. Does not change results."""
@@ -26,7 +26,7 @@ class StructureOptions:
     """Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a
     spring, 4 for a mass. With 4 no pair is inertial, and the motion of the two masses is 20 % off with H = 5."""
     inertial_rate: float = 8.0
-    """Of the frequency: rate of the first test for `inertial_ratio`, for any number of harmonics."""
+    """Rate of the first test for `inertial_ratio` over the frequency, for any number of harmonics."""
     drag_fraction: float = 0.1
     """Drag of an inertial pair over m w: the mean velocity falls to exp(-2 pi 0.1) = 0.53 of its value in a period.
     Half and twice the value change the motion of slider and two masses by 1e-4."""
