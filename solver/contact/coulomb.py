@@ -1,4 +1,5 @@
 """Coulomb friction with separation at one sample: return map, derivative, and mean normal force around a sample.
+
 Floats and arrays only.
 
 The arguments of the law, Eqs. (11)-(15), are a *predicted* force `p`, the contact force of a pair that does not move,

@@ -1,7 +1,6 @@
-"""Exact derivatives of the periodic state of elastic pairs and of masses, including the periodicity. Floats and arrays
-only.
+"""Exact derivatives of the periodic state of elastic pairs and of masses, including the periodicity.
 
-`coulomb` has the derivative of a sample, `rigid_slider` the derivative of a step of a mass.
+Floats and arrays only. `coulomb` has the derivative of a sample, `rigid_slider` the derivative of a step of a mass.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def solve_first_state(
     3. The excitation is raised from states with smaller static friction forces. Pairs that the static load leaves at
        their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
     4. The vibration builds up in time under the whole excitation (`transient`).
-    5. The excitation is raised by arc length.
+    5. Where the first way did not reach the whole excitation, arc length continues from its last state.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def solve_first_state(
     Returns
     -------
     outcome : Outcome
-        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE or ADRIFT.
+        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE, UNSETTLED or ADRIFT.
     point : PathPoint or None
         The state; its parameter is the load factor of the excitation, 1.
     """
