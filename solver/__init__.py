@@ -1,21 +1,20 @@
-"""One case: a joint that vibrates and wears. Arrays in, frozen results out; no files, no MPI, no xarray, no study.
+"""One case: a joint that vibrates and wears. Input: arrays. Output: frozen results. No files, MPI, xarray or studies.
 
 For use in Python, from this package itself:
 
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `frequency_response`: the unworn joint over frequency, a `FrequencyResponse`;
-- `march_wear`: its wear over the cycles at one frequency, a `WearHistory`;
+- `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
 - `tuned`: other limits of the solver for hard cases;
-- `SolverSettings` says how finely and how exactly, `Outcome` how a computation ended.
+- `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
 The rooms, from the ground up: `structure` (Fourier basis, condensation, penalty), `contact` (Coulomb friction and
 unilateral contact through a period), `harmonic_balance` (the DLFT balance and its Jacobian), `newton` (iteration,
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
-transient), `accuracy` (harmonic levels, refinement, reference solution and errors, certificate), `results`,
+transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `wear` (the integration over the slow time). On top:
 `forced_response`, `wear_history`, `tuning`. On the ground: `model`, `model_from_matrices`, `settings`, `outcome`,
-`clock`, `packing`. The equations in one convention, where the print of the paper is wrong, and what was measured:
-`PHYSICS.md`.
+`clock`, `packing`. `PHYSICS.md` has the equations in one sign convention, the misprints of the paper, and measurements.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ __all__ = [
     "tuned",
 ]
 
-# Loaded when first asked for: rooms import each other through this package, and numba takes a while to load.
+# Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _PLACES = {
     "FrequencyResponse": "forced_response",
     "Outcome": "outcome",

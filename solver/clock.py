@@ -1,4 +1,4 @@
-"""CPU time of computing: what a kernel takes to be compiled, or to be loaded, says nothing of what is computed."""
+"""CPU time of a computation, without the time in which kernels are compiled or loaded from the cache."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numba.core.event import Event, Listener, register
 
 
 class _Compiler(Listener, threading.local):
-    """Takes note of the CPU time, s, that each thread spends on kernels; one may need others."""
+    """CPU time, s, that each thread spends on compiling or loading kernels. Kernels may be nested."""
 
     def __init__(self) -> None:
         self.spent = 0.0
@@ -17,30 +17,30 @@ class _Compiler(Listener, threading.local):
         self._began = 0.0
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002
-        """A kernel is taken up."""
+        """Begin of a kernel."""
         if self._depth == 0:
             self._began = time.thread_time()
         self._depth += 1
 
     def on_end(self, event: Event) -> None:  # noqa: ARG002
-        """It is ready."""
+        """End of a kernel."""
         self._depth -= 1
         if self._depth == 0:
             self.spent += time.thread_time() - self._began
 
 
 class _Compilations(Listener):
-    """Counts the kernels that are compiled: one that is read from the cache is not."""
+    """Number of kernels that were compiled, without those read from the cache."""
 
     def __init__(self) -> None:
         self.number = 0
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002
-        """A kernel is compiled from now on."""
+        """Begin of a compilation."""
         self.number += 1
 
     def on_end(self, event: Event) -> None:
-        """It is ready."""
+        """End of a compilation: nothing to count."""
 
 
 _compiler = _Compiler()
@@ -51,10 +51,10 @@ register("numba:compile", _compilations)  # type: ignore[no-untyped-call]
 
 
 def computing_time() -> float:
-    """CPU time of this thread, s, without that of compiling; differences of it are what something takes."""
+    """CPU time of this thread, s, without the time of compiling. The difference of two values is a duration."""
     return time.thread_time() - _compiler.spent
 
 
 def n_compiled() -> int:
-    """Kernels that this process has had to compile so far, as in the first run after an installation."""
+    """Number of kernels that this process has compiled so far; above zero in the first run after an installation."""
     return _compilations.number

@@ -26,12 +26,16 @@ _UNWORN = np.zeros(1)  # the only cycle count
 class FrequencyResponse:
     """Unworn periodic states over frequency, at `n_frequency` points.
 
-    frequency (n_frequency,): Hz, as given. response (n_frequency, n_response): complex first harmonic, m; the response
-    is Re(value exp(i omega t)). response_peak (n_frequency, n_response): largest magnitude over a period, m.
-    response_error (n_frequency,): estimated relative error. All of them NaN where there is no state.
-    outcome, message: how the computation of each point ended, and what that does not say by itself.
-    branch (n_frequency,): number of folds that the sweep has jumped over on its way. fold_frequency (n_frequency,): Hz,
-    the last of them; NaN if none.
+    - frequency (n_frequency,): Hz, as given.
+    - response (n_frequency, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
+    - response_peak (n_frequency, n_response): largest magnitude over a period, m.
+    - response_error (n_frequency,): estimated relative error.
+    - outcome: how the computation of each point ended.
+    - message: details of each outcome.
+    - branch (n_frequency,): number of folds at which the sweep has jumped before it reached the point.
+    - fold_frequency (n_frequency,): frequency of the last of these folds, Hz; NaN if there is none.
+
+    The responses and their errors are NaN where no state was found.
     """
 
     frequency: FloatArray
@@ -55,28 +59,28 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Frequency response of an unworn joint.
 
-    A point that fails is one point: its `outcome` and `message` say why, and the others are computed.
+    Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
 
     Parameters
     ----------
     model
-        As `build_model`, `studies.build_scene` and `studies.read_scene` give it.
+        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency
-        (n_frequency,) or one number, Hz, in any order. A state does not depend on which others are asked for.
+        (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
     excitation_amplitude
-        N, multiplies the unit harmonic load of the model.
+        Amplitude, N. It multiplies the unit harmonic load of the model.
     friction_coefficient
-        Of all pairs, or (n_contact,) of each; None for a model that has one of each pair, as a scene file may.
+        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
     sweep
-        How a state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
+        Way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     settings
         The defaults of `SolverSettings` if not given.
 
     Raises
     ------
     ValueError
-        Where a number is out of its range, the model does not hold the nodal diameters that the harmonics need, or
-        friction coefficients are given twice, not at all, or not to each pair.
+        A number is out of its range; the model lacks nodal diameters that the harmonics need; friction coefficients
+        are given twice, not at all, or not to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
@@ -85,7 +89,7 @@ def frequency_response(
     found: dict[int, WearHistory] = {}
     branch = follow_branch(model, friction, load, ascending, sweep, settings)
     for index, start in branch:
-        # a state is reported as at cycle 0 of any wear history; nothing wears until then
+        # an unworn state is a wear history with cycle 0 alone
         found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _UNWORN, 1.0))
     points = [found[index] for index in place.tolist()]
     return FrequencyResponse(
@@ -107,7 +111,7 @@ def check_case(
     sweep: Sweep,
     settings: SolverSettings,
 ) -> tuple[float, float | FloatArray | None]:
-    """Excitation amplitude and friction coefficient. Raises ValueError where a joint cannot be computed like this."""
+    """Checked excitation amplitude and friction coefficient. Raises ValueError where an argument is not allowed."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
     friction = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Sweep))
@@ -120,7 +124,7 @@ def check_case(
 
 
 def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:
-    """One number, one of each pair (n_contact,), or None for those of the model. Raises ValueError where none fits."""
+    """One number, one for each pair (n_contact,), or None for those of the model. Raises ValueError where none fits."""
     friction: float | FloatArray | None = None
     if given is not None:
         numbers = check_numbers("friction_coefficient", given, least=0.0)
@@ -130,13 +134,13 @@ def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | Floa
 
 
 def check_word(name: str, given: str, known: tuple[str, ...]) -> None:
-    """Raises ValueError where a text is none of those that are known."""
+    """Raises ValueError where a word is not in the list of known words."""
     if given not in known:
         raise ValueError(f"{name}: give one of {', '.join(known)} instead of {given!r}")
 
 
 def check_number(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> float:
-    """The number. Raises ValueError where it is not one alone, or as `check_numbers`."""
+    """One number. Raises ValueError where there are more, or as `check_numbers`."""
     found = check_numbers(name, given, above=above, least=least)
     if found.size != 1:
         raise ValueError(f"{name}: give one number")
@@ -144,7 +148,7 @@ def check_number(name: str, given: ArrayLike, *, above: float = -math.inf, least
 
 
 def check_numbers(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> FloatArray:
-    """The numbers as a vector. Raises ValueError where there is none, or one of them is not finite or too small."""
+    """The numbers as a vector. Raises ValueError where there is none, or where a number is not finite or too small."""
     found = np.atleast_1d(np.array(given, np.float64))
     if found.ndim != 1 or not found.size or not np.isfinite(found).all():
         raise ValueError(f"{name}: give finite numbers")

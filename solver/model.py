@@ -1,6 +1,6 @@
-"""What is studied: a reduced linear structure and the contact pairs on it.
+"""The model of a joint: a reduced linear structure and the contact pairs on the structure.
 
-These frozen dataclasses are the only thing that a scene hands to the solver. All values are SI.
+A scene gives these frozen dataclasses to the solver and nothing else. All values are in SI units.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ Matrix = NDArray[np.float64] | NDArray[np.complex128]
 class ContactInterface:
     """Contact pairs, `n_contact` of them.
 
-    dofs (n_contact, 3) int: index, in every `LinearModel` of the scene, of the closing, first and second tangential
-        *relative* displacement of the pair (blade minus disk; the closing one positive when the pair closes);
-        -1 where the pair has none.
-    area (n_contact,): weight alpha of the pair, m2, Eq. (7).
-    gap (n_contact,): initial gap, m.
-    normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement;
-        not used for the others.
-    position (n_contact, 3): m, NaN where unknown.
-    surface: text label of each pair, e.g. "intrados".
-    friction_coefficient (n_contact,): of each pair; None where one for all of them is given beside the scene.
-    edge (n_contact,): pairs at which the modelled contact ends though the bodies go on, as the last strip of a
-        half-space; load or wear there shows that the contact is cut off. None where the bodies end with their pairs.
+    - dofs (n_contact, 3) int: indices of the closing, the first and the second tangential *relative* displacement of
+      each pair in every `LinearModel` of the scene (blade minus disk; the closing displacement is positive when the
+      pair closes); -1 where the pair has no such displacement.
+    - area (n_contact,): weight alpha of the pair, m2, Eq. (7).
+    - gap (n_contact,): initial gap, m.
+    - normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement;
+      not used for other pairs.
+    - position (n_contact, 3): m, NaN where unknown.
+    - surface: text label of each pair, e.g. "intrados".
+    - friction_coefficient (n_contact,): for each pair; None where the study gives the friction coefficient.
+    - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue, e.g. the last strip
+      of a half-space. Load or wear of such a pair shows that the contact is cut off. None where the bodies end with
+      their pairs.
     """
 
     dofs: IntArray
@@ -55,9 +56,10 @@ class ContactInterface:
 class LinearModel:
     """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`, Eq. (1).
 
-    mass, damping, stiffness (n, n): symmetric real, or Hermitian for a cyclic sector at one nodal diameter.
-    load_static (n,): N, real. load_harmonic (n,): N per unit excitation amplitude; complex, load(t) = Re(F exp(i w t)).
-    response (n_response, n): rows that give the reported responses, m, from the displacements.
+    - mass, damping, stiffness (n, n): real symmetric, or Hermitian for a cyclic sector at one nodal diameter.
+    - load_static (n,): N, real.
+    - load_harmonic (n,): N per unit excitation amplitude; complex, load(t) = Re(F exp(i w t)).
+    - response (n_response, n): matrix from the displacements to the reported responses, m.
     """
 
     mass: Matrix
@@ -72,10 +74,12 @@ class LinearModel:
 class ReducedModel:
     """A scene: linear structure(s), the contact pairs on them and the names of the responses.
 
-    linear: by nodal diameter k in 0..n_sectors // 2; a structure that is no cyclic sector has the key 0 only. The
-        contact displacements have the same indices in all of them.
-    n_sectors: number of sectors of the cyclic structure; 0 for a structure that is no cyclic sector.
-    nodal_diameter: d of the travelling wave that excites the sector: harmonic n moves in nodal diameter n d.
+    - linear: linear model for each nodal diameter k in 0..n_sectors // 2; a structure that is no cyclic sector has the
+      key 0 only. The contact displacements have equal indices in all linear models.
+    - contact: the contact pairs.
+    - response_names: a name for each reported response.
+    - n_sectors: number of sectors of the cyclic structure; 0 for a structure that is no cyclic sector.
+    - nodal_diameter: d of the travelling wave that excites the sector; harmonic n moves in nodal diameter n d.
     """
 
     linear: Mapping[int, LinearModel]
@@ -85,10 +89,10 @@ class ReducedModel:
     nodal_diameter: int = 0
 
     def harmonic_structure(self, harmonic: int) -> tuple[LinearModel, bool]:
-        """Linear model that a harmonic sees, and whether its conjugate holds (nodal diameter folded back).
+        """Linear model for a harmonic, and whether its conjugate is meant (nodal diameter folded back).
 
-        A travelling wave of nodal diameter d moves in harmonic n with the interblade phase `2 pi n d / N`, that is in
-        nodal diameter `n d` modulo N; above N/2 it is the conjugate of nodal diameter N - n d.
+        Harmonic n of a travelling wave of nodal diameter d has the interblade phase `2 pi n d / N`. The wave moves in
+        nodal diameter `n d` modulo N; above N/2 this is the conjugate of nodal diameter N - n d.
 
         Raises KeyError where the scene does not hold that nodal diameter.
         """
@@ -100,13 +104,13 @@ class ReducedModel:
         return self.linear[wrapped], False
 
     def holds(self, n_harmonics: int) -> bool:
-        """Whether the scene has the nodal diameter that each of the harmonics 0..n_harmonics moves in."""
+        """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""
         wanted = needed_nodal_diameters(self.nodal_diameter, self.n_sectors, n_harmonics)
         return all(k in self.linear for k in wanted)
 
 
 def needed_nodal_diameters(nodal_diameter: int, n_sectors: int, n_harmonics: int) -> tuple[int, ...]:
-    """Folded nodal diameters that the harmonics 0..n_harmonics of a travelling wave see, ascending, each once."""
+    """Folded nodal diameters of the harmonics 0..n_harmonics of a travelling wave, ascending, each once."""
     if n_sectors == 0:
         return (0,)
     wrapped = {(harmonic * nodal_diameter) % n_sectors for harmonic in range(n_harmonics + 1)}

@@ -30,34 +30,34 @@ def build_model(
 ) -> ReducedModel:
     """A structure `M x'' + C x' + K x + (contact forces) = load` and the contact pairs on it.
 
-    The displacements x hold the *relative* displacements of the pairs themselves (blade minus disk, the closing one
-    positive when the pair closes), as after a change of coordinates and a reduction to `[u_rel | other]`.
+    The *relative* displacements of the pairs (blade minus disk; closing displacements positive when the pair closes)
+    are components of x, as after a change of coordinates and a reduction to `[u_rel | other]`.
 
     Parameters
     ----------
     mass, damping, stiffness
-        (n, n), kg, N s/m, N/m; symmetric. damping: None for none.
+        (n, n), kg, N s/m, N/m; symmetric. damping: None for a structure without damping.
     contact_dofs
         (n_contact, 3) int: index in x of the closing, the first and the second tangential relative displacement of each
-        pair; -1 where the pair has none.
+        pair; -1 where the pair has no such displacement.
     area
         (n_contact,) or one number for all, m2: the weight alpha of Eq. (7).
     load_harmonic, load_static
-        (n,), N. The harmonic one per unit excitation amplitude, complex: load(t) = Re(F exp(i omega t)). The static one
-        is 0 if not given.
+        (n,), N. The harmonic load is complex and per unit excitation amplitude: load(t) = Re(F exp(i omega t)). The
+        static load is 0 if not given.
     response
-        What is reported: indices (n_response,) of x, or a matrix (n_response, n); all of x if not given.
+        Reported responses: indices (n_response,) of x, or a matrix (n_response, n). All of x if not given.
     gap, normal_load
         (n_contact,) or one number. Initial gap, m; constant normal force of pairs without a closing displacement, N,
         compression positive.
     position, surface, response_names
-        (n_contact, 3), m, and a label for each pair; a name for each response. They have no part in the results.
+        Position (n_contact, 3), m, and label of each pair; name of each response. They do not change the results.
 
     Raises
     ------
     ValueError
-        Where shapes do not fit, a number is not finite, a matrix is not symmetric, an area is not positive, or an index
-        is out of range or used twice.
+        Shapes do not fit, a number is not finite, a matrix is not symmetric, an area is not positive, or an index is
+        out of range or used twice.
     """
     k = _matrix("stiffness", stiffness)
     n = len(k)
@@ -91,7 +91,7 @@ def build_model(
 
 
 def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """A copy as floating numbers; one number stands for a vector of them."""
+    """A copy as an array of floating-point numbers; a single number is repeated to the shape."""
     found = np.array(given, np.float64)
     if found.ndim == 0:
         found = np.full(shape, found)

@@ -1,4 +1,4 @@
-"""How a computation ended. Failure is a value with a sentence; raising is the caller's choice."""
+"""How a computation ended. A failure is a value with a sentence; the caller decides whether to raise an exception."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from enum import IntEnum
 from pathlib import Path
 
 SENSITIVE_ERROR = 0.5
-"""Relative error of the last worn volume from which on one number says too little."""
+"""Limit of the relative error of the last worn volume. Above this limit the outcome is SENSITIVE."""
 
 
 class Outcome(IntEnum):
-    """End of a computation; the number is stored in result files, so numbers are never used again for others."""
+    """End of a computation. Result files store the number, so that a number never changes its meaning."""
 
     CONVERGED = 0
     STATIC_FAILED = 1
@@ -37,7 +37,7 @@ class Outcome(IntEnum):
 
     @property
     def complete(self) -> bool:
-        """Whether the point was computed to the end: its values are results, each with its error, small or large."""
+        """Whether the point was computed to the end. Its values are then results, each with an estimated error."""
         return self in (Outcome.CONVERGED, Outcome.INACCURATE, Outcome.SENSITIVE)
 
     @property
@@ -47,7 +47,7 @@ class Outcome(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What a user reads: what has happened. What may help depends on what was used, which is not known here."""
+        """Sentence for the user about what has happened. The remedy depends on settings that are not known here."""
         return _SENTENCES[self]
 
 
@@ -93,7 +93,7 @@ _SENTENCES = {
 
 
 def known_to(error: float, rtol: float) -> str:
-    """What a relative error above `rtol` says: "is known to 2.6 % only", with digits that show it above."""
+    """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess."""
     if math.isinf(error):
         return "is not known"
     short = f"{100.0 * error:.2g}"
@@ -101,7 +101,7 @@ def known_to(error: float, rtol: float) -> str:
 
 
 def describe_error(error: Exception) -> str:
-    """What an unexpected error says, and where it came from: one line for the result file."""
+    """Text of an unexpected error with file and line of its origin, in one line for the result file."""
     last = traceback.extract_tb(error.__traceback__)[-1:]
     place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
     return " ".join(f"{type(error).__name__}: {error}{place}".split())

@@ -1,8 +1,8 @@
-"""Values of the solver as text and plain arrays, to be kept on disk: the state of a march or of a sweep.
+"""Values of the solver as text and plain arrays for a file: the state of a wear history or of a sweep.
 
-`unpack(pack(value))` is equal to `value` to the last bit, and its arrays lie in memory in rows. The order in which an
-array lies decides the order of sums over it, and so their last bits: a computation that is to go on elsewhere to the
-same numbers goes on from the unpacked value itself.
+`unpack(pack(value))` is equal to `value` to the last bit, and its arrays are stored by rows (C order). The memory order
+of an array determines the order of sums over the array, and so their last bits. A computation that is to be continued
+to the last bit therefore continues from the unpacked value itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CLASSES: dict[str, type[Any]] = {}
 
 @dataclass(frozen=True)
 class Packed:
-    """A value as JSON text that refers to arrays by their place."""
+    """A value as JSON text that refers to arrays by their index."""
 
     text: str
     arrays: tuple[NDArray[np.generic], ...]
@@ -36,7 +36,7 @@ class Packed:
 
 
 def packable(known: type[T]) -> type[T]:
-    """Decorator of the frozen classes that are part of the state of a march or of a sweep; no two of one name."""
+    """Decorator of frozen classes in the state of a wear history or of a sweep. Names are unique."""
     assert known.__name__ not in _CLASSES
     _CLASSES[known.__name__] = known
     return known
@@ -53,7 +53,7 @@ def pack(value: object) -> Packed:
     Raises
     ------
     TypeError
-        For anything else: a bug.
+        For any other value: a bug.
     """
     arrays: list[NDArray[np.generic]] = []
     text = json.dumps(_described(value, arrays))
@@ -61,18 +61,18 @@ def pack(value: object) -> Packed:
 
 
 def unpack(packed: Packed) -> Any:
-    """The value.
+    """The value that was packed.
 
     Raises
     ------
     ValueError, KeyError, TypeError, IndexError
-        Where text and arrays are not those of a value.
+        Text and arrays do not describe a value.
     """
     return _rebuilt(json.loads(packed.text), packed.arrays)
 
 
 def attributes(part: object, state: type[T]) -> T:
-    """The attributes of a part that a TypedDict of states names."""
+    """Those attributes of an object that are keys of a TypedDict `state`."""
     return cast("T", {name: getattr(part, name) for name in state.__annotations__})
 
 
@@ -86,7 +86,7 @@ def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
     """JSON of a value; its arrays are appended to `arrays`."""
     if isinstance(value, Outcome):
         return {"outcome": int(value)}
-    # np.float64 is a float; as a plain one it would divide by zero differently
+    # np.float64 is a float too, but a plain float divides by zero differently
     if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, np.generic)):
         return value
     if isinstance(value, np.ndarray | np.generic):
@@ -127,7 +127,7 @@ def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> object:
 
 
 def in_rows(value: T) -> T:
-    """A value whose arrays lie in memory in rows, as those that `unpack` gives."""
+    """The value with all arrays stored by rows (C order), as `unpack` returns them."""
     found: Any = value
     if isinstance(value, np.ndarray):
         found = np.array(value, order="C")

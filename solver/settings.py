@@ -10,20 +10,21 @@ from solver.packing import packable
 
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
-"""Of the steps on the slow time scale."""
+"""Scheme of the steps on the slow time scale."""
 
 
 Quantity = Literal["wear_depth", "worn_volume", "frequency_shift"]
 TARGETS: tuple[Quantity, ...] = get_args(Quantity)
-"""What a target may be of."""
+"""Quantities of a target."""
 
 
 @dataclass(frozen=True)
 class WearTarget:
-    """Wear at which a march ends.
+    """Wear at which a history ends.
 
-    quantity: "wear_depth", of the deepest pair, m, "worn_volume", of all pairs, m3, or "frequency_shift", by how much
-    the resonance of the vibration (`results.resonance`) has changed, up or down, relative. value: above 0.
+    - quantity: "wear_depth" of the deepest pair, m; "worn_volume" of all pairs, m3; or "frequency_shift", the relative
+      change of the resonance of the vibration (`results.resonance`), up or down.
+    - value: above 0.
     """
 
     quantity: Quantity
@@ -32,12 +33,12 @@ class WearTarget:
 
 @dataclass(frozen=True)
 class ToTheEnd:
-    """In place of cycle counts: a march until nothing wears any more.
+    """In place of cycle counts: a history until wear has come to an end.
 
-    n_outputs: states that are kept, the first and the last included, spaced evenly in worn volume and cycles; at
-        least 2.
-    final_share: the march ends where the wear rate of every pair is below this share of the largest that it has had;
-        what a pair has worn at is counted as at least that share of the largest of all pairs.
+    - n_outputs: number of states that are kept, the first and the last included, spaced evenly in worn volume and
+      cycles; at least 2.
+    - final_share: the history ends where the wear rate of each pair is below this share of its own largest wear rate so
+      far. The largest wear rate of a pair counts as at least `final_share` of the largest of all pairs.
     """
 
     n_outputs: int
@@ -46,14 +47,15 @@ class ToTheEnd:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How finely and how exactly a case is solved.
+    """Resolution and accuracy of a computation.
 
-    harmonics: number H of harmonics above the static one, or "auto": those that the state needs for `rtol`.
-    samples: N, equally spaced time samples in a period, at which the contact law is applied, more than 2 H; or "auto".
-    tolerance: largest accepted scaled residual of the harmonic balance.
-    rtol: relative error of response and wear rate that automatic harmonics and samples aim at.
-    time_limit: CPU seconds that a start state with its loading history may take, or a march, before it is given up;
-        without those that kernels are compiled in.
+    - harmonics: number H of harmonics above the static one, or "auto": as many as the state needs for `rtol`.
+    - samples: number N of equally spaced time samples in a period at which the contact law is applied; more than 2 H,
+      or "auto".
+    - tolerance: largest accepted scaled residual of the harmonic balance.
+    - rtol: relative error of response and wear rate for which automatic harmonics and samples are chosen.
+    - time_limit: CPU seconds, without the time of compiling kernels, after which a computation is given up. The limit
+      holds for a start state with its loading history, and for a wear history.
     """
 
     harmonics: int | Automatic = "auto"
@@ -64,7 +66,7 @@ class SolverSettings:
 
     @property
     def automatic(self) -> bool:
-        """Whether anything is chosen by the state."""
+        """Whether harmonics or samples are chosen automatically."""
         return self.harmonics == "auto" or self.samples == "auto"
 
 
@@ -73,7 +75,8 @@ class SolverSettings:
 class Resolution:
     """Harmonics and samples of one solve.
 
-    orders: harmonics above the static one, ascending, the first 1. samples: N, more than twice the highest.
+    - orders: harmonics above the static one, ascending, beginning with 1.
+    - samples: number N of time samples, more than twice the highest harmonic.
     """
 
     orders: tuple[int, ...]
@@ -86,40 +89,40 @@ class Resolution:
 
 
 def all_orders(n_harmonics: int) -> tuple[int, ...]:
-    """Every harmonic from the first one on."""
+    """All harmonics from 1 to `n_harmonics`."""
     return tuple(range(1, n_harmonics + 1))
 
 
 @dataclass(frozen=True)
 class ResolutionOptions:
-    """What automatic harmonics and samples begin with, each with the evidence for its value."""
+    """First values of automatic harmonics and samples, each with the evidence for its value."""
 
     first_harmonics: int = 3
-    """Harmonics of the first state: the fewest that friction is seen in."""
+    """Harmonics of the first state: the smallest number that shows friction."""
     fewest_samples: int = 64
-    """Samples in a period; with fewer the samples, not the harmonics, limit a slider with one harmonic."""
+    """Samples in a period. With fewer, the samples and not the harmonics limit the accuracy of a slider with H = 1."""
     samples_per_harmonic: int = 8
-    """Samples in a period of the highest harmonic."""
+    """Samples in one period of the highest harmonic."""
 
 
 RESOLUTION = ResolutionOptions()
 
 
 def samples_for(highest: int) -> int:
-    """Samples, a power of two, with which the harmonics up to the highest one are resolved."""
+    """Number of samples, a power of two, that resolves the harmonics up to `highest`."""
     wanted = max(RESOLUTION.fewest_samples, RESOLUTION.samples_per_harmonic * highest)
     return 1 << (wanted - 1).bit_length()
 
 
 def first_resolution(settings: SolverSettings) -> Resolution:
-    """The resolution that the settings fix, or the one that automatic settings begin with."""
+    """The fixed resolution of the settings, or the first one of automatic settings."""
     n_harmonics = RESOLUTION.first_harmonics if settings.harmonics == "auto" else settings.harmonics
     samples = samples_for(n_harmonics) if settings.samples == "auto" else settings.samples
     return Resolution(all_orders(n_harmonics), samples)
 
 
 def allowed(resolution: Resolution, settings: SolverSettings) -> Resolution:
-    """The resolution that comes nearest to one where harmonics or samples are fixed."""
+    """A resolution with its harmonics or samples replaced where the settings fix them."""
     fixed = first_resolution(settings)
     return Resolution(
         resolution.orders if settings.harmonics == "auto" else fixed.orders,

@@ -1,10 +1,10 @@
-"""Limits of the solver that a hard case may need otherwise, changed from Python for what is computed inside.
+"""Other limits of the solver for a hard case, inside a `with` block in Python.
 
     with solver.tuned(history_iterations=20_000, jump_iterations=3000):
         history = solver.march_wear(...)
 
-`TUNABLE` has the names. Each constant stands in the file `options.py` of its room, with its meaning and with the number
-or the case that chose its value.
+`TUNABLE` has the names. The file `options.py` of each room holds the constants, with the meaning of each constant and
+the evidence for its value.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ TUNABLE = {
         ),
     ),
 }
-"""Options by their name: room, and the constants that may be changed."""
+"""For each options object: its room, and the constants that may be changed."""
 
 
 @contextmanager
 def tuned(**values: float | tuple[float, ...]) -> Iterator[None]:
-    """Other constants for what is computed inside the `with` block, in all threads of the process.
+    """Change constants inside the `with` block, for all threads of the process.
 
     Parameters
     ----------
     values
-        By the names of `TUNABLE`; of the kind of the constant.
+        Constants by the names of `TUNABLE`, each of the same type as before.
 
     Raises
     ------
     ValueError
-        Where no constant has the name, or the value is of another kind.
+        No constant has this name, or the value is of another type.
     """
     of_name = {name: (room, options) for options, (room, names) in TUNABLE.items() for name in names}
     before = []
@@ -67,7 +67,7 @@ def tuned(**values: float | tuple[float, ...]) -> Iterator[None]:
         before.append((constants, name, old))
     try:
         for constants, name, _ in before:
-            # frozen for everybody else
+            # the options are frozen: only this function changes them
             object.__setattr__(constants, name, values[name])
         yield
     finally:

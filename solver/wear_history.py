@@ -40,45 +40,47 @@ def march_wear(
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state on.
 
-    A computation that fails is no exception: `outcome` and `message` of the history say why and how far it came.
+    A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
 
     Parameters
     ----------
     model
-        As `build_model`, `studies.build_scene` and `studies.read_scene` give it.
+        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency
-        Hz.
+        Frequency of the excitation, Hz.
     excitation_amplitude
-        N, multiplies the unit harmonic load of the model.
+        Amplitude, N. It multiplies the unit harmonic load of the model.
     friction_coefficient
-        Of all pairs, or (n_contact,) of each; None for a model that has one of each pair, as a scene file may.
+        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
     wear_coefficient
-        k_w of Eq. (2), 1/Pa; the energy wear coefficient with the law "energy".
+        k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
     cycles
-        Ascending cycle counts at which the history is reported, or the last one alone; the march ends there. It begins
-        at 0, which is put in front where it is missing. Or inf: until nothing wears any more, see `outputs`.
+        Ascending cycle counts at which the history is reported, or the last count alone. The history ends at the last
+        count. It begins at 0; a missing 0 is added. With inf the history ends where wear has come to an end, see
+        `outputs`.
     scheme, step
-        "adaptive" chooses its own steps, by `settings.rtol`; "implicit" and "explicit" take steps of `step` cycles,
-        Eqs. (23), (24). "final" finds the state at which nothing wears any more without slow time where it can; it
-        takes `cycles` = inf, and `final_method` of the history says how it was found.
+        "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step` cycles, Eqs.
+        (23), (24). "final" seeks the final state, in which nothing wears any more, if possible without integration over
+        the slow time; it needs `cycles` = inf, and `final_method` of the history names the method.
     sweep
-        How the unworn state is reached: "up" or "down" along the frequency, "ramp" by raising the excitation.
+        Way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     settings
         The defaults of `SolverSettings` if not given.
     law
-        What of the slip work wears, Archard's law if not given: `solver.contact.wear_law`.
+        The wear law, see `solver.contact.wear_law`; Archard's law if not given.
     until
-        Wear at which the march ends before the last of `cycles`; `cycles_to_target` of the history is that count.
+        Wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
     outputs, final_share
-        Of a march to the end: the states that are reported, spaced evenly in worn volume and cycles, at counts that the
-        history says; and the share of the largest wear rate of each pair that this has to fall below.
+        For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles; the history has
+        their counts. final_share: the history ends where the wear rate of each pair is below this share of its own
+        largest wear rate.
 
     Raises
     ------
     ValueError
-        Where a number is out of its range, counts do not ascend, a scheme of a given step has none, the model does not
-        hold the nodal diameters that the harmonics need, friction coefficients are given twice, not at all, or not to
-        each pair, or the law is none of `wear_law.LAWS` or names other surfaces than the model has.
+        A number is out of its range; counts do not ascend; the scheme needs a step that is not given; the model lacks
+        nodal diameters that the harmonics need; friction coefficients are given twice, not at all, or not to each pair;
+        the law is not in `wear_law.LAWS` or names surfaces that the model does not have.
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
@@ -105,7 +107,7 @@ def march_wear(
     if until is not None:
         check_word("until.quantity", until.quantity, TARGETS)
         check_number("until.value", until.value, above=0.0)
-    # that the law is none of these pairs is the fault of the caller, not of the march
+    # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts

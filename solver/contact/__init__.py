@@ -1,1 +1,1 @@
-"""Contact laws: Coulomb friction with separation, its march through a period, masses on sliders, Archard's wear law."""
+"""Contact laws: Coulomb friction with separation, march through a period, masses on sliders, Archard's wear law."""

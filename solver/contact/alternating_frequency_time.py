@@ -1,6 +1,7 @@
-"""Alternating frequency-time: the predicted force from harmonics to samples, the contact law, its force to harmonics.
+"""Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics.
 
-All pairs of a joint through one period, each by the kernel that suits it, and the exact derivative of that.
+The contact law of all pairs of a joint through one period, elastic and inertial pairs each by their own kernel, and the
+exact derivative of the contact force.
 """
 
 from __future__ import annotations
@@ -20,15 +21,20 @@ from solver.structure.joint import Joint
 
 @dataclass(frozen=True)
 class Marched:
-    """What the pairs do under a predicted force, N samples.
+    """Contact forces and states of the pairs under a predicted force, at N samples.
 
-    predicted_t (n_contact, 3, N): N; tangents of inertial pairs as means over the steps. force_t (n_contact, 3, N): N,
-    compression positive, likewise. force_h (n_contact, 3, m): its harmonics, N. state_t (n_contact, 2, N+1): tangential
-    state, its start first, N; for inertial pairs the displacement, m. start (n_contact, 2): what the first period began
-    with, N; for inertial pairs the velocity at the start of the last one, m/s. status_t (n_contact, N). periods
-    (n_contact,): how many were marched. periodicity_error: N, change of the tangential state over the last period.
-    slip_work (n_contact,): J, integral of normal force times slip distance over a period: what wears, no work of any
-    force (`solver.contact.archard`).
+    - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
+    - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
+    - force_h (n_contact, 3, m): harmonics of the contact force, N.
+    - state_t (n_contact, 2, N+1): tangential state, N, beginning with the start of the period; for inertial pairs the
+      displacement, m.
+    - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
+      start of the last period, m/s.
+    - status_t (n_contact, N): SEPARATED, STICK or SLIP.
+    - periods (n_contact,): number of periods that were marched.
+    - periodicity_error: change of the tangential state over the last period, N.
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. Archard's wear is
+      proportional to this integral, which is no work of a force (`solver.contact.archard`).
     """
 
     predicted_t: FloatArray
@@ -43,9 +49,9 @@ class Marched:
 
 
 def march_law(joint: Joint, predicted_h: FloatArray, history: FloatArray) -> Marched:
-    """Motion under a predicted force (n_contact, 3, m), N, from a tangential history (n_contact, 2), m.
+    """March all pairs through the period: predicted force (n_contact, 3, m), N, tangential history (n_contact, 2), m.
 
-    Eqs. (11)-(15); for inertial pairs the march of `solver.contact.rigid_slider`.
+    Elastic pairs follow Eqs. (11)-(15), inertial pairs `solver.contact.rigid_slider`.
     """
     basis, friction = joint.basis, joint.friction_coefficient
     predicted_t = predicted_h @ basis.synthesis
@@ -92,27 +98,27 @@ def march_law(joint: Joint, predicted_h: FloatArray, history: FloatArray) -> Mar
 
 
 def friction_work(joint: Joint, at: Marched) -> FloatArray:
-    """Work that friction dissipates in a period (n_contact,), J: it is at its limit wherever a pair slips."""
+    """Work that friction dissipates in a period (n_contact,), J. The friction force is at its limit during slip."""
     return friction_limit(joint.friction_coefficient, at.slip_work)
 
 
 def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
-    """Exact derivatives with respect to the harmonics of the predicted force of each pair, periodicity included.
+    """Exact derivatives with respect to the harmonics of the predicted force of each pair, including the periodicity.
 
-    Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
-    (n_contact, 3m), m.
+    Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip
+    work (n_contact, 3m), m.
     """
     basis, friction, m = joint.basis, joint.friction_coefficient, joint.basis.synthesis.shape[0]
     n_contact = at.predicted_t.shape[0]
     force_tangent, slip_work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
     has_tangent = (joint.contact.dofs[:, 1:] >= 0).any(axis=1)
-    # one that sticks and stays closed all period long passes all on, one that is open nothing; the start of a period
-    # that was marched more than once may depend on the force even so
+    # a pair that sticks during the whole period transmits the predicted force, an open pair transmits nothing; but the
+    # start of a period that was marched more than once may depend on the force
     stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
     switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
     harmonics = np.arange(3 * m)
     force_tangent[np.ix_(stuck & joint.has_normal, harmonics[:m], harmonics[:m])] = np.eye(m)
-    # tangents that do not exist stick
+    # tangential displacements that do not exist count as sticking
     force_tangent[np.ix_(stuck | ~has_tangent, harmonics[m:], harmonics[m:])] = np.eye(2 * m)
     inertial = np.flatnonzero(joint.penalty.inertial & switching)
     elastic = np.flatnonzero(~joint.penalty.inertial & has_tangent & switching)
@@ -151,5 +157,5 @@ def law_tangent(joint: Joint, at: Marched) -> tuple[FloatArray, FloatArray]:
 
 
 def _masses(joint: Joint, inertial: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Mass, drag and line of the inertial pairs, as `rigid_slider.march_masses` takes them."""
+    """Mass, drag and line of the inertial pairs, arguments of `rigid_slider.march_masses`."""
     return joint.penalty.mass[inertial], joint.penalty.drag[inertial], joint.line[inertial]

@@ -1,22 +1,23 @@
-"""Coulomb friction with separation, sample by sample: the return map, its derivative, and the normal force that goes on
-to the harmonics. Floats and arrays only.
+"""Coulomb friction with separation at one sample: return map, derivative, and mean normal force around a sample.
 
-The law is applied to a *predicted* force `p` (what the joint would take up if the pair did not move) and to a
-force-like tangential state `x = eps X_T` (X_T: corrected slip, m), Eqs. (11)-(15). With compression positive (PHYSICS,
-section 2: the print has the sign of the normal test the other way round) and the trial force `p_T - x'`, x' the state
-one sample earlier:
+Floats and arrays only.
+
+The arguments of the law, Eqs. (11)-(15), are a *predicted* force `p`, the contact force of a pair that does not move,
+and a force-like tangential state `x = eps X_T` (X_T: corrected slip, m). Compression is positive (PHYSICS, section 2:
+the print has the opposite sign in the normal test). With x' the state at the sample before and the trial force
+`p_T - x'`, the law is:
 
 - separated, `p_N <= 0`: no force, and the state follows freely, `x = p_T`;
 - stick, `|p_T - x'| < mu p_N`: `lambda_T = p_T - x'`, `x = x'`;
 - slip otherwise: `lambda_T = mu p_N n` along `n = (p_T - x') / |p_T - x'|`, `x = p_T - lambda_T`.
 
-So the friction force is the projection of a trial force on a disc of radius `mu p_N`, of elastic pairs and of masses on
-sliders alike; its derivative where it slips is
+So the friction force is the projection of a trial force on a disc of radius `mu p_N`, for elastic pairs and for masses
+on sliders. The derivative of the friction force of a slipping pair is
 
     d lambda_T = mu n d p_N + (mu p_N / |p_T - x'|) (1 - n n^T) (d p_T - d x').
 
-The normal force is that of the sample in the law. Its harmonics, Eqs. (11), (12), are taken from its mean around each
-sample (`closed_fraction`).
+The law takes the normal force at the sample. The harmonics of the normal force, Eqs. (11), (12), are computed from its
+means around each sample (`closed_fraction`).
 """
 
 from __future__ import annotations
@@ -56,10 +57,10 @@ def friction_force(trial_1: float, trial_2: float, limit: float) -> tuple[float,
 
 @njit(cache=True)
 def slip_direction(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, float]:
-    """Derivative of `friction_force` where the pair slips, Eq. (15): the direction n (2), and the limit over |trial|.
+    """Parts of the derivative of `friction_force` of a slipping pair, Eq. (15): direction n (2), limit over |trial|.
 
-    The derivative with respect to the limit is n, that with respect to the trial force `limit / |trial| (1 - n n^T)`.
-    Zero where there is no trial force.
+    The derivative with respect to the limit is n; with respect to the trial force `limit / |trial| (1 - n n^T)`. All
+    are zero where the trial force is zero.
     """
     size = np.sqrt(trial_1 * trial_1 + trial_2 * trial_2)
     if size == 0.0:
@@ -69,7 +70,7 @@ def slip_direction(trial_1: float, trial_2: float, limit: float) -> tuple[float,
 
 @njit(cache=True)
 def across_slip(unit_1: float, unit_2: float, ratio: float) -> tuple[float, float, float]:
-    """Entries 11, 12, 22 of the symmetric `ratio (1 - n n^T)`, arguments as `slip_direction` returns them."""
+    """Entries 11, 12, 22 of the symmetric matrix `ratio (1 - n n^T)`; arguments as `slip_direction` returns them."""
     return ratio * (1.0 - unit_1 * unit_1), -ratio * unit_1 * unit_2, ratio * (1.0 - unit_2 * unit_2)
 
 
@@ -77,7 +78,7 @@ def across_slip(unit_1: float, unit_2: float, ratio: float) -> tuple[float, floa
 def contact_sample(
     normal: float, tangent_1: float, tangent_2: float, friction: float, state_1: float, state_2: float
 ) -> tuple[float, float, float, float, float, int]:
-    """One sample of one pair: normal force, two tangential ones, two states, status. In N; Eqs. (3), (4), (11)-(15)."""
+    """One sample of one pair: normal force, 2 friction forces, 2 states, N, and status; Eqs. (3), (4), (11)-(15)."""
     if normal <= 0.0:
         return 0.0, 0.0, 0.0, tangent_1, tangent_2, SEPARATED
     force_1, force_2, sticks = friction_force(
@@ -92,9 +93,9 @@ def contact_sample(
 def contact_tangent(
     status: int, normal: float, trial_1: float, trial_2: float, friction: float
 ) -> tuple[float, float, float, float, float]:
-    """Derivative of `contact_sample`: of the tangential force with respect to what the sample is given.
+    """Derivative of the tangential force of `contact_sample`.
 
-    Returns the derivative with respect to the normal force (2), and the entries 11, 12, 22 of the symmetric one with
+    Returns the derivative with respect to the normal force (2), and entries 11, 12, 22 of the symmetric derivative with
     respect to the trial force `p_T - x'`. The new state is `p_T - lambda_T`.
     """
     if status == STICK:
@@ -112,10 +113,10 @@ def contact_tangent(
 def advance_monodromy(
     monodromy: FloatArray, status: int, normal: float, trial_1: float, trial_2: float, friction: float
 ) -> None:
-    """Derivative (2, 2) of the state with respect to that at the start of the period, taken past a sample, in place.
+    """Multiply the monodromy (2, 2) by the derivative of one sample that slips or is separated, in place.
 
-    Arguments as in `contact_tangent`, of a sample that does not stick. What lies across the slip turns with it; what
-    lies along it is forgotten.
+    The monodromy is the derivative of the state with respect to the state at the start of the period. Arguments as in
+    `contact_tangent`. Slip leaves only changes of the state across the slip direction, separation leaves none.
     """
     limit = friction_limit(friction, normal)
     if status == SEPARATED or limit == 0.0:
@@ -123,7 +124,7 @@ def advance_monodromy(
         return
     unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
     for column in range(2):
-        # 1 - n n^T is t t^T with t across n: so nothing along n is left by round-off
+        # 1 - n n^T is computed as t t^T with t across n: round-off then leaves nothing along n
         across = ratio * (unit_1 * monodromy[1, column] - unit_2 * monodromy[0, column])
         monodromy[0, column] = -unit_2 * across
         monodromy[1, column] = unit_1 * across
@@ -143,10 +144,13 @@ def advance_tangent(
 ) -> None:
     """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
 
-    Eqs. (13)-(15), with all that came before in the period. Columns are m harmonics of each component of the predicted
-    force of the pair, from `first` (3,) on: normal, tangent 1, tangent 2; -1 where the force does not depend on one.
-    The last two are the state at the start of the period. `basis` (m,) holds the derivative of a time sample with
-    respect to its harmonics. `dstate` comes in as that of the sample before.
+    Eqs. (13)-(15), with the dependence on all earlier samples of the period.
+
+    - dstate: on entry the derivative of the state at the sample before.
+    - basis (m,): derivative of a time sample with respect to its harmonics.
+    - first (3,): first of the m columns of each component of the predicted force (normal, tangent 1, tangent 2); -1
+      where the force does not depend on the component.
+    - The last two columns are the derivatives with respect to the state at the start of the period.
     """
     m, width = basis.size, dstate.shape[1]
     if status == STICK:
@@ -196,11 +200,11 @@ def sample_tangents(
     has_normal: BoolArray,
     stride: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of every pair at every `stride`-th sample, n of them.
+    """Derivatives of the state (normal, tangents) of each pair at every `stride`-th sample, n samples in all.
 
-    The normal state is what of the predicted force the pair does not take up. Arrays as in `march_period`. Returns the
-    derivatives with respect to the predicted force of the sample (n, n_contact, 3, 3), and to the tangential state
-    before it (n, n_contact, 2, 2), all dimensionless. The normal force is that of the sample alone.
+    The normal state is predicted less contact force. Arrays as in `march_period`. Returns the derivatives with respect
+    to the predicted force at the sample (n, n_contact, 3, 3), and to the tangential state at the sample before (n,
+    n_contact, 2, 2), all dimensionless. The normal force is taken at the sample, without the mean around it.
     """
     n_contact, n_samples = status_t.shape
     own = np.zeros((n_samples // stride, n_contact, 3, 3))
@@ -217,7 +221,7 @@ def sample_tangents(
             across = carried[place, pair]
             across[0, 0], across[1, 1] = across_11, across_22
             if status == SLIP:
-                # entry 12 of `across_slip` but for the order of its products, as the preconditioner rounds it
+                # entry 12 of `across_slip`, with the order of the products (round-off) of the preconditioner
                 limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
                 unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
                 across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
@@ -234,22 +238,24 @@ def sample_tangents(
 
 @njit(cache=True)
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
-    """Normal force of a sample over the half step towards a neighbour, and its derivatives to both predicted forces.
+    """Mean normal force over the half step towards a neighbour, and its derivatives to both predicted forces.
 
-    Between two samples the predicted normal force is taken as linear, so the pair closes or opens where it is zero: the
-    half step next to an opening counts by the closed part of the step. Without this every sample that changes its state
-    is a corner in the residual, and a branch with hard impacts breaks up into small folds. `force` is positive.
+    force: predicted normal force at the sample, positive. neighbour: predicted normal force at the neighbour.
+
+    The predicted normal force is linear between two samples, and the pair opens or closes at its zero. The half step
+    next to an opening is weighted by the closed fraction of the step. Without this weight each change of a status is a
+    corner of the residual, and a branch with hard impacts breaks up into small folds.
     """
     if neighbour >= 0.0:
         return force, 1.0, 0.0
     fraction = force / (force - neighbour)
-    # in fractions, not squares: predicted forces of pairs without preload may be as small as numbers get
+    # fractions instead of squares: squares of the tiny predicted forces of pairs without preload may underflow
     return fraction * force, fraction * (2.0 - fraction), fraction * fraction
 
 
 @njit(cache=True)
 def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
-    """Normal force (n_contact, N), N, averaged around each sample: what its harmonics are taken from."""
+    """Mean normal force (n_contact, N), N, around each sample, from which the harmonics are computed."""
     n_contact, _, n_samples = predicted_t.shape
     mean = np.zeros((n_contact, n_samples))
     for pair in range(n_contact):
@@ -266,7 +272,7 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 def mean_normal_tangent(
     predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
 ) -> FloatArray:
-    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` with respect to those of its argument."""
+    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` to the harmonics of its argument."""
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
     basis_t = np.ascontiguousarray(synthesis.T)

@@ -1,4 +1,4 @@
-"""Tuning constants of the contact room. Those that compiled kernels read stand beside the kernels."""
+"""Tuning constants of the contact room. Constants of compiled kernels are in the files of the kernels."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ContactOptions:
-    """When the march through the period ends; each with its meaning, unit and the evidence for its value."""
+    """End of the march through the period; each option with its meaning, unit and the evidence for its value."""
 
     periodicity: float = 1e-10
-    """Of the largest friction limit: the tangential state has repeated where it changes by less over a period. A
-    hundredth of the usual tolerance of the residual, 1e-8, so that it does not show there."""
+    """Change of the tangential state over a period, over the largest friction limit, below which the state is periodic.
+    A hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change."""
     most_periods: int = 400
-    """Marched until a state that does not repeat is taken as it is. Pairs whose slip turns need up to some 20 with
-    Newton's method and above 40 without it (`tests/solver/test_kernels.py`)."""
+    """Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction
+    need up to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
 
 
 CONTACT = ContactOptions()

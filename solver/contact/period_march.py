@@ -1,9 +1,10 @@
-"""Elastic pairs through one period: force, state and slip work, until the state repeats. Floats and arrays only.
+"""March of elastic pairs through the period: force, state and slip work of a periodic state. Floats and arrays only.
 
-The law of a sample is in `coulomb`. The state at the start of a period is history. The period is marched again from
-where it ended until it repeats, and at least twice where anything slips or opens. Slip whose direction varies closes
-slowly, by a factor a period: after a few periods the start is taken from Newton's method on the periodicity, with the
-monodromy of the march, and the march then has to confirm it.
+`coulomb` has the law of a sample. The first period starts from the tangential history. Each next period starts from the
+end of the period before, until the state repeats; a pair that slips or opens is marched at least twice. Where the
+direction of slip varies, the change of the state falls slowly, by a constant factor in each period. So after a few
+periods Newton's method on the periodicity gives the start, with the monodromy of the march. The next period has to
+confirm this start.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from solver.contact import archard
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
 
-PLAIN_PERIODS = 4  # before Newton's method is used on the periodicity; most pairs repeat within two
-SMALLEST_DETERMINANT = 1e-9  # of 1 - monodromy: below it something does not fade from period to period, and is marched
+PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
+SMALLEST_DETERMINANT = 1e-9  # of 1 - monodromy: below it a part of the state does not fade, and the plain march goes on
 
 slip_work_rate = njit()(archard.slip_work_rate)
 slip_work_slopes = njit()(archard.slip_work_slopes)
@@ -43,20 +44,20 @@ def march_period(
     periodicity : float
         Accepted difference of the state over a period, N.
     most_periods : int
-        Periods after which a state that does not repeat is taken as it is.
+        Largest number of periods; then a state that is not periodic is accepted.
 
     Returns
     -------
     force_t : array (n_contact, 3, N)
         Contact force, N, compression positive.
     state_t : array (n_contact, 2, N+1)
-        Tangential state of the last period, its start first, N.
+        Tangential state of the last period, beginning with its start, N.
     status_t : array (n_contact, N)
-        SEPARATED, STICK, SLIP.
+        SEPARATED, STICK or SLIP.
     periods : array (n_contact,)
         Number of periods marched.
     periodicity_error : array (n_contact,)
-        What is left of the change of the state over the last period, N.
+        Change of the state over the last period, N.
     """
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))
@@ -101,7 +102,7 @@ def march_period(
             periodicity_error[pair] = np.hypot(change_1, change_2)
             if not moved or (period > 0 and periodicity_error[pair] <= periodicity):
                 break
-            # a plain period never takes the state further away; one from a start that Newton's method gave may
+            # a plain period never increases the change; a period from a start of Newton's method may
             if tracked and periodicity_error[pair] < 0.5 * before:
                 before = periodicity_error[pair]
                 missing_1, missing_2, found = solve_periodicity(monodromy, change_1, change_2)
@@ -115,7 +116,7 @@ def march_period(
 
 @njit(cache=True)
 def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -> tuple[float, float, bool]:
-    """Solution of `(I - monodromy) x = change`, and whether there is one that means anything."""
+    """Solution of `(I - monodromy) x = change`, and whether the determinant is large enough for one."""
     a, b = 1.0 - monodromy[0, 0], -monodromy[0, 1]
     c, d = -monodromy[1, 0], 1.0 - monodromy[1, 1]
     determinant = a * d - b * c
@@ -126,10 +127,10 @@ def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -
 
 @njit(cache=True)
 def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
-    """Slip work of a period, as force times state: N * N, (n_contact,); divided by the tangential penalty it is in J.
+    """Slip work of a period times the tangential penalty (n_contact,), N * N.
 
-    Eqs. (7), (21) with the sliding velocity (the print has the displacement), integrated as normal force times
-    increments of the corrected slip (`increment_work`).
+    Eqs. (7), (21) with the sliding velocity (the print has the displacement): sum of normal force times increment of
+    the tangential state (`increment_work`).
     """
     n_contact, _, n_samples = force_t.shape
     integral = np.zeros(n_contact)
@@ -145,12 +146,12 @@ def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def increment_work(normal_before: float, normal: float, slip: float) -> float:
-    """Slip work of an increment of slip by the trapezoidal rule: under the mean of the normal forces of its ends."""
+    """Slip work of an increment of slip by the trapezoidal rule, with the mean of the normal forces at both ends."""
     return slip_work_rate(0.5 * (normal_before + normal), slip)
 
 
 @njit(cache=True)
 def increment_slopes(normal_before: float, normal: float, slip: float) -> tuple[float, float]:
-    """Derivatives of `increment_work` with respect to the normal force of either end, and to the slip."""
+    """Derivatives of `increment_work` with respect to the normal force at each end, and to the slip."""
     by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
     return 0.5 * by_normal, by_slip

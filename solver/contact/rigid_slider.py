@@ -1,20 +1,21 @@
 """Friction of a mass that sits directly on a slider, through one period. Floats and arrays only.
 
-A rigid Coulomb force jumps where the mass turns, so its harmonics fall as 1/n and the harmonics of the motion that are
-left out as 1/n^3: at a handful of harmonics a balance of truncated series is wrong by per cents. Above the highest
-harmonic, though, the structure answers with its mass alone. So the motion of such a pair is marched through the period,
+A rigid Coulomb force jumps where the mass turns. So the harmonics of the force fall as 1/n, and the harmonics of the
+motion as 1/n^3: a balance of a few harmonics is wrong by some per cent. Above the highest harmonic H, however, the
+structure acts by its mass alone. So the motion of such a pair is marched through the period,
 
     m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
 
-where p is the predicted force of the pair. Its harmonics up to H are the unknowns of the balance, and (*) defines the
-motion that belongs to them, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: nothing is left out there. The harmonics
-of lambda above H act on the mass m in the march, which is what the structure does with them up to `k / (n w)^2 m`.
-So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the balance is closed by
-the tail. The drag c forgets the start of the period; it acts on p and on the march alike and cancels up to H.
+where p is the predicted force of the pair. The harmonics of p up to H are the unknowns of the balance. Equation (*)
+defines their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`, without truncation. The harmonics of lambda
+above H act on the mass m in the march, as in the structure, up to a relative error of `k / (n w)^2 m`.
+So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the march supplies the
+harmonics above H. The drag c removes the influence of the start of the period. The drag is part of p and of the
+march, and cancels up to H.
 
-In a step of length dt the force and the friction limit are constant, `p` as the mean over the step (`step_mean`), and
-the instant at which the mass turns or comes to rest inside the step is resolved: the residual is then smooth, and the
-error of second order in dt. With two tangents there is no such instant, and the step is divided instead.
+In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
+which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.
+With two tangents there is no such instant, and the step is divided instead.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from solver.contact import archard
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
 from solver.model import FloatArray, IntArray
 
-PARTS = 8  # of a step of a pair with two tangents
-SAME_VELOCITY = 1e-13  # of the velocity that the force reaches in a period: the motion has repeated
-MOST_MASS_PERIODS = 500  # the drag halves what is left in each (`solver.structure.penalty`): far more than it takes
+PARTS = 8  # parts of a step of a pair with two tangents
+SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
+MOST_MASS_PERIODS = 500  # far more than needed: the drag halves the change in each period
 
 slip_work_rate = njit()(archard.slip_work_rate)
 
@@ -37,12 +38,15 @@ slip_work_rate = njit()(archard.slip_work_rate)
 def step_line(
     force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
 ) -> tuple[float, float, float, float]:
-    """One step along one line: mean friction force, velocity after it, and mean velocity and speed over it.
+    """One step along one line: mean friction force, velocity after the step, mean velocity and mean speed in the step.
 
-    Coulomb's law on a line, `coulomb.friction_force` with one direction, with its switches resolved inside the step.
+    Coulomb's law in one direction (`coulomb.friction_force`). Changes between stick and slip inside the step are
+    resolved.
 
-    gain, loss: `m/dt + c/2` and `m/dt - c/2`, so that `gain after = force - friction + loss before`. `tangent` (3, 3)
-    receives the derivatives of (friction, velocity after, mean speed) with respect to (force, velocity, limit).
+    - force, velocity, limit: mean force, N, velocity before the step, m/s, and friction limit, N.
+    - gain, loss: `m/dt + c/2` and `m/dt - c/2`, so that `gain after = force - friction + loss before`.
+    - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) with respect to (force,
+      velocity, limit).
     """
     tangent[:, :] = 0.0
     if velocity == 0.0:
@@ -78,7 +82,7 @@ def step_line(
     fraction_limit = -fraction / retarding
     speed = sign * velocity
     if sign * force >= -limit:
-        # it stays: what is left of the step holds the force itself
+        # the mass remains at rest: in the rest of the step friction equals the force
         tangent[0, 0] = 1.0
         tangent[0, 1] = loss
         tangent[2, 0] = 0.5 * fraction_force * speed
@@ -115,8 +119,9 @@ def step_plane(
 ) -> None:
     """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, force and velocity (2,).
 
-    `out` (7,) receives the mean friction force (2), the velocity after (2), the mean velocity (2) and the mean speed.
-    `tangent` (5, 5): of (friction, velocity after, mean speed) with respect to (force, velocity, limit).
+    - out (7,): receives mean friction force (2), velocity after the step (2), mean velocity (2) and mean speed.
+    - tangent (5, 5): receives the derivatives of (friction, velocity after, mean speed) with respect to (force,
+      velocity, limit).
     """
     mass, drag = 0.5 * (gain + loss), gain - loss
     gain = PARTS * mass + 0.5 * drag
@@ -124,7 +129,7 @@ def step_plane(
     out[:] = 0.0
     tangent[:, :] = 0.0
     first, second = velocity[0], velocity[1]
-    inner = np.zeros((2, 5))  # of the velocity, with respect to (force, velocity, limit)
+    inner = np.zeros((2, 5))  # derivative of the velocity with respect to (force, velocity, limit)
     inner[0, 2] = 1.0
     inner[1, 3] = 1.0
     drive = np.empty((2, 5))
@@ -196,7 +201,7 @@ def step_mass(
     out: FloatArray,
     tangent: FloatArray,
 ) -> None:
-    """One step of a pair, as `step_plane`; line: 0 or 1 where only that tangent exists, -1 where both do."""
+    """One step of a pair, as `step_plane`. line: 0 or 1, the index of the only tangent; -1 for two tangents."""
     if line < 0:
         step_plane(force, velocity, limit, gain, loss, out, tangent)
         return
@@ -223,11 +228,11 @@ def march_masses(
     Parameters
     ----------
     predicted_t : array (n_contact, 3, N)
-        Predicted force, N; the normal one at the samples, the tangential ones as means over the steps around them.
+        Predicted force, N: normal component at the samples, tangential components as means over the steps.
     friction : array (n_contact,)
         Friction coefficient.
     mass, drag : array (n_contact,)
-        kg, N s/m.
+        Mass, kg, and drag, N s/m.
     line : array (n_contact,)
         As in `step_mass`.
     step : float
@@ -236,17 +241,17 @@ def march_masses(
     Returns
     -------
     force_t : array (n_contact, 3, N)
-        Contact force, N, compression positive, the tangential one as the mean over the step.
+        Contact force, N, compression positive; tangential components as means over the steps.
     velocity_t : array (n_contact, 2, N+1)
-        At the ends of the steps, m/s.
+        Velocity at the ends of the steps, m/s.
     place_t : array (n_contact, 2, N+1)
         Displacement since the start of the period, m.
     status_t : array (n_contact, N)
-        SEPARATED, STICK, SLIP.
+        SEPARATED, STICK or SLIP.
     slip_work : array (n_contact,)
         Integral of normal force times speed over the period, J.
     periodicity_error : array (n_contact,)
-        What is left of the change of the velocity over the last period, as a force m v / dt, N.
+        Change of the velocity over the last period, as a force m v / dt, N.
     """
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))

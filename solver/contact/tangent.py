@@ -1,6 +1,6 @@
-"""Exact derivatives through one period, periodicity included, of elastic pairs and masses. Floats and arrays only.
+"""Exact derivatives of the periodic state of elastic pairs and of masses, including the periodicity.
 
-That of a sample is in `coulomb`, that of a step of a mass in `rigid_slider`.
+Floats and arrays only. `coulomb` has the derivative of a sample, `rigid_slider` the derivative of a step of a mass.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ def march_tangent(
     analysis: FloatArray,
     has_normal: BoolArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivative of what `march_period` and `integrate_slip_work` give, the periodicity included.
+    """Derivatives of the results of `march_period` and `integrate_slip_work`, including the periodicity.
 
-    The last period gives the derivatives with its start held and those with respect to its start. The start moves with
-    the predicted force as a state that repeats has to; where nothing makes it do so (the pair has come to stick), as it
-    has been marched to.
+    The last period gives the derivatives with its start held, and the derivatives with respect to its start. The
+    derivative of the start follows from the periodicity. Where the periodicity does not determine the start (the pair
+    has come to stick), the derivative of the start follows from the periods before.
 
     Parameters
     ----------
     predicted_t, friction, start : array
-        As `march_period` was given them.
+        Arguments of `march_period`.
     state_t, periods : array
-        As it has returned them.
+        Results of `march_period`.
     line : array (n_contact,)
-        As in `rigid_slider.step_mass`; a tangent that does not exist is returned as one that sticks.
+        As in `rigid_slider.step_mass`. A tangent that does not exist is returned as sticking.
     synthesis, analysis : array (m, N), (N, m)
-        Of the Fourier basis.
+        Matrices of the Fourier basis.
     has_normal : array (n_contact,)
         False where the normal force is constant.
 
@@ -55,7 +55,7 @@ def march_tangent(
     """
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
-    # rows of the transposes are contiguous, which is what the loops over columns need
+    # rows of the transposes are contiguous, as the loops over columns need
     basis_t = np.ascontiguousarray(synthesis.T)
     force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
     slip_work_tangent = np.zeros((n_contact, 3 * m))
@@ -141,10 +141,10 @@ def march_tangent(
 
 @njit(cache=True)
 def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, int]:
-    """Columns of the derivatives of a pair: the first of each component (3,), -1 for none, and how many (3m at most).
+    """Columns of the derivatives of a pair: first column of each component (3,), -1 for none, and number of columns.
 
-    A pair with one tangent has the columns that there are alone, `line` as in `rigid_slider.step_mass`; one with both
-    has room for all of them.
+    A pair with one tangent (`line` as in `rigid_slider.step_mass`) has the columns of its components alone; a pair with
+    both tangents has 3m columns.
     """
     columns = np.array([0 if has_normal else -1, m, 2 * m])
     if line < 0:
@@ -158,7 +158,7 @@ def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, int]:
 def _line_tangent(
     tangent: FloatArray, dforce: FloatArray, dstart: FloatArray, analysis_t: FloatArray, line: int, columns: IntArray
 ) -> None:
-    """Tangent (3m, 3m) of a pair with one tangent, in place, from `dforce` (N, width + 2), that of its force."""
+    """Tangent (3m, 3m) of a pair with one tangent, in place; `dforce` (N, width + 2): derivative of its force."""
     m, n_samples = analysis_t.shape
     width, own, rows = dstart.shape[1], columns[1 + line], (1 + line) * m
     closed = np.empty((n_samples, width))
@@ -187,9 +187,11 @@ def start_tangent(
     basis_t: FloatArray,
     columns: IntArray,
 ) -> None:
-    """Derivative (2, width) of the start of the last period, into `dstart`; `dstate` (2, width + 2): that of its end.
+    """Derivative of the start of the last period, into `dstart` (2, width).
 
-    periods: those to march before the last one where the periodicity does not say it, 0 where the start is given.
+    - dstate (2, width + 2): derivative of the end of the last period.
+    - periods: number of periods before the last one, which give the derivative where the periodicity does not; 0 where
+      the start is given.
     """
     width = dstart.shape[1]
     dstart[:, :] = 0.0
@@ -236,15 +238,15 @@ def mass_tangent(
     Parameters
     ----------
     predicted_t, friction, mass, drag, line, step
-        As `march_masses` was given them.
+        Arguments of `march_masses`.
     start : array (n_contact, 2)
         Velocity at the start of the period, m/s.
     synthesis : array (m, N)
-        Gives the normal force at the samples.
+        From the harmonics to the normal force at the samples.
     step_synthesis : array (m, N)
-        Gives the tangential forces as means over the steps.
+        From the harmonics to the means of the tangential forces over the steps.
     step_analysis : array (N, m)
-        Gives their harmonics back from such means.
+        From the means of the tangential forces back to their harmonics.
     has_normal : array (n_contact,)
         False where the normal force is constant.
 
@@ -253,7 +255,7 @@ def mass_tangent(
     force_tangent : array (n_contact, 3m, 3m)
         As `march_tangent`, without its normal rows, dimensionless.
     slip_work_tangent : array (n_contact, 3m)
-        Of the slip work, m.
+        Derivative of the slip work, m.
     """
     n_contact, _, n_samples = predicted_t.shape
     m = synthesis.shape[0]
@@ -268,7 +270,7 @@ def mass_tangent(
         columns, width = pair_columns(m, line[pair], has_normal[pair])
         tangents = np.array([0, 1]) if line[pair] < 0 else np.array([line[pair]])
         leave = np.empty((5, width + 2))
-        # in whole blocks of 8 columns: so the product below rounds as it does with more of them
+        # in whole blocks of 8 columns: the round-off of the product below does not depend on the number of columns
         padded = width + 2 if line[pair] < 0 else (width + 2 + 7) // 8 * 8
         dforce_t = np.zeros((n_samples, tangents.size, padded))
         work = np.zeros(width + 2)
@@ -283,7 +285,7 @@ def mass_tangent(
             normal = max(predicted_t[pair, 0, n], 0.0)
             limit = friction_limit(friction[pair], normal)
             step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line[pair], out, local)
-            # entry holds the velocities; both forces and the friction limit have columns of their own
+            # entry holds the derivatives of the velocities; both forces and the friction limit have their own columns
             for row in range(5):
                 first, second = local[row, 2], local[row, 3]
                 for column in range(width + 2):

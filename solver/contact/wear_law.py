@@ -1,21 +1,21 @@
-"""Wear laws: how much of the slip work of a pair wears. Every other law is Archard's with another work.
+"""Wear laws. Each law is Archard's law with another work in place of the slip work.
 
-The depth of a pair grows in a cycle by `k_w / alpha` times the *wearing work* X, J, of Eqs. (7), (21) (`archard`):
+The wear depth of a pair grows in a cycle by `k_w / alpha` times the *wearing work* X, J, Eqs. (7), (21) (`archard`):
 
     X = c f(p, W) max(S - q alpha, 0)
 
-with S the slip work, J, p the mean pressure over the period, Pa, W the depth, m, and alpha the area of the pair, m2:
+with the slip work S, J, the mean pressure over the period p, Pa, the depth W, m, and the area of the pair alpha, m2:
 
 - `archard`: X = S.
-- `energy`: c = mu, so that X = mu S is what friction dissipates (`alternating_frequency_time.friction_work`) and the
-  coefficient is the energy wear coefficient, volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger,
+- `energy`: c = mu, so that X = mu S is the energy dissipated by friction (`alternating_frequency_time.friction_work`).
+  k_w is then the energy wear coefficient, volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger,
   Wear 255 (2003) 287).
-- `threshold`: q, J/m2, is a slip work density of a cycle below which nothing wears; only what is above wears.
-- `table`: f is given at pressures and depths, bilinear between them and constant beyond, so that `k_w f` is a wear
-  coefficient that depends on both.
+- `threshold`: q, J/m2, is a density of slip work per cycle. Only slip work above this threshold wears.
+- `table`: f is given at pressures and depths, with bilinear interpolation and constant extrapolation. `k_w f` is then
+  a wear coefficient that depends on pressure and depth.
 
-With each of them c may differ between surfaces. All are proportional to the coefficient. An implicit step solves
-`W = W_k + gain X(S, p, W)` at each pair by itself, as Archard's does: W is eliminated there.
+In each law c may differ between surfaces, and the wear rate is proportional to k_w. An implicit step solves
+`W = W_k + gain X(S, p, W)` for each pair separately and so eliminates W.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LAWS = ("archard", "energy", "threshold", "table")
 
 @dataclass(frozen=True)
 class WearTable:
-    """Factors of the wear coefficient, 1: a row for each of the ascending pressures, Pa, a column for each depth, m."""
+    """Factors of the wear coefficient, 1: a row for each pressure, Pa, a column for each depth, m, both ascending."""
 
     pressure: tuple[float, ...]
     depth: tuple[float, ...]
@@ -40,13 +40,15 @@ class WearTable:
 
 @dataclass(frozen=True)
 class WearLaw:
-    """A wear law as a study names it.
+    """A wear law in the terms of a study.
 
-    name: one of `LAWS`. threshold: q, J/m2 in a cycle. table: of the law of that name. surfaces: factors of the wear
-    coefficient by the label of a surface; a pair whose label names both of its sides, as "flat/cylinder", has the sum
-    of both. Empty: 1 on each pair. proportional: whether the rate is proportional to the wear coefficient,
-    `dW/dt = k_w f(W)`: then a history depends on wear coefficient and cycles through `k_w` times cycles only, and
-    nothing wears at 0.
+    - name: one of `LAWS`.
+    - threshold: q of the law "threshold", J/m2 per cycle.
+    - table: of the law "table".
+    - surfaces: factor of the wear coefficient for each label of a surface. A pair whose label names both sides, as
+      "flat/cylinder", has the sum of both factors. Empty: factor 1 for each pair.
+    - proportional: whether the wear rate is proportional to the wear coefficient, `dW/dt = k_w f(W)`. A history then
+      depends on `k_w` times cycles only, and nothing wears at `k_w` = 0.
     """
 
     name: str = "archard"
@@ -60,9 +62,9 @@ ARCHARD = WearLaw()
 
 
 def surface_factors(labels: tuple[str, ...], surfaces: tuple[tuple[str, float], ...]) -> FloatArray:
-    """Factor (n_contact,) of each pair from those of the surfaces that its label names.
+    """Factor (n_contact,) of each pair: the sum of the factors of the surfaces in its label.
 
-    Raises ValueError where a label names a surface without a factor, or a factor is of no surface that there is.
+    Raises ValueError where a surface has no factor, or where a factor belongs to no surface of the pairs.
     """
     given = dict(surfaces)
     sides = [label.split("/") for label in labels]
@@ -75,11 +77,14 @@ def surface_factors(labels: tuple[str, ...], surfaces: tuple[tuple[str, float], 
 
 @dataclass(frozen=True)
 class WearingWork:
-    """The work that wears the pairs of one joint. What is None is not in the law.
+    """The wearing work of the pairs of one joint. Attributes that a law does not use are None.
 
-    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. pressure (n_p,), Pa, depth (n_d,), m, and table
-    (n_p, n_d): f. area (n_contact,): alpha, m2, used by the table alone. depth_held: whether derivatives leave out what
-    the depth itself does.
+    - factor (n_contact,): c, 1.
+    - least (n_contact,): q alpha, J.
+    - pressure (n_p,), Pa, depth (n_d,), m: arguments of the table.
+    - table (n_p, n_d): f, 1.
+    - area (n_contact,): alpha, m2, for the table alone.
+    - depth_held: whether derivatives leave out the dependence on the depth.
     """
 
     factor: FloatArray | None = None
@@ -92,19 +97,19 @@ class WearingWork:
 
     @property
     def largest_factor(self) -> float:
-        """Wearing work over slip work, at most, 1."""
+        """Largest possible ratio of wearing work to slip work, 1."""
         largest = 1.0 if self.factor is None else float(self.factor.max(initial=0.0))
         return largest if self.table is None else largest * float(self.table.max())
 
     def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
-        """X (n_contact,), J.
+        """Wearing work X (n_contact,), J.
 
         Parameters
         ----------
         slip_work
             S (n_contact,), J.
         normal_force
-            Mean over the period (n_contact,), N.
+            Mean normal force over the period (n_contact,), N.
         depth
             W (n_contact,), m.
         """
@@ -130,7 +135,7 @@ class WearingWork:
         return by_work * value, work * by_force, np.zeros_like(work) if self.depth_held else work * slope
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
-        """Relative error of the wearing work of all pairs over that of their slip work, 1; more near a threshold."""
+        """Ratio of the relative errors of total wearing work and slip work, 1; above 1 near a threshold."""
         if self.least is None:
             return 1.0
         worn = float(self.work(slip_work, normal_force, depth).sum())
@@ -142,14 +147,16 @@ class WearingWork:
     ) -> FloatArray:
         """Growth of the depth (n_contact,), m, in a step: the least root y of `y = gain X(S, p, before + y)`.
 
-        gain (n_contact,): `archard.wear_gain` of the step, m/J. before (n_contact,): depth that the step adds to, m.
+        - gain (n_contact,): `archard.wear_gain` of the step, m/J.
+        - before (n_contact,): depth at the start of the step, m.
+
         Between two depths of the table both sides are straight lines, so that the root is exact.
         """
         work = self._without_table(slip_work)
         if self.table is None or self.depth is None:
             return gain * work
         by_depth, _ = self._at_pressure(normal_force)
-        # at growths y_0 = 0 and those that reach the depths of the table: y - gain X
+        # y - gain X at the growth y = 0 and at the growths that reach the depths of the table
         grown = np.maximum(self.depth[None, :] - before[:, None], 0.0)
         there = np.where(grown > 0.0, by_depth, self._at_depth(by_depth, before)[0][:, None])
         steep = gain * work
@@ -171,9 +178,9 @@ class WearingWork:
         slip_work_tangent: FloatArray,
         normal_force_tangent: FloatArray,
     ) -> FloatArray:
-        """Derivative (n_contact, k) of the growth from those of slip work and mean normal force, (n_contact, k).
+        """Derivative (n_contact, k) of the growth from the derivatives (n_contact, k) of slip work and mean force.
 
-        at: slip work, J, normal force, N, and depth, m, at the end of the step, (n_contact,) each.
+        at: slip work, J, mean normal force, N, and depth, m, at the end of the step, (n_contact,) each.
         """
         if self.table is None:
             return (gain * self.slopes(*at)[0])[:, None] * slip_work_tangent
@@ -187,7 +194,7 @@ class WearingWork:
         return work if self.factor is None else self.factor * work
 
     def _at_pressure(self, normal_force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The table at the pressures of the pairs (n_contact, n_d), and its derivative to the normal force, 1/N."""
+        """Rows of the table at the pressures of the pairs (n_contact, n_d), and derivative to the normal force, 1/N."""
         assert self.pressure is not None
         assert self.table is not None
         assert self.area is not None
@@ -211,7 +218,7 @@ ARCHARDS_WORK = WearingWork()
 
 
 def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
-    """Place of the knot before each value, fraction of the way to the next one, and that way; 0 beyond the ends."""
+    """Index of the knot before each value, fraction of the interval, and its width; both are 0 beyond the ends."""
     place = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 1)
     width = np.append(np.diff(knots), 0.0)[place]
     width = np.where(at < knots[0], 0.0, width)
@@ -220,21 +227,21 @@ def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray,
 
 
 def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
-    """The work that wears the pairs of a joint by a law.
+    """The wearing work of the pairs of a joint under a wear law.
 
     Parameters
     ----------
     law
-        As a study names it.
+        The wear law.
     contact
-        The pairs: areas, and the labels of their surfaces.
+        The pairs, with their areas and the labels of their surfaces.
     friction_coefficient
-        (n_contact,), of each pair.
+        (n_contact,), for each pair.
 
     Raises
     ------
     ValueError
-        Where the law is none of `LAWS`, or the surfaces that it names are not those of the pairs.
+        The law is not in `LAWS`, or its surfaces are not the surfaces of the pairs.
     """
     if law.name not in LAWS:
         raise ValueError(f'wear law "{law.name}": give one of {", ".join(LAWS)}')

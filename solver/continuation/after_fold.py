@@ -1,4 +1,4 @@
-"""States after a fold: where the vibration can go on when its branch ends while the joint wears."""
+"""Stable states behind a fold: candidates for the vibration when its branch ends while the joint wears."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ from solver.structure.joint import Case, Joint
 def states_after_fold(
     case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
 ) -> Iterator[PathPoint | Outcome]:
-    """Stable states beyond the end of a branch, the most physical one first; each is sought when it is asked for.
+    """Stable states behind the end of a branch, in the order of physical preference. Each is computed on demand.
 
-    First the periodic state to which the structure relaxes in time at the wear depth beyond the end; then the branch at
-    the depth of the last state, followed along the frequency through its folds and back to the same frequency; then a
-    state from nothing.
+    1. The periodic state to which the structure relaxes in time, at the wear depth behind the end.
+    2. States of the branch at the depth of the last state: the branch is followed along the frequency through its folds
+       and back to the frequency of the last state.
+    3. A first state, computed from rest (`first_state`).
 
     Parameters
     ----------
     case, joint : Case, Joint
-        Where the branch ends.
+        Model, settings and joint at the end of the branch.
     last : PathPoint
         The last state of the branch.
     worn : array (n_contact,)
-        Wear depth just beyond the end of the branch, m.
+        Wear depth just behind the end of the branch, m.
     solver, budget
         As in `solve_balance`.
 
     Yields
     ------
     PathPoint or Outcome
-        A state, or last of all why there is no (other) one. Where the mean positions run away at the first attempt,
-        ADRIFT, no other one is made.
+        States, and at the end the outcome where the last attempt fails. Where the mean positions run away in the
+        relaxation (ADRIFT), no other attempt is made.
     """
     outcome, relaxed = relax_to_periodic(case, joint, worn, last.evaluation, joint, last.history, solver, budget)
     if relaxed is not None:
@@ -59,7 +60,7 @@ def states_after_fold(
         return is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), solver)
 
     tolerance = case.settings.tolerance
-    # the target is the frequency of the state itself
+    # the target is the frequency of the last state
     start = PathPoint(joint.omega, last.evaluation, last.evaluation.history)
     span = CONTINUATION.fold_search_length * joint.omega
     for toward in (-1.0, 1.0):

@@ -1,7 +1,7 @@
-"""Pseudo-arc-length continuation of a branch through its folds, until an accepted state at the target is reached.
+"""Pseudo-arc-length continuation of a branch through its folds to an accepted state at a target.
 
-Each step solves the bordered system by block elimination with the solver of the plain Jacobian: two right-hand sides,
-one kept factorisation.
+Each step solves the bordered system by block elimination. The solver of the plain Jacobian gives the solutions for two
+right-hand sides from one factorisation.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from solver.newton.solve_balance import Budget, solve_balance
 
 @dataclass(frozen=True)
 class ArcResult:
-    """End of a continuation by arc length.
+    """Result of a continuation by arc length.
 
-    point: state at the target, None where it was not reached. folds: values of the parameter at which it turned back.
-    jumps: those of the folds at which a slow change of the parameter makes the state jump: where the branch has
-    returned to their value of the parameter, the vibration is another one.
+    - point: state at the target; None where the target was not reached.
+    - folds: values of the parameter at which the branch turns back.
+    - jumps: the folds at which the state jumps when the parameter changes slowly. Where the branch returns to the
+      parameter of such a fold, the vibration is a different one.
     """
 
     point: PathPoint | None
@@ -45,28 +46,28 @@ def follow_arc(
     toward: float = 0.0,
     beyond: bool = True,
 ) -> ArcResult:
-    """Follow the branch by arc length, through folds, until it crosses the target in a state that is accepted.
+    """Follow the branch by arc length, through folds, to an accepted state at the target.
 
-    The history is held at that of the start. The search also ends at a distance of `CONTINUATION.farthest` from start
-    and target, and after `CONTINUATION.arc_steps` steps.
+    The tangential history of the start is held. The search also ends at a distance of `CONTINUATION.farthest` from
+    start and target, and after `CONTINUATION.arc_steps` steps.
 
     Parameters
     ----------
     balance_at : callable
-        Balance at a value of the parameter, of pairs with a history (n_contact, 2), m.
+        Balance at a value of the parameter for a tangential history (n_contact, 2), m.
     start : PathPoint
-        State to begin with.
+        First state of the branch.
     target, span : float
-        Value of the parameter that is sought, and its natural length.
+        Target of the parameter, and the natural length of the parameter, which scales the arc.
     solver, tolerance, budget
         As in `solve_balance`.
     accept : callable
         Whether a state at the target ends the search.
     toward : float
-        Sign of the parameter's first step where that is not towards the target; the target may then be the start.
+        Sign of the first change of the parameter; by default towards the target. Needed where the target is the start.
     beyond : bool
-        False ends the search where the branch comes to the target before any fold in a state that is not accepted. It
-        has lost its stability otherwise than at a fold, and where it comes to later no slow change leads.
+        False ends the search where the branch reaches the target before any fold in a state that is not accepted. The
+        branch has then lost its stability otherwise than at a fold, and no slow change leads to its later states.
     """
     toward = toward or float(np.sign(target - start.parameter)) or 1.0
     arc = _Arc(
@@ -99,7 +100,7 @@ def follow_arc(
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
-            # the start lies so near to a fold that the first step goes round it
+            # the start lies so near to a fold that the first step passes the fold
             if 0.25 * length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
                 length *= 0.25
                 failures += 1
@@ -125,9 +126,9 @@ def follow_arc(
 
 
 def _jumps(folds: list[float], turns: list[int], points: list[PathPoint], toward: float) -> tuple[float, ...]:
-    """Folds at which the branch turns back and returns with another vibration; turns: the places of the folds."""
+    """Folds behind which the branch returns with a different vibration. turns: indices of the folds in `points`."""
     jumps: list[float] = []
-    free = 0  # folds between another one and the return of the branch do not count
+    free = 0  # folds between an earlier fold and the return of the branch do not count
     for fold, turn in zip(folds, turns, strict=True):
         if turn < free:
             continue
@@ -142,7 +143,7 @@ def _jumps(folds: list[float], turns: list[int], points: list[PathPoint], toward
 
 @dataclass
 class _Arc:
-    """Arc-length steps in the scaled unknowns (p / size, parameter / span); the history is held."""
+    """Arc-length steps in the scaled unknowns (p / size, parameter / span). The tangential history is held."""
 
     balance_at: BalanceAt
     history: FloatArray
@@ -157,21 +158,21 @@ class _Arc:
     def slope(self, parameter: float, evaluation: Evaluation) -> FloatArray:
         """Derivative (n_rel, m), N, of the residual with respect to parameter / span.
 
-        A difference: it only gives directions to the corrector, whose residual is exact.
+        A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
         step = CONTINUATION.parameter_difference
         ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 
     def tangent(self, parameter: float, evaluation: Evaluation) -> FloatArray | None:
-        """Unit tangent of the branch, of either sign; None where it is not defined."""
+        """Unit tangent of the branch, of either sign; None where the tangent is not defined."""
         balance = self.balance_at(parameter, self.history)
         step = self.solver.solve(balance.linearise(evaluation), -self.slope(parameter, evaluation)) / self.size
         tangent = np.append(step.ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
             return None
-        # near a fold the step is so long that its square overflows, yet its direction is right
+        # near a fold the square of the step may overflow, although its direction is right
         tangent /= largest
         return np.asarray(tangent / np.linalg.norm(tangent))
 
@@ -187,7 +188,7 @@ class _Arc:
             parameter = float(unknown[-1] * self.span)
             balance = self.balance_at(parameter, self.history)
             evaluation = balance.evaluate(unknown[:-1].reshape(shape) * self.size)
-            # zero but for round-off: the plane across the tangent is linear, and every iterate lies in it
+            # zero but for round-off: every iterate lies in the plane across the tangent
             ahead = float(tangent @ (unknown - base)) - length
             norm = evaluation.scaled_residual()
             if norm <= tolerance:
@@ -210,11 +211,11 @@ class _Arc:
     def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget
     ) -> PathPoint | None:
-        """Point behind a corner of the branch, where a contact sample changes its state and the branch may turn back.
+        """Point behind a corner of the branch; None where no point is found.
 
-        The plane across the old tangent need not meet the branch behind the corner. The tangent of the piece behind it
-        is taken a little ahead of the point, and both of its signs are tried; a solution back on the old piece is
-        refused.
+        At a corner a contact sample changes its status, and the branch may turn back. The plane across the old tangent
+        may not meet the branch behind the corner. So the tangent behind the corner is taken a little ahead of the
+        point, and both signs of this tangent are tried. A solution on the branch before the corner is refused.
         """
         shape = point.evaluation.predicted_h.shape
         base = self.place(point.parameter, point.evaluation)
@@ -237,7 +238,7 @@ class _Arc:
     def state_at(
         self, before: PathPoint, after: PathPoint, target: float, tolerance: float, budget: Budget
     ) -> PathPoint | None:
-        """State at the target between two points of the branch; None where Newton's method leaves them."""
+        """State at the target between two points of the branch; None where Newton's method ends far from both."""
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         start = one + fraction * (other - one)
@@ -249,10 +250,10 @@ class _Arc:
         return PathPoint(target, result.evaluation, self.history) if result.converged and near else None
 
     def fold(self, points: list[PathPoint], tolerance: float, budget: Budget) -> float:
-        """Extreme value of the parameter among three points around a fold.
+        """Extreme value of the parameter at a fold, from three points around the fold.
 
-        The vertex of the parabola through the parameter over the chord length; a point of the branch is added there and
-        takes the place of one of the outer ones, a few times.
+        The value is the vertex of the parabola of the parameter over the chord length. Before, a few points of the
+        branch are added near the vertex, each in place of an outer point.
         """
         top = points[1].parameter > points[0].parameter
         for _ in range(CONTINUATION.fold_points):
@@ -276,7 +277,7 @@ class _Arc:
         at = np.array([-np.linalg.norm(places[1] - places[0]), 0.0, np.linalg.norm(places[2] - places[1])])
         square, slope, height = np.polyfit(at, [place[-1] for place in places], 2)
         vertex = -0.5 * slope / square if square != 0.0 else 0.0
-        # at a corner of the branch the parabola means nothing: no farther than the neighbours
+        # at a corner of the branch the parabola has no meaning: the vertex must lie between the neighbours
         inside = at[0] < vertex < at[2] and abs(0.5 * slope * vertex) < max(
             abs(places[1][-1] - places[0][-1]), abs(places[2][-1] - places[1][-1])
         )

@@ -1,4 +1,4 @@
-"""The first state of a joint: the static one, and the periodic one that is reached from it."""
+"""The first states of a joint: the static state, and the periodic state that is reached from the static one."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from solver.structure.joint import Case, Joint, static_joint
 
 
 def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, budget: Budget) -> PathPoint | None:
-    """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), the load raised from nothing.
+    """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    The state depends on the history of the load, so it is raised in equal steps and each starts from the tangential
-    state of the one before. In the first evaluation the pairs stick. Steps that Newton's method does not find are found
-    by a homotopy in the friction coefficient.
+    The state depends on the history of the load. So the load is raised in equal steps, and each step starts from the
+    tangential state of the step before. In the first evaluation all pairs stick. Where Newton's method fails, a
+    homotopy in the friction coefficient finds the state.
 
     Parameters
     ----------
     joint : Joint
-        Its excitation is left out.
+        The joint; its excitation is left out.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
     tolerance, budget
@@ -56,7 +56,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, b
     for step in range(2, n_steps + 1):
         load_factor = step / n_steps
         whole = balance_at(load_factor, point.history)
-        # without gaps and wear the state grows with its load; much friction allows others that do not
+        # without gaps and wear the state grows in proportion to its load; high friction also allows other states
         grown = point.evaluation.predicted_h * (step / (step - 1.0))
         result = solve_balance(whole, grown, solver, tolerance, budget, CONTINUATION.load_step_iterations)
         if result.converged:
@@ -80,20 +80,22 @@ def solve_first_state(
     solver: JacobianSolver,
     budget: Budget,
 ) -> tuple[Outcome, PathPoint | None]:
-    """Periodic state from nothing: the static state first, then the excitation is raised.
+    """First periodic state. These ways are tried in turn until one leads to a stable state:
 
-    A mass on a rigid slider has no state that is near both sticking and sliding: where raising the excitation fails or
-    ends in an unstable state, the vibration without the joint is tried as the start. Pairs that the static load has
-    left at their friction limit slip under the smallest vibration, in states that are not near the static one; they
-    shake down, so the excitation is raised from states of less static friction, too. Then the vibration builds up in
-    time under the whole excitation (`transient`), and arc length in the excitation comes last.
+    1. The static state is solved, and the excitation is raised from zero.
+    2. Newton's method starts from the vibration without the joint: a mass on a rigid slider has no state that is near
+       both sticking and sliding.
+    3. The excitation is raised from states with smaller static friction forces. Pairs that the static load leaves at
+       their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
+    4. The vibration builds up in time under the whole excitation (`transient`).
+    5. Where the first way did not reach the whole excitation, arc length continues from its last state.
 
     Parameters
     ----------
     case : Case
         Model, friction and settings.
     omega, excitation_amplitude : float
-        rad/s, N.
+        Angular frequency, rad/s, and excitation amplitude, N.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
     solver, budget
@@ -102,7 +104,7 @@ def solve_first_state(
     Returns
     -------
     outcome : Outcome
-        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE or ADRIFT.
+        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE, UNSETTLED or ADRIFT.
     point : PathPoint or None
         The state; its parameter is the load factor of the excitation, 1.
     """
@@ -157,7 +159,7 @@ def solve_first_state(
     if relaxed is not None:
         return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
-        # it comes last, and where the joint has no grip it goes round and round
+        # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
         limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
         span = CONTINUATION.load_length
         reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, stays).point
@@ -168,7 +170,7 @@ def solve_first_state(
 
 
 def _relieved(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:
-    """Tangential history (n_contact, 2), m, with which pairs carry a fraction less of their static friction force."""
+    """Tangential history (n_contact, 2), m, that reduces the static friction forces by a fraction."""
     return static.history + fraction * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 

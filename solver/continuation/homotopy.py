@@ -1,21 +1,21 @@
-"""Homotopies to states that Newton's method does not find at once: in the friction coefficient, in the harmonics.
+"""Homotopies in the friction coefficient and in the harmonics, to states that Newton's method does not find directly.
 
-*Friction.* A static state under little friction is found from nothing: where a pair slips its force is bound to the
-normal one. With a friction coefficient of 2 and more most pairs stick, and the first iterations do not show which of
-them slip, and in which direction: they cycle among sets of slipping pairs, or end in one of several states that exist
-then. With less friction the joint has one state, found in a few iterations. From there the friction coefficient is
-raised in steps of its logarithm: pairs stop slipping one by one, and the limit is the structure with its closed pairs
-glued.
+*Friction.* A static state under low friction is found from any start: where a pair slips, its friction force is bound
+to the normal force. With a friction coefficient of 2 and more most pairs stick, and several states may exist. The first
+iterations then do not show which pairs slip, and in which direction: they cycle among sets of slipping pairs, or end in
+one of the several states. With less friction the joint has one state, which takes a few iterations. From this state the
+friction coefficient is raised in steps of its logarithm. Pairs stop slipping one by one; in the limit all closed pairs
+are glued.
 
-*Harmonics.* A balance of H harmonics is the one of more harmonics in which the new ones take the contact force up
-exactly as the penalty E_n does: with the compliance G_n = 1 / Z_n replaced by 1 / E_n the predicted forces
-(1 - E_n G_n) lambda_n that were left out are zero (`solver.structure.penalty`). So with
+*Harmonics.* A balance of H harmonics equals a balance of more harmonics in which the structure answers to the new
+harmonics as the penalty E_n does. With the compliance G_n = 1 / Z_n replaced by 1 / E_n the predicted forces
+(1 - E_n G_n) lambda_n of the new harmonics are zero (`solver.structure.penalty`). The homotopy is
 
     G_n(s) = (1 - s) / E_n + s G_n
 
-for the new harmonics the known state is a solution at s = 0, and the state with all of them the one at s = 1; in
-between the predicted forces that were left out grow from nothing. The compliance is interpolated, since the stiffnesses
-of an elastic joint and of a mass have opposite signs: interpolated stiffnesses would pass through a resonance.
+for the new harmonics. At s = 0 the known state is a solution, at s = 1 the state with all harmonics. In between the
+predicted forces of the new harmonics grow from zero. The compliance is interpolated, not the stiffness: the stiffnesses
+of an elastic joint and of a mass have opposite signs, and interpolated stiffnesses would pass through a resonance.
 """
 
 from __future__ import annotations
@@ -41,24 +41,24 @@ from solver.structure.joint import Case, Joint
 def solve_from_less_friction(
     balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, budget: Budget
 ) -> PathPoint | None:
-    """State of a balance, by a homotopy from less friction where there is much or Newton's method fails.
+    """State of a balance, by a homotopy from less friction where friction is high or Newton's method fails.
 
-    The history of the balance is held: the states on the homotopy are no states of the joint.
+    The tangential history of the balance is held, because the states on the homotopy are no states of the joint.
 
     Parameters
     ----------
     balance : Balance
-        The problem.
+        The balance to be solved.
     start : array (n_rel, m)
-        Predicted force to begin with, N.
+        First predicted force, N.
     solver, tolerance, budget
         As in `solve_balance`.
 
     Returns
     -------
     PathPoint or None
-        The parameter of the point is the largest friction coefficient; those of all pairs are raised in proportion.
-        None where no state is found.
+        The state; its parameter is the largest friction coefficient. The friction coefficients of all pairs are raised
+        in proportion. None where no state is found.
     """
     target = balance.joint.friction_coefficient
     largest = float(target.max(initial=0.0))
@@ -91,14 +91,14 @@ def add_harmonics(
     case, joint, evaluation : Case, Joint, Evaluation
         The known state.
     resolution : Resolution
-        All its harmonics and new ones, and at least as many samples.
+        All harmonics of the known state and new ones, and at least as many samples.
     budget : Budget
-        Where Newton iterations are counted.
+        Counts the Newton iterations.
 
     Returns
     -------
     Evaluation or None
-        With the penalty of `case`: the state is still to be transferred to the penalty of its own harmonics. None where
+        State with the penalty of `case`; the caller transfers the state to the penalty of the new harmonics. None where
         the homotopy does not reach its end.
     """
     tolerance = case.settings.tolerance
@@ -118,19 +118,19 @@ def add_harmonics(
 def start_with_tail(
     joint: Joint, evaluation: Evaluation, old: tuple[int, ...], inertial: BoolArray | None = None
 ) -> tuple[Balance, FloatArray]:
-    """Balance and predicted force (n_rel, m), N, from which a state is solved with more harmonics.
+    """Balance with more harmonics, and a predicted force (n_rel, m), N, to start from.
 
-    The new harmonics are those of the force samples and the motion of the structure under them: zeros would remove the
-    impacts that the samples have.
+    The new harmonics of the force are taken from the force samples, and the new harmonics of the motion are the motion
+    of the structure under these forces. Zeros would remove the impacts that the samples contain.
 
     Parameters
     ----------
     joint : Joint
-        With all harmonics.
+        The joint with all harmonics.
     evaluation, old : Evaluation, tuple of int
         The known state and its harmonics.
     inertial : array (n_contact,), optional
-        As in `carried_history`, by default those of the joint.
+        As in `carried_history`; by default the inertial pairs of the joint.
     """
     history = carried_history(evaluation, old, joint.penalty.inertial if inertial is None else inertial, joint)
     balance = Balance.frozen(joint, history, evaluation.wear_depth)
@@ -149,9 +149,9 @@ def start_with_tail(
 
 
 def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compliances 1 / E_n and G_n, (k, n_rel, n_rel), m/N, of the penalty and of the structure.
+    """Compliances 1 / E_n of the penalty and G_n of the structure, (k, n_rel, n_rel) each, m/N.
 
-    places (k,): of the harmonics among those of the joint.
+    places (k,): indices of the wanted harmonics among the harmonics of the joint.
     """
     unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
     unit[:, :, 1::2] = 1.0
@@ -163,10 +163,12 @@ def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexAr
 
 @dataclass(frozen=True)
 class HarmonicHomotopy:
-    """Balances between the state without the new harmonics, s = 0, and that with them, s = 1.
+    """Balances between the state without the new harmonics (s = 0) and the state with the new harmonics (s = 1).
 
-    joint: with all harmonics. history (n_contact, 2), wear_depth (n_contact,): m, held. new (k,): places of the new
-    harmonics. penalty_compliance, compliance: as `compliances` returns them.
+    - joint: the joint with all harmonics.
+    - history (n_contact, 2), wear_depth (n_contact,): m, held.
+    - new (k,): indices of the new harmonics.
+    - penalty_compliance, compliance: as `compliances` returns them.
     """
 
     joint: Joint
@@ -177,7 +179,7 @@ class HarmonicHomotopy:
     compliance: ComplexArray
 
     def at(self, parameter: float, _: FloatArray) -> Balance:
-        """Balance at the homotopy parameter s; its history is held."""
+        """Balance at the homotopy parameter s."""
         structure = self.joint.structure
         if parameter < 1.0:
             mixed = structure.dynamic_stiffness.astype(complex)

@@ -1,8 +1,8 @@
-"""Natural continuation of a converged state along one parameter; `arc_length` continues where it fails.
+"""Natural continuation of a converged state along one parameter. Where it fails, `arc_length` may continue.
 
-The parameter may be the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale; the caller supplies the balance at a value of it. The work is bounded by the
-shortest step and the number of failures.
+The parameter is the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
+time scale. The caller supplies the balance at a value of the parameter. The shortest step and the number of failures
+limit the work.
 """
 
 from __future__ import annotations
@@ -29,35 +29,36 @@ def follow_naturally(
     fine: float = np.inf,
     shortest: float | None = None,
 ) -> tuple[PathPoint, bool]:
-    """Step the parameter to the target; steps are halved where Newton's method needs many iterations.
+    """Step the parameter to the target. Steps are halved where Newton's method needs many iterations.
 
-    The first Newton iteration from the last state is the tangent predictor (for wear: Eq. (19)), so no other is needed.
+    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)). No other predictor is
+    needed.
 
     Parameters
     ----------
     balance_at : callable
-        Balance at a value of the parameter, of pairs with a history (n_contact, 2), m.
+        Balance at a value of the parameter for a tangential history (n_contact, 2), m.
     start : PathPoint
-        State to begin with.
+        First state.
     target : float
-        Value of the parameter.
+        Last value of the parameter.
     solver, tolerance, budget
         As in `solve_balance`.
     keep_history : bool
-        The history stays that of the start: the intermediate states are no states of the joint.
+        True holds the tangential history of the start, for intermediate states that are no states of the joint.
     fine : float
-        Length, in the unit of the parameter, above which a step is accepted only if the vibration changes little over
-        it: where each step leaves a history to the next, the state at the target depends on the steps.
+        Step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
+        the step: where each step leaves a history to the next step, the state at the target depends on the steps.
     shortest : float, optional
-        Fraction of the range down to which steps are halved, `CONTINUATION.shortest_fraction` by default; a quarter of
-        `fine` if that is shorter.
+        Shortest step as a fraction of the range; by default `CONTINUATION.shortest_fraction`, or a quarter of `fine`
+        if that is shorter.
 
     Returns
     -------
     point : PathPoint
         Last state.
     arrived : bool
-        Whether it is at the target.
+        Whether the last state is at the target.
     """
     point = start
     whole = target - start.parameter
@@ -86,6 +87,6 @@ def follow_naturally(
 
 
 def _is_smooth(before: Evaluation, after: Evaluation) -> bool:
-    """Whether two states differ so little that no step between them is needed."""
+    """Whether the vibration changes so little between two states that no step between them is needed."""
     linear = bool((before.status_t == STICK).all() and (after.status_t == STICK).all())
     return vibration_change(before, after) <= (CONTINUATION.linear_change if linear else CONTINUATION.smooth_change)

@@ -1,14 +1,15 @@
 """Ratcheting of masses on sliders, and the state after shakedown.
 
-A very small stiffness holds the mean position of a marched mass (`penalty.mean`), and drag its mean velocity. Where
-vibration lets such a mass slip to another mean position than that of its history, the march in time ratchets by
+A very small stiffness holds the mean position of an inertial pair (`penalty.mean`), and drag holds its mean velocity.
+Vibration may let the mass slip to a mean position u_0 that differs from the position of its history. The march through
+the period then ratchets by
 
     2 pi / omega (p_0 - lambda_0) / c = 2 pi / omega penalty.mean (u_0 - history) / c
 
-a period, c the drag, while the Fourier series are periodic. The slip of this motion counts as wear, but its work is not
-in the balance of energy; where little slips both consist of it almost entirely. In the joint the mean position has
-moved already: with the position reached as the new history the ratcheting is a fraction of what it was. In the end the
-mass slips to and fro, or sticks: it has shaken down.
+in each period, with c the drag, although the Fourier series are periodic. The slip of this motion counts as wear, but
+its work is not in the balance of energy. Where little slips, nearly all slip and wear is ratcheting. In the joint the
+mean position has moved already: with u_0 as the new history only a fraction of the ratcheting is left. In the end the
+mass slips to and fro, or sticks: this is the state after shakedown.
 """
 
 from __future__ import annotations
@@ -28,33 +29,33 @@ from solver.structure.joint import Joint
 
 
 def ratcheting_work(joint: Joint, evaluation: Evaluation) -> float:
-    """Mean normal force times ratcheting over a period, N m: the part of the slip work that is not periodic."""
+    """Mean normal force times ratcheting in a period, N m: the part of the slip work that is not periodic."""
     on = joint.penalty.inertial
     moved_on = evaluation.state_t[on, :, -1] - evaluation.state_t[on, :, 0]
     return float(np.abs(evaluation.force_h[on, 0, 0]) @ np.hypot(moved_on[:, 0], moved_on[:, 1]))
 
 
 def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
-    """Whether ratcheting is more than a fraction of the slip work."""
+    """Whether the work of ratcheting exceeds a fraction of the slip work."""
     return ratcheting_work(joint, evaluation) > fraction * float(evaluation.slip_work.sum())
 
 
 def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float, budget: Budget) -> PathPoint:
-    """State after the shakedown of the masses of a state, at the same wear depth.
+    """State after shakedown of the masses, at an unchanged wear depth.
 
     Parameters
     ----------
     joint, point : Joint, PathPoint
-        The state.
+        The state before shakedown.
     fraction : float
-        Of the slip work; less ratcheting is accepted.
+        Accepted work of ratcheting over the slip work.
     tolerance, budget
         As in `solve_balance`.
 
     Returns
     -------
     PathPoint
-        The last state that was found, where ratcheting does not end.
+        The state after shakedown; the last state that was found where ratcheting does not end.
     """
     solver = JacobianSolver()
     worn = point.evaluation.wear_depth
@@ -72,14 +73,14 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
 
 
 def _mean_shift(joint: Joint, point: PathPoint) -> FloatArray:
-    """Shift (n_contact, 2), m, from the mean positions at which marched masses are held to those they have reached."""
+    """Shift (n_contact, 2), m, of the inertial pairs from the mean position in the history to the position reached."""
     shift = point.evaluation.displacement_h[:, 1:, 0] - point.evaluation.history
     return np.where(joint.penalty.inertial[:, None], shift, 0.0)
 
 
 @dataclass(frozen=True)
 class _MeanShift:
-    """Homotopy of balances from one history to another, both (n_contact, 2), m."""
+    """Homotopy of balances from `history` to `history + shift`, both (n_contact, 2), m."""
 
     joint: Joint
     wear_depth: FloatArray

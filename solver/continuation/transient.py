@@ -1,7 +1,7 @@
-"""Relaxation in time to a periodic state: the harmonics of a motion vary slowly until they are constant.
+"""Relaxation in time to a periodic state: the harmonics of the motion vary slowly until they are constant.
 
-The motion is y(t) = Re sum Y_n(T) exp(i n w t) with amplitudes that vary slowly, so that d/dt acts on Y_n as
-i n w + d/dT. With the velocity V = (i n w + d/dT) Y as a state of its own, the equation of motion reads
+The motion is y(t) = Re sum Y_n(T) exp(i n w t) with slowly varying amplitudes Y_n(T), so that d/dt acts on Y_n as
+i n w + d/dT. With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
 
     M (i n w + d/dT) V + C V + K Y + lambda = F,
 
@@ -9,13 +9,14 @@ and an implicit Euler step of length D in T from (Y_0, V_0), with s = i n w + 1/
 
     (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D.
 
-This is the harmonic balance, Eq. (8), with other matrices and loads: it is condensed on the contact pairs and solved by
-the same Newton's method. A motion that repeats (V_0 = i n w Y_0, Y = Y_0) fulfils the balance exactly, whatever D, and
-D -> infinity is that balance. Friction is closed over one period with the history of the step before. The static
-harmonic is no exception, with s = 1/D.
+This is the harmonic balance, Eq. (8), with other matrices and loads. The equation is condensed on the contact pairs and
+solved by Newton's method, as the balance is. A periodic motion (V_0 = i n w Y_0, Y = Y_0) fulfils the equation exactly
+for each D; for D -> infinity the equation is the balance. The friction law is periodic over one period and starts from
+the history of the step before. The static harmonic has s = 1/D.
 
-A short step resolves the transient of the structure, a long one damps everything that decays. Growing motions leave an
-unstable state as long as 1/D exceeds their rate, so D starts at one period, and the stability of the state is tested.
+A short step resolves the transient of the structure; a long step damps all decaying motions. Growing motions leave an
+unstable state as long as 1/D exceeds their rate. So D starts at one period, and the stability of the final state is
+tested.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class _LoadedStructure(CondensedStructure):
-    """A structure under a load in all harmonics, load_h (n_rel, 2H+1), N."""
+    """A structure with a load in each harmonic, load_h (n_rel, 2H+1), N."""
 
     load_h: FloatArray
 
@@ -58,7 +59,7 @@ class _LoadedStructure(CondensedStructure):
 
 
 class Transient:
-    """Matrices and loads of a case at one frequency and load, for steps in time."""
+    """Matrices and loads of a case at one frequency and excitation, for steps in time."""
 
     def __init__(self, case: Case, joint: Joint) -> None:
         self.joint = joint
@@ -80,7 +81,7 @@ class Transient:
             self.parts.append((mass, damping, stiffness, load.conj() if conjugate else load))
 
     def periodic(self, evaluation: Evaluation) -> Motion:
-        """Motion whose relative displacements are those of a periodic state of this joint."""
+        """Motion of the whole structure in a periodic state of this joint."""
         return self._motion(evaluation, self.rates, [load for *_, load in self.parts], None, 0.0)
 
     def rest(self) -> Motion:
@@ -89,7 +90,7 @@ class Transient:
         return Motion(none, none)
 
     def resumed(self, motion: Motion) -> Motion:
-        """Initial motion from a periodic one of another joint (another frequency or load): the same amplitudes."""
+        """Initial motion with the amplitudes of a periodic motion of another joint (another frequency or load)."""
         return Motion(motion.displacement, self.rates[:, None] * motion.displacement)
 
     def step(self, before: Motion, inverse: float) -> Joint:
@@ -109,7 +110,7 @@ class Transient:
         return replace(self.joint, structure=_LoadedStructure(**kept, load_h=load_h))
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
-        """Motion at the end of such a step, from the solution of its balance."""
+        """Motion at the end of a step, from the solution of the balance of the step."""
         return self._motion(
             evaluation, np.asarray(self.rates + inverse, np.complex128), self._loads(before, inverse), before, inverse
         )
@@ -160,12 +161,12 @@ def relax_to_periodic(
     case : Case
         Model and settings of both joints.
     joint : Joint
-        Where the state is sought.
+        The joint whose periodic state is sought.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
     start, start_joint : Evaluation, Joint
-        State to begin with. Both joints have the same pairs and harmonics; frequency and load may differ: a start
-        without excitation leads to the state that builds up from rest.
+        First state. Both joints have equal pairs and harmonics; frequency and load may differ. A start without
+        excitation leads to the state that builds up from rest.
     history : array (n_contact, 2)
         Tangential history at the start, m.
     solver, budget
@@ -174,12 +175,14 @@ def relax_to_periodic(
     Returns
     -------
     outcome : Outcome
-        CONVERGED. ADRIFT where the mean positions run away: a joint that slips all over forgets where it was, nothing
-        but friction may hold its parts, and then there is no periodic state. UNSTABLE where the motion comes to a
-        periodic state that is unstable. UNSETTLED where it comes to none, in `CONTINUATION.transient_steps` steps of
-        a period or more, or in `CONTINUATION.transient_effort` Newton iterations.
+        - CONVERGED: the state is found and stable.
+        - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
+          state.
+        - UNSTABLE: the motion settles at an unstable periodic state.
+        - UNSETTLED: the motion does not settle within `CONTINUATION.transient_steps` steps of a period or more, or
+          within `CONTINUATION.transient_effort` Newton iterations.
     point : PathPoint or None
-        The state; its parameter is NaN.
+        The state; its parameter is NaN. None where the outcome is not CONVERGED.
     """
     budget.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
@@ -210,13 +213,13 @@ def relax_to_periodic(
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > CONTINUATION.runaway * size:
             return Outcome.ADRIFT, None
-        # not again until the motion changes less: from a motion that still changes Newton's method fails
+        # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < CONTINUATION.renewed_attempt * tried or length >= CONTINUATION.longest_transient
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
             found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, budget)
             if found is not None and not stable and length >= CONTINUATION.longest_transient:
-                # no step is longer, and this is where they lead
+                # the steps have their largest length and lead to an unstable state
                 return Outcome.UNSTABLE, None
             if found is not None and stable:
                 distance = _change(transient.periodic(found.evaluation), motion)
@@ -224,7 +227,7 @@ def relax_to_periodic(
                     return Outcome.CONVERGED, found
         elif change > CONTINUATION.relaxed_change:
             tried = np.inf
-        # amplitudes have no meaning over less than a period: only where Newton's method fails are steps shorter
+        # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(CONTINUATION.wanted_change / max(change, 1e-300), *CONTINUATION.transient_growth))
         length = min(max(length * growth, 1.0), CONTINUATION.longest_transient)
     return Outcome.UNSETTLED, None
@@ -239,7 +242,7 @@ def _periodic(
     solver: JacobianSolver,
     budget: Budget,
 ) -> tuple[PathPoint | None, bool]:
-    """Periodic state from a motion that has relaxed, and whether it is stable."""
+    """Periodic state near a relaxed motion, or None; and whether the state is stable."""
     balance = Balance.frozen(joint, history, wear_depth)
     result = solve_balance(balance, predicted, solver, case.settings.tolerance, budget, CONTINUATION.near_iterations)
     if not result.converged:
@@ -249,7 +252,7 @@ def _periodic(
 
 
 def _change(before: Motion, after: Motion) -> float:
-    """Change of the vibrating amplitudes over the larger ones of two motions."""
+    """Norm of the change of the vibrating amplitudes over the larger norm of two motions."""
     one, other = before.displacement[1:], after.displacement[1:]
     size = max(float(np.linalg.norm(one)), float(np.linalg.norm(other)))
     return float(np.linalg.norm(other - one)) / size if size > 0.0 else 0.0

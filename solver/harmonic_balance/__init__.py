@@ -1,1 +1,1 @@
-"""The dynamic Lagrangian frequency-time balance (DLFT), its exact Jacobian, and states taken to other harmonics."""
+"""The dynamic Lagrangian frequency-time balance (DLFT), its exact Jacobian, transfer to other harmonics."""

@@ -1,4 +1,4 @@
-"""A converged state, and what it leaves behind for the next one."""
+"""A converged state, and the tangential history that it leaves to the next state."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from solver.packing import packable
 from solver.structure.joint import Joint
 
 BalanceAt = Callable[[float, FloatArray], Balance]
-"""The balance at a value of a parameter, of pairs with a history (n_contact, 2), m."""
+"""The balance at a value of a parameter for a tangential history (n_contact, 2), m."""
 
 
 @packable
 @dataclass(frozen=True)
 class PathPoint:
-    """A converged state at a value of the parameter; `history` (n_contact, 2), m: what the next state starts from."""
+    """A converged state at a value of the parameter. history (n_contact, 2): for the next state, m."""
 
     parameter: float
     evaluation: Evaluation
@@ -28,8 +28,9 @@ class PathPoint:
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the next state: the corrected slip X_T at the end of the period, the
-    mean position of inertial pairs.
+    """Tangential history (n_contact, 2), m, for the next state.
+
+    Elastic pairs: the corrected slip X_T at the end of the period. Inertial pairs: the mean position.
     """
     joint = balance.joint
     at_end = evaluation.state_t[:, :, -1] / joint.state_stiffness[:, None]
@@ -37,12 +38,12 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
 
 
 def history_at_rest(joint: Joint, point: PathPoint) -> FloatArray:
-    """Tangential history (n_contact, 2), m, of a state, for a next one in which pairs that slip may have come to stick.
+    """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
 
-    A pair that slips to and fro comes to stick in the middle of its slip, when the range of the slip has shrunk to
-    nothing. So the history of such a pair is the middle of its range while it is closed; a pair that goes on slipping
-    has no memory of it. Behind the resonance of the dovetail the motion that a sweep leaves is 0.5 % wrong with the
-    middle, and 2.3 % with `final_history`, with as many states.
+    When the range of slip of a pair shrinks to zero, the pair comes to stick in the middle of the range. So the history
+    of a slipping pair is the middle of its slip in the closed samples. A pair that goes on slipping does not remember
+    its history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
+    with `final_history`, for an equal number of states.
     """
     evaluation, history = point.evaluation, point.history.copy()
     slips = (evaluation.status_t == SLIP).any(axis=1) & ~joint.penalty.inertial
@@ -54,7 +55,7 @@ def history_at_rest(joint: Joint, point: PathPoint) -> FloatArray:
 
 
 def vibration_change(before: Evaluation, after: Evaluation) -> float:
-    """Change of the vibrating part of the predicted force over its size, of two states."""
+    """Norm of the change of the vibrating part of the predicted force, over its norm in the state `before`."""
     return float(np.linalg.norm(after.predicted_h[:, 1:] - before.predicted_h[:, 1:])) / vibration_size(before)
 
 

@@ -1,15 +1,15 @@
-"""The harmonic balance of a joint: residual, exact Jacobian, and wear that goes with the motion.
+"""The harmonic balance of a joint: residual, exact Jacobian, and wear depth that depends on the motion.
 
-The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eqs. (9), (10). It gives at each pair by itself the
-contact force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` (Eqs. (10)-(12), with `X` the corrected
-motion), so that
+The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eqs. (9), (10). The predicted force of a pair
+determines the contact force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` of the pair (Eqs. (10)-(12),
+with the corrected motion `X`), so that
 
     R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
 
-is the only coupled equation. For a given wear depth this is the residual in u of the paper after a linear change of
-variable, so a Newton iteration takes the same steps. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26)
-(the print of (26b) lacks h): the wear rate of a pair depends on its own p alone, W is eliminated there, and the
-Jacobian changes by a rank-one block a pair:
+is the only coupled equation. For a given wear depth, a linear change of variable turns this residual into the residual
+in u of the paper. So the Newton iterations are equal. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26) (the
+print of (26b) lacks h). The wear rate of a pair depends on p of this pair alone. So W is eliminated pair by pair, and
+the Jacobian changes by a block of rank one for each pair:
 
     dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
 """
@@ -33,11 +33,13 @@ from solver.structure.rough_forms import SingleArray
 
 @dataclass(frozen=True)
 class Balance:
-    """A periodic problem: a joint, the history of its pairs and the wear.
+    """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    history (n_contact, 2): corrected slip X_T at the start of the period, m. wear_depth (n_contact,): m, at the start
-    of the slow step; the same all period, Eq. (6). wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; zero
-    where W does not grow with the motion. wearing: what of the slip work wears.
+    - joint: the joint.
+    - history (n_contact, 2): corrected slip X_T at the start of the period, m.
+    - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
+    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; zero where W does not grow with the motion.
+    - wearing: wearing work of the wear law.
     """
 
     joint: Joint
@@ -48,11 +50,11 @@ class Balance:
 
     @classmethod
     def frozen(cls, joint: Joint, history: FloatArray, wear_depth: FloatArray) -> Balance:
-        """The wear is held: the depths do not depend on the motion."""
+        """Balance at a fixed wear depth, which does not depend on the motion."""
         return cls(joint, history, wear_depth, np.zeros_like(wear_depth))
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
-        """Predicted force (n_rel, m), N, Eq. (10), that gives a motion, m, and contact force, N, (n_contact, 3, m)."""
+        """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
         motion = displacement_h.copy()
         motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
         held = self.joint.penalty.inertial
@@ -60,9 +62,9 @@ class Balance:
         return self.joint.to_relative(force_h + self.joint.force_correction(motion))
 
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
-        """Residual, Eq. (8), and everything that it passes through, for a predicted force (n_rel, 2H+1), N.
+        """Residual, Eq. (8), and all intermediate results, for a predicted force (n_rel, 2H+1), N.
 
-        Eqs. (11)-(15) give the contact force, Eq. (12) the motion, Eq. (24) the wear depth where it grows with it.
+        Eqs. (11)-(15) give the contact force, Eq. (12) the motion, Eq. (24) the wear depth in an implicit step.
         """
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
@@ -89,7 +91,7 @@ class Balance:
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
-        """Exact derivative of the residual, Eqs. (16)-(18): closure of the history and wear included."""
+        """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
         joint = self.joint
         force_tangent, slip_work_tangent = law_tangent(joint, at)
         growth_tangent = self.wearing.growth_tangent(
@@ -101,10 +103,14 @@ class Balance:
 @packable
 @dataclass(frozen=True)
 class Evaluation(Marched):
-    """Residual (n_rel, 2H+1), N, of a predicted force (n_rel, 2H+1), N, with what the pairs do under it.
+    """Residual for a predicted force, with the contact forces and states of the pairs.
 
-    scale: N, of the static and of the other harmonics. history (n_contact, 2): m, as in `Balance`.
-    displacement_h (n_contact, 3, 2H+1), wear_depth (n_contact,): m.
+    - predicted_h (n_rel, 2H+1): predicted force, N.
+    - residual (n_rel, 2H+1): N.
+    - scale: scales of the residual in the static harmonic and in the other harmonics, N.
+    - history (n_contact, 2): as in `Balance`, m.
+    - displacement_h (n_contact, 3, 2H+1): motion, m.
+    - wear_depth (n_contact,): m; at the end of the step in an implicit step.
     """
 
     predicted_h: FloatArray
@@ -115,7 +121,7 @@ class Evaluation(Marched):
     wear_depth: FloatArray
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Euclidean norm of the residual, the static harmonic and the others each over its scale."""
+        """Euclidean norm of the residual, with the static harmonic and the other harmonics divided by their scales."""
         static, moving = scale or self.scale
         return float(
             np.hypot(np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving)
@@ -123,12 +129,12 @@ class Evaluation(Marched):
 
 
 def worn_by(at: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What a wear law takes of a state, each (n_contact,): slip work, J, mean normal force, N, depth, m."""
+    """Arguments of a wear law in a state, each (n_contact,): slip work, J, mean normal force, N, depth, m."""
     return at.slip_work, at.force_h[:, 0, 0], at.wear_depth
 
 
 def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tuple[float, float]:
-    """Scales of the residual, N: the static preload must not hide an error in the vibration, which may be far less."""
+    """Scales of the residual, N, static and vibrating: a large preload must not hide an error of the vibration."""
     moving = max(float(np.linalg.norm(reduced_force[:, 1:])), float(np.linalg.norm(contact_force[:, 1:])))
     static = max(float(np.linalg.norm(reduced_force[:, 0])), float(np.linalg.norm(contact_force[:, 0])), moving)
     if static == 0.0:
@@ -140,10 +146,14 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
 class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
-    growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, a part of the static normal motion. at: what the
-    pairs do where this is the derivative. Where a pair stays stuck or closed all period long its motion does not depend
-    on p: these unknowns stand in the Jacobian as columns of the identity, are left out of the coupled system and follow
-    from it (`active`).
+    - joint: the joint.
+    - at: contact forces and states of the pairs at the point of linearisation.
+    - force_tangent (n_contact, 3m, 3m): derivative of the contact force, dimensionless.
+    - growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
+
+    The motion of a pair that sticks and is closed during the whole period does not depend on p. The columns of its
+    unknowns in the Jacobian are columns of the identity. These unknowns are left out of the coupled system and computed
+    from its solution (`active`).
     """
 
     joint: Joint
@@ -153,7 +163,7 @@ class Linearisation:
 
     @cached_property
     def motion_tangent(self) -> FloatArray:
-        """`du/dp` (n_contact, 3m, 3m), m/N, by Eq. (12), with the wear."""
+        """`du/dp` (n_contact, 3m, 3m), m/N, by Eq. (12), including the wear."""
         size = self.force_tangent.shape[1]
         correction = (np.eye(size) - self.force_tangent).reshape(-1, 3, size // 3, size)
         tangent = self.joint.motion(correction).reshape(-1, size, size)
@@ -178,12 +188,12 @@ class Linearisation:
         return joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
-        """The same to three digits at least, in less time: for directions of Newton's method."""
+        """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
         joint = self.joint
         pairs, held_back = self._held_back
         held, motion = hold_back(step, self._rows_of_pairs, pairs, held_back, *self._compliance, self.growth_tangent)
         if joint.penalty.inertial.any():
-            # masses on sliders move by Newton's law
+            # inertial pairs move by Newton's law
             motion_h = joint.motion(joint.to_pairs(held))
             motion_h[:, 0, 0] += (self.growth_tangent * joint.to_pairs(step).reshape(len(motion_h), -1)).sum(axis=1)
             motion = joint.to_relative(motion_h)
@@ -191,32 +201,32 @@ class Linearisation:
 
     @cached_property
     def _held_back(self) -> tuple[IntArray, SingleArray]:
-        """Pairs that move with their predicted force, and what they do not transmit of it, in single precision."""
+        """Active pairs, and the part `1 - d lambda/dp` that they do not transmit, in single precision."""
         pairs = self.active()
         return pairs, identity_less(self.force_tangent, pairs)
 
     @cached_property
     def _rows_of_pairs(self) -> IntArray:
-        """Row of each component of a pair (n_contact, 3), -1 where there is none."""
+        """Row of each component of the pairs (n_contact, 3); -1 where a component does not exist."""
         rows = np.full(3 * self.joint.contact.n_contact, -1)
         rows[self.joint.component_index] = np.arange(self.joint.component_index.size)
         return rows.reshape(-1, 3)
 
     @property
     def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Motion over force (n_contact,), m/N, of pairs at displacement level: normal and tangential."""
+        """Motion over force (n_contact,), m/N, of elastic pairs: normal and tangential."""
         return 1.0 / self.joint.penalty.normal, 1.0 / self.joint.penalty.tangential
 
     def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian that belong to `pairs`, in the order (relative displacement, harmonic).
+        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
 
-        n_harmonics: where given, of the lowest harmonics only.
+        n_harmonics: number of the lowest harmonics that are included; all if not given.
         """
         whole = self.joint.basis.synthesis.shape[0]
         m = whole if n_harmonics is None else 2 * n_harmonics + 1
         rows, pair, component = self._rows(pairs)
         n_rows = rows.size
-        # blocks of the pairs, spread over the rows and columns that there are: (row, harmonic, column, harmonic)
+        # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
         spread = np.zeros((2, n_rows, m, n_rows, m))
         same = pair[:, None] == pair[None, :]
         row, column = np.nonzero(same)
@@ -235,20 +245,20 @@ class Linearisation:
         return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
 
     def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Rows of `pairs`, and for each its place in `pairs` and its component."""
+        """Rows of `pairs`; for each row the index of its pair in `pairs`, and its component."""
         rows = self.joint.rows_of(pairs)
         return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
 
 
 @njit(cache=True)
 def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
-    """Which of the matrices (n, k, k) differ from the identity by more than `by` in an entry."""
+    """True (n,) for the matrices (n, k, k) with an entry that differs from the identity by more than `by`."""
     n, k, _ = matrices.shape
     differs = np.zeros(n, np.bool_)
     for place in range(n):
         for row in range(k):
             for column in range(k):
-                # the negation finds what is not a number as well
+                # the negation also finds entries that are not a number
                 if not abs(matrices[place, row, column] - (row == column)) <= by:
                     differs[place] = True
                     break
@@ -280,10 +290,13 @@ def hold_back(
     tangential: FloatArray,
     growth: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """What the pairs do not transmit of a predicted force (n_rel, m), N, and how it moves them (n_rel, m), m.
+    """Part of a predicted force (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m.
 
-    rows (n_contact, 3): of each component, -1 for none. pairs (n,), held_back (n, 3m, 3m): `1 - d lambda/dp` of pairs
-    that move. normal, tangential (n_contact,): m/N. growth (n_contact, 3m): of the wear depth, m/N.
+    - step (n_rel, m): predicted force, N.
+    - rows (n_contact, 3): row of each component, -1 for none.
+    - pairs (n,), held_back (n, 3m, 3m): active pairs, and their `1 - d lambda/dp`.
+    - normal, tangential (n_contact,): compliances, m/N.
+    - growth (n_contact, 3m): derivative of the wear depth, m/N.
     """
     m = step.shape[1]
     held, motion = np.zeros_like(step), np.zeros_like(step)

@@ -1,7 +1,7 @@
-"""A state taken to other harmonics or to another penalty: what it starts from there.
+"""Transfer of a state to other harmonics or to another penalty: balance and predicted force to start from.
 
-Other harmonics have another penalty, and a mass may be marched with some of them and held by a spring with others
-(`solver.structure.penalty`): what a state takes along is put into the terms of the penalty that it goes to.
+Other harmonics have another penalty, and a pair may be inertial with one penalty and elastic with the other
+(`solver.structure.penalty`). So force, motion and tangential history are converted to the new penalty.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from solver.structure.joint import Case, Joint
 def transfer(
     case: Case, joint: Joint, evaluation: Evaluation, old_orders: tuple[int, ...], inertial: BoolArray | None = None
 ) -> tuple[Balance, FloatArray]:
-    """Balance and predicted force (n_rel, m), N, from which a state of other harmonics is solved in this case.
+    """Balance in the case, and a predicted force (n_rel, m), N, to start from, for a state of other harmonics.
 
-    inertial (n_contact,): pairs that were marched with their mass in the state; by default those that are in this case.
+    inertial (n_contact,): inertial pairs of the state; by default the inertial pairs of `joint`.
     """
     was = joint.penalty.inertial if inertial is None else inertial
     history = carried_history(evaluation, old_orders, was, joint)
@@ -32,12 +32,14 @@ def transfer(
 
 
 def carried_history(evaluation: Evaluation, orders: tuple[int, ...], inertial: BoolArray, joint: Joint) -> FloatArray:
-    """History (n_contact, 2), m, of a state in the terms of another joint: pairs may be marched with their mass in one
-    of them only.
+    """Tangential history (n_contact, 2), m, of a state, converted for a joint in which other pairs may be inertial.
 
-    inertial (n_contact,): where they were in the state, of harmonics `orders`. A pair that is now takes its mean
-    position along; one that no longer is its place at the end of the period, which its corrected slip equals
-    (`coulomb`: the tangential state is the penalty times the motion).
+    - orders: harmonics of the state.
+    - inertial (n_contact,): inertial pairs of the state.
+
+    The history of a pair that becomes inertial is its mean position. The history of a pair that becomes elastic is its
+    position at the end of the period, which equals the corrected slip (`coulomb`: the tangential state is the penalty
+    times the motion).
     """
     now = joint.penalty.inertial
     if np.array_equal(inertial, now):

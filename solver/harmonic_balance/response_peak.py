@@ -1,10 +1,11 @@
-"""The largest magnitude of the responses over a period, with the tail that friction on rigid ground leaves in it.
+"""The largest magnitude of the responses over a period, including the tail of friction on rigid ground.
 
-The force on a mass that slides on rigid ground jumps where the mass turns. Its harmonics above the highest one of the
-balance are known from the time samples, and the structure answers them by its receptance, `u_n = -lambda_n / Z_n` (tail
-closure, PHYSICS section 5). At the turn they all have one sign: what is left out of the peak falls with the square of
-the highest harmonic, what is left out of the first harmonic with a higher power. Other pairs add nothing: their force
-has corners only, and where they bounce its higher harmonics are those of an impact that more of them would change.
+The friction force on a mass that slides on rigid ground jumps where the mass turns. The time samples give the harmonics
+of the force above the highest harmonic of the balance. The structure answers them by its receptance,
+`u_n = -lambda_n / Z_n` (tail closure, PHYSICS section 5). At the turn all these harmonics have one sign. So the
+truncation error of the peak falls with the square of the highest harmonic, and the error of the first harmonic with a
+higher power. Other pairs have no tail: their forces have corners only. The higher harmonics of a bouncing pair belong
+to an impact that more harmonics would change.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
 
 
 def tail_orders(joint: Joint) -> tuple[int, ...]:
-    """Harmonics above the highest one that are taken from the samples: odd ones where the others are odd, none where no
-    mass sits on rigid ground.
+    """Harmonics of the tail, above the highest harmonic of the balance.
+
+    Only odd harmonics where the balance has only odd ones; none where no mass sits on rigid ground.
     """
     orders = joint.basis.orders
     if not orders or not joint.penalty.inertial.any():
@@ -42,13 +44,13 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
 
 
 def tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> FloatArray:
-    """Responses (n_response, 2k+1), m, in k harmonics above the highest one to the friction on masses."""
+    """Responses (n_response, 2k+1), m, to the friction on masses in k harmonics above the highest one."""
     still = np.zeros(joint.structure.static_response.shape[0])
     try:
         # the load acts in the first harmonic alone
         structure = build_structure(joint.model, joint.omega, 0.0, orders)
     except np.linalg.LinAlgError:
-        # at one of them the structure is singular with its joint held
+        # the structure with its joint held is singular at one of these harmonics
         return np.zeros((still.size, 2 * len(orders) + 1))
     marched, n_samples = joint.penalty.inertial, joint.basis.n_samples
     force_h = np.zeros((marched.size, 3, 2 * len(orders) + 1))

@@ -1,1 +1,1 @@
-"""Stability of periodic states: Hill's determinant along a branch, Floquet multipliers of what is reported."""
+"""Stability of periodic states: Hill's determinant along a branch, Floquet multipliers of reported states."""

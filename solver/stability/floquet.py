@@ -1,12 +1,17 @@
-"""Whether the vibration stays at a periodic state: its Floquet multipliers.
+"""Stability of a periodic state by its Floquet multipliers.
 
-A small disturbance of a state is multiplied by the monodromy (`monodromy`) in each period. A multiplier beyond the unit
-circle is a disturbance that grows: a real one beyond +1 leads to another state, one beyond -1 to a vibration that
-repeats after two periods, a complex pair to one of a second frequency (Neimark and Sacker). Of a small joint all
-multipliers are computed, of a large one the largest, by Arnoldi's method. A state in which no pair slips, opens or
-closes moves as its linear structure does, whose exponents are those of a matrix.
+A small disturbance of a state is multiplied by the monodromy (`monodromy`) in each period. A disturbance whose
+multiplier lies outside the unit circle grows:
 
-Which multipliers are looked at is limited by the march: see `StabilityOptions`.
+- a real multiplier beyond +1 leads to another state;
+- a real multiplier beyond -1 leads to a vibration that repeats after two periods (period doubling);
+- a complex pair leads to a vibration with a second frequency (Neimark-Sacker bifurcation).
+
+For a small joint all multipliers are computed, for a large joint the largest ones, by Arnoldi's method. In a state in
+which no pair slips, opens or closes, disturbances follow the linear structure, whose exponents are eigenvalues of a
+matrix.
+
+The time integration of disturbances limits the size of joints that are tested: see `StabilityOptions`.
 """
 
 from __future__ import annotations
@@ -34,11 +39,12 @@ from solver.structure.joint import Case, Joint
 
 @dataclass(frozen=True)
 class Instability:
-    """Why no vibration stays at a state.
+    """Reason why a state is unstable.
 
-    multiplier: the largest one, beyond the unit circle. frequency: Hz, of the excitation. by_structure: whether no pair
-    slips, opens or closes, so that the linear structure alone is unstable. driven: whether the structure itself gains
-    energy.
+    - multiplier: the multiplier of largest modulus, outside the unit circle.
+    - frequency: frequency of the excitation, Hz.
+    - by_structure: whether no pair slips, opens or closes, so that the linear structure alone is unstable.
+    - driven: whether the structure itself gains energy.
     """
 
     multiplier: complex
@@ -48,13 +54,13 @@ class Instability:
 
     @property
     def outcome(self) -> Outcome:
-        """PERIOD_DOUBLED where a bouncing joint changes the sign of a disturbance each period, else UNSTABLE."""
+        """PERIOD_DOUBLED where a disturbance of a switching joint changes sign in each period, else UNSTABLE."""
         doubles = not self.by_structure and self.multiplier.imag == 0.0 and self.multiplier.real < 0.0
         return Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE
 
     @property
     def sentence(self) -> str:
-        """How fast a disturbance grows, and what it does."""
+        """Sentence for the user: growth of a disturbance in a period, and its kind."""
         said = f"a small disturbance grows by the factor {abs(self.multiplier):.3g} in each period of the excitation"
         if self.by_structure:
             said = f"{said}, in the linear structure alone"
@@ -67,26 +73,29 @@ class Instability:
 def find_instability(
     case: Case, joint: Joint, at: Evaluation, budget: Budget, every: bool = True
 ) -> Instability | None:
-    """Why the vibration does not stay at a state whose wear is held; None where it stays, or where that is not known.
+    """Instability of a state at a fixed wear depth; None where the state is stable, or where stability is not known.
 
-    Not looked for: in a travelling wave, where a pair slips or opens, as a disturbance moves in other nodal diameters;
-    in joints of more than `STABILITY.most_rows` displacements of pairs that switch; in a small joint that opens and
-    closes where no state with `STABILITY.opening_harmonics` is found: with few harmonics its impacts are others.
+    Stability is not tested in these cases:
+
+    - a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
+    - a joint with more than `STABILITY.most_rows` displacements of switching pairs;
+    - a small joint that opens and closes, where no state with `STABILITY.opening_harmonics` is found: with fewer
+      harmonics the impacts differ.
 
     Parameters
     ----------
     case, joint, at
-        Of the state.
+        Case, joint and evaluation of the state.
     budget
-        Where Newton iterations are counted.
+        Counts the Newton iterations.
     every
-        False leaves out joints that are not small, or that stay closed: for states between the first and the last of a
-        march, where impacts alone change suddenly how a joint moves.
+        False leaves out large joints and joints that do not open and close, where a pair slips. This is for states
+        between the first and the last of a wear history, where only impacts change the motion of a joint suddenly.
 
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the budget.
+        After the deadline of the budget.
     """
     switching, stuck = switching_pairs(at)
     frequency = joint.omega / (2.0 * np.pi)
@@ -110,13 +119,13 @@ def find_instability(
     if _judge(first, 0.0, joint) is None:
         return None
     second = multipliers_of(build_monodromy(joint, linear, at, 2 * n_samples), small)
-    # what the samples change of it is its error
+    # the change with the number of samples is the error of the multiplier
     error = abs(float(np.abs(second).max()) - float(np.abs(first).max()))
     return _judge(second, 2.0 * error, joint)
 
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
-    """The state with the harmonics that a joint that opens and closes is judged with; None where it is not found."""
+    """The state with enough harmonics for a joint that opens and closes; None where no such state is found."""
     least = Resolution(all_orders(STABILITY.opening_harmonics), case.resolution.samples)
     if case.resolution.highest >= least.highest or not _opens_and_closes(at):
         return joint, at
@@ -132,7 +141,7 @@ def _opens_and_closes(at: Evaluation) -> bool:
 
 
 def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: bool = False) -> Instability | None:
-    """What the largest multiplier says where it lies beyond the unit circle by more than its error."""
+    """Instability where the largest multiplier lies outside the unit circle by more than its error, else None."""
     if not multipliers.size:
         return None
     largest = complex(multipliers[np.argmax(np.abs(multipliers))])
@@ -142,8 +151,10 @@ def _judge(multipliers: ComplexArray, error: float, joint: Joint, by_structure: 
 
 
 def _is_driven(joint: Joint) -> bool:
-    """Whether the structure itself gains energy: something grows while all pairs are held, or vibrates and grows while
-    none is. That a blade which nothing holds is thrown out of its spinning disk is no fault of its structure.
+    """Whether the structure itself gains energy.
+
+    True where a motion grows with all pairs held, or where a vibration grows with no pair held. A motion without
+    vibration that grows with no pair held does not count: a free blade leaves its spinning disk.
     """
     linear = joint.model.harmonic_structure(1)[0]
     held = moving(joint, np.ones(joint.contact.n_contact, bool))
@@ -152,10 +163,10 @@ def _is_driven(joint: Joint) -> bool:
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
-    """All multipliers, or those of the largest ones that Arnoldi's method has settled."""
+    """All multipliers, or the largest ones, as far as Arnoldi's method has converged."""
     if every:
         return np.asarray(np.linalg.eigvals(monodromy.apply(np.eye(monodromy.size))), np.complex128)
-    # a fixed start: the answer must not depend on what was computed before
+    # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=monodromy.size)
 
     def product(vector: np.ndarray) -> np.ndarray:
@@ -169,7 +180,7 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
 
 
 def moving(joint: Joint, held: BoolArray) -> BoolArray:
-    """Displacements (n,) of the structure that move while some pairs (n_contact,) are held."""
+    """True for the displacements (n,) of the structure that move while the pairs `held` (n_contact,) are held."""
     dofs = joint.contact.dofs[held]
     moves = np.ones(len(joint.model.linear[0].mass), bool)
     moves[dofs[dofs >= 0]] = False
@@ -177,7 +188,7 @@ def moving(joint: Joint, held: BoolArray) -> BoolArray:
 
 
 def _samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], small: bool) -> int:
-    """Samples of a period that the march takes: enough for vibrations that grow in the structure alone."""
+    """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
     rates = [np.abs(growing_exponents(linear, moving(joint, pairs)).imag) for pairs in held]
     fastest = max((float(of.max(initial=0.0)) for of in rates), default=0.0) / joint.omega
     least = STABILITY.small_samples if small else STABILITY.large_samples
@@ -186,10 +197,10 @@ def _samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], sma
 
 
 def growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
-    """Exponents sigma, 1/s, of the motions exp(sigma t) of a linear structure that grow.
+    """Exponents sigma, 1/s, of the growing motions exp(sigma t) of a linear structure.
 
-    moves (n,): False of displacements that are held. Empty where mass, damping and stiffness are all positive
-    semidefinite: such a structure only loses energy.
+    moves (n,): False for displacements that are held. The result is empty where mass, damping and stiffness are all
+    positive semidefinite: such a structure only loses energy.
     """
     if _is_passive(Identity(linear)):
         return np.empty(0, complex)

@@ -12,9 +12,9 @@ open all over (Z_n / eps: the square of a modulus for each complex harmonic, a p
 So a negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the
 real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
 
-This costs next to nothing beside a Newton iteration and is asked at every state of a branch. It sees neither an even
-number of such multipliers nor those elsewhere beyond the unit circle: `floquet` computes them, of states that are
-reported. Disturbances of friction are taken as slow, with the closure over one period.
+The test costs next to nothing beside a Newton iteration and is made at each state of a branch. The test sees neither an
+even number of such multipliers nor multipliers elsewhere outside the unit circle: `floquet` computes the multipliers of
+reported states. Disturbances of friction are taken as slow, with the closure over one period.
 """
 
 from __future__ import annotations

@@ -1,22 +1,22 @@
-"""How a small disturbance of a periodic state goes through one period: the monodromy of the joint, in time.
+"""The monodromy of a joint: integration in time of a small disturbance of a periodic state over one period.
 
 A disturbance (dy, dlambda) of the displacements y, m, and of the contact force, N, obeys
 
     M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
 
-and at every sample the derivative of the contact law of Eqs. (9)-(15), its statuses being those of the state. With
-`p = lambda + x`, `x = eps u` the state of an elastic pair, and A, B the derivatives of x with respect to p and to x of
-the sample before (`coulomb.sample_tangents`), the law reads
+and at each sample the derivative of the contact law, Eqs. (9)-(15), with the statuses of the periodic state. Let
+`p = lambda + x`, with the state `x = eps u` of an elastic pair. Let A be the derivative of x with respect to p, and B
+the derivative with respect to x at the sample before (`coulomb.sample_tangents`). The law of the disturbance is
 
     (1 - A) eps du - A dlambda = B eps du'.                                                                  (2)
 
-A mass on a slider is marched with its own steps (`rigid_slider.step_mass`), whose derivatives T see the instants at
-which it turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+A mass on a slider has its own steps (`rigid_slider.step_mass`). Their derivatives T include the instants at which the
+mass turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
 
-Equation (1) is integrated by backward differences of second order (BDF2): the contact holds displacements, which no
-scheme without damping at high rates follows. The scheme itself takes the fraction `(2 pi r)^4 / (4 N^3)` of a
-vibration at r times the frequency of the state in a period of N samples. Pairs that stick all period long are held,
-pairs that are open all period long are free: no law is needed for either.
+Equation (1) is integrated by backward differences of second order (BDF2). The contact holds displacements suddenly,
+which needs a scheme with damping at high rates. In a period of N samples the scheme damps a vibration at r times the
+frequency of the state by the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick during the whole period are held, pairs
+that are open during the whole period are free: they need no law.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ from solver.structure.joint import Joint
 
 @dataclass(frozen=True)
 class SampledLaw:
-    """Derivative of the contact law at N samples of the p pairs that switch, blocks (N, p, 3, 3) of each pair:
+    """Derivative of the contact law of the p switching pairs at N samples, in blocks (N, p, 3, 3) of the pairs:
 
-        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv',
+        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
 
-    a prime for the sample before. Displacements that a pair does not have take no force. Velocities: m per sample.
+    A prime marks the sample before. Velocities are in m per sample. Displacements that a pair does not have take no
+    force.
     """
 
     by_force: FloatArray
@@ -53,10 +54,12 @@ class SampledLaw:
 
 @dataclass(frozen=True)
 class Monodromy:
-    """March of disturbances through the N samples of a period.
+    """Integration of disturbances through the N samples of a period, with the time h between two samples.
 
-    inertia, drag (n, n): `M / h^2` and `C / h` of the displacements that move, N/m, h the time between two samples.
-    compliance (n, n): inverse of `9/4 M / h^2 + 3/2 C / h + K`, m/N. select (3p, n): motion of the pairs that switch.
+    - inertia, drag (n, n): `M / h^2` and `C / h` of the displacements that move, N/m.
+    - compliance (n, n): inverse of `9/4 M / h^2 + 3/2 C / h + K`, m/N.
+    - select (3p, n): from the displacements that move to the motion of the switching pairs.
+    - law: derivative of the contact law.
     """
 
     inertia: FloatArray
@@ -67,12 +70,12 @@ class Monodromy:
 
     @property
     def size(self) -> int:
-        """Of a disturbance: displacements and velocities of two samples."""
+        """Size of a disturbance: displacements and velocities at two samples."""
         return 4 * len(self.inertia)
 
     @cached_property
     def _contact(self) -> tuple[FloatArray, FloatArray]:
-        """Motion under contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law in these forces alone."""
+        """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
         spread = np.asarray(self.select @ self.compliance).T
         flexibility = np.asarray(self.select @ spread)
         n_samples, n_pairs = self.law.by_force.shape[:2]
@@ -86,12 +89,12 @@ class Monodromy:
         return spread, inverse
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
-        """Disturbances (size, j) a period later: displacements now and a sample before, velocities (m per sample)."""
+        """Disturbances (size, j) a period later: displacements now and at the sample before, velocities likewise."""
         now, before, speed, speed_before = np.split(disturbance, 4)
         law, shape = self.law, (-1, 3, disturbance.shape[1])
         spread, inverse = self._contact
         for n, solve in enumerate(inverse):
-            # BDF2: v = 3/2 y + known, and the same of the acceleration
+            # BDF2: v = 3/2 y + known; acceleration from v in the same way
             known = 0.5 * before - 2.0 * now
             push = self.inertia @ (1.5 * known + 0.5 * speed_before - 2.0 * speed) + self.drag @ known
             after = -(self.compliance @ push)
@@ -105,9 +108,9 @@ class Monodromy:
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:
-    """Monodromy of a state whose wear is held, marched with `n_samples` of the law.
+    """Monodromy of a state at a fixed wear depth, with `n_samples` samples of the contact law.
 
-    linear: the structure that disturbances move in. Raises numpy.linalg.LinAlgError where that is singular.
+    linear: the structure in which disturbances move. Raises numpy.linalg.LinAlgError where the structure is singular.
     """
     fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
     state = Balance.frozen(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
@@ -129,13 +132,13 @@ def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples
 
 
 def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
-    """Pairs (n_contact,) that slip or open in a part of the period; and those that stick through all of it."""
+    """Pairs (n_contact,) that slip or open in a part of the period; pairs that stick during the whole period."""
     stuck = (at.status_t == STICK).all(axis=1)
     return ~stuck & ~(at.status_t == SEPARATED).all(axis=1), stuck
 
 
 def _sample_law(joint: Joint, at: Evaluation, pairs: IntArray) -> SampledLaw:
-    """The law of the pairs that switch."""
+    """Derivative of the contact law of the switching pairs."""
     n = at.status_t.shape[1]
     own, carried = sample_tangents(
         at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, 1
@@ -143,7 +146,7 @@ def _sample_law(joint: Joint, at: Evaluation, pairs: IntArray) -> SampledLaw:
     penalty = joint.penalty
     eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
     there = joint.contact.dofs[pairs] >= 0
-    # without such a displacement there is no disturbance of the force either
+    # a displacement that does not exist has no disturbance of the force
     passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
     last = np.zeros((n, pairs.size, 3, 3))
     last[:, :, 1:, 1:] = carried[:, pairs]
@@ -156,7 +159,7 @@ def _sample_law(joint: Joint, at: Evaluation, pairs: IntArray) -> SampledLaw:
 
 
 def _take_mass_law(law: SampledLaw, place: int, joint: Joint, at: Evaluation, pair: int) -> None:
-    """Tangential rows of the law of a mass on a slider, in place, at `place` among the pairs that switch."""
+    """Tangential rows of the law of a mass on a slider, in place; `place`: index among the switching pairs."""
     step, line = joint.sample_step, int(joint.line[pair])
     mass, drag = joint.penalty.mass[pair], joint.penalty.drag[pair]
     gain, loss = mass / step + 0.5 * drag, mass / step - 0.5 * drag

@@ -17,16 +17,18 @@ from solver.structure.rough_forms import multiply_roughly
 
 @dataclass(frozen=True)
 class CondensedStructure:
-    """`Z_r u + lambda = F_r` per harmonic, Eq. (8), and the responses as functions of u.
+    """`Z_r u + lambda = F_r` for each harmonic, Eq. (8), and the responses as functions of u.
 
-    `n_rel` relative displacements, in the order pair by pair: closing, tangent 1, tangent 2, those that exist.
+    The `n_rel` relative displacements u are ordered pair by pair: closing, tangent 1, tangent 2, as far as they exist.
 
-    static_stiffness (n_rel, n_rel): N/m. moving: the stiffness at the H harmonics above it.
-    static_force (n_rel,): N. harmonic_force (n_rel,) complex: N, harmonic 1, for the actual excitation amplitude.
-    static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
-    static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
-    drive (n_rel,), drive_offset complex: `conj(F) . x` of the harmonic load F and its displacements x, N m, from u and
-    with u = 0.
+    - static_stiffness (n_rel, n_rel): static Z_r, N/m.
+    - moving: Z_r at the H harmonics above the static one.
+    - static_force (n_rel,): static F_r, N.
+    - harmonic_force (n_rel,): complex F_r of harmonic 1, N, for the actual excitation amplitude.
+    - static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
+    - static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
+    - drive (n_rel,), drive_offset: complex; `drive . u + drive_offset` is `conj(F) . x`, N m, of the harmonic load F
+      and the displacements x.
     """
 
     static_stiffness: FloatArray
@@ -63,7 +65,7 @@ class CondensedStructure:
         return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
-        """The same to three digits at least, in less time: for directions of Newton's method."""
+        """`Z_r u` to at least three digits in less time, for directions of Newton's method."""
         static = np.ascontiguousarray(self.static_stiffness)
         return multiply_roughly(static, self.moving.rough, np.ascontiguousarray(displacement_h))
 
@@ -91,23 +93,23 @@ def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
-    """Condense the dynamic stiffness `K + i n w C - (n w)^2 M` of Eq. (1) at the harmonics n to the Z_r of Eq. (8).
+    """Condense the dynamic stiffness `K + i n w C - (n w)^2 M`, Eq. (1), at the harmonics n to Z_r of Eq. (8).
 
     Parameters
     ----------
     model : ReducedModel
         Matrices, loads and contact pairs.
     omega : float
-        w, rad/s.
+        Angular frequency w, rad/s.
     excitation_amplitude : float
-        N.
+        Amplitude, N.
     orders : tuple of int
-        Harmonics above the static one, ascending; the excitation acts in the first of them, which is 1.
+        Harmonics above the static one, ascending, beginning with 1. The excitation acts in harmonic 1.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        Where the structure with its joint held is singular at a harmonic.
+        The structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
@@ -129,7 +131,7 @@ def build_structure(
 
 @dataclass(frozen=True)
 class _Moving:
-    """What a `CondensedStructure` has of the harmonics above the static one."""
+    """The attributes of a `CondensedStructure` for the harmonics above the static one."""
 
     moving: HarmonicStiffness
     harmonic_force: ComplexArray
@@ -142,14 +144,14 @@ class _Moving:
 def _condense_each(
     model: ReducedModel, relative: IntArray, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> _Moving:
-    """A matrix for each harmonic; arguments as in `build_structure`."""
+    """Condensation with a matrix for each harmonic; arguments as in `build_structure`."""
     n_response = model.linear[0].response.shape[0]
     stiffness = np.empty((len(orders), relative.size, relative.size), complex)
     response = np.empty((len(orders), n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
     drive, drive_offset = np.zeros(relative.size, complex), 0.0 + 0.0j
     for (linear, conjugate), places in _by_structure(model, orders):
-        # a folded nodal diameter has the conjugate matrices, not the conjugate of the sum: damping stays positive
+        # a folded nodal diameter has conjugate matrices, not the conjugate of the sum: damping remains positive
         mass, damping, elastic, shape, rows = (
             part.conj() if conjugate else part
             for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
@@ -170,7 +172,7 @@ def _condense_each(
 def _condense_shared(
     linear: LinearModel, relative: IntArray, rates: FloatArray, excitation_amplitude: float
 ) -> _Moving:
-    """The matrices of a real structure once, for harmonics n = 1, ... at the rates n w (H,), rad/s."""
+    """Condensation of a real structure with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
     n = linear.mass.shape[0]
     internal = np.setdiff1d(np.arange(n), relative)
     rate = rates[:, None, None]
@@ -184,7 +186,7 @@ def _condense_shared(
     compliance = cast("ComplexArray", np.linalg.inv(block(internal, internal)))
     coupling = block(internal, relative)
     load, rows = excitation_amplitude * linear.load_harmonic, linear.response
-    # displacements behind the joint under a unit load on them, seen by the responses and by the excitation
+    # effect of a unit load on the displacements behind the joint, on the responses and on the work of the excitation
     seen = rows[:, internal] @ compliance
     by_load = load[internal].conj() @ compliance[0]
     held = compliance[0] @ load[internal]
@@ -203,7 +205,7 @@ def _is_real(linear: LinearModel) -> bool:
 
 
 def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
-    """Linear models (and whether the conjugate is meant) with the places of the harmonics to which they apply."""
+    """Each linear model (and whether its conjugate is meant) with the indices of its harmonics in `orders`."""
     seen = [model.harmonic_structure(harmonic) for harmonic in orders]
     for number, (linear, conjugate) in enumerate(seen):
         same = [other is linear and folded == conjugate for other, folded in seen]
@@ -215,8 +217,10 @@ def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tupl
 class Condensed:
     """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
 
-    stiffness (..., n_rel, n_rel): Schur complement, N/m. force (..., n_rel): reduced load, N. motion (..., n, n_rel):
-    all displacements under a unit u. held_motion (..., n): displacement under the load with u = 0, m.
+    - stiffness (..., n_rel, n_rel): Schur complement, N/m.
+    - force (..., n_rel): reduced load, N.
+    - motion (..., n, n_rel): all displacements for a unit u.
+    - held_motion (..., n): all displacements under the load with u = 0, m.
     """
 
     stiffness: Matrix
@@ -226,7 +230,7 @@ class Condensed:
 
 
 def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Static condensation of (dynamic) stiffnesses on some displacements.
+    """Condensation of static or dynamic stiffnesses on some displacements (Schur complement).
 
     Parameters
     ----------
@@ -235,12 +239,12 @@ def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
     relative : array (n_rel,)
         Indices of the displacements that remain.
     load : array (..., n)
-        N.
+        Load, N.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        Where the block of the other displacements is singular.
+        The block of the other displacements is singular.
     """
     n = full.shape[-1]
     internal = np.setdiff1d(np.arange(n), relative)

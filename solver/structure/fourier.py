@@ -19,7 +19,10 @@ from solver.model import ComplexArray, FloatArray
 class FourierBasis:
     """Matrices between H harmonics, of any orders, and N time samples.
 
-    orders (H,): ascending. synthesis (2H+1, N): `x_t = x_h @ synthesis`. analysis (N, 2H+1): `x_h = x_t @ analysis`.
+    - orders (H,): ascending.
+    - n_samples: N.
+    - synthesis (2H+1, N): `x_t = x_h @ synthesis`.
+    - analysis (N, 2H+1): `x_h = x_t @ analysis`.
     """
 
     orders: tuple[int, ...]
@@ -42,12 +45,12 @@ def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
     orders : tuple of int
         Harmonics above the static one, ascending.
     n_samples : int
-        N, equally spaced over the period.
+        Number N of samples, equally spaced over the period.
 
     Raises
     ------
     ValueError
-        Where the highest order is not below N/2: the samples would alias.
+        The highest order is not below N/2: aliasing.
     """
     highest = max(orders, default=0)
     if n_samples <= 2 * highest:
@@ -62,7 +65,7 @@ def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
 
 
 def synthesis(orders: tuple[int, ...], phase: FloatArray) -> FloatArray:
-    """Matrix (2H+1, n) of the series of Eq. (5) with these orders at phases (n,), rad: `x = x_h @ synthesis`."""
+    """Matrix (2H+1, n) of the Fourier series, Eq. (5), at phases (n,), rad: `x = x_h @ synthesis`."""
     angle = np.array(orders, np.float64)[:, None] * phase
     values = np.empty((2 * len(orders) + 1, len(phase)))
     values[0] = 1.0
@@ -94,7 +97,7 @@ def derivative(values_h: FloatArray, rates: FloatArray) -> FloatArray:
 
 
 def change_orders(values_h: FloatArray, orders: tuple[int, ...], wanted: tuple[int, ...]) -> FloatArray:
-    """The same series with other harmonics, (..., 2H+1): new ones are zero, those not wanted are truncated."""
+    """The series with other harmonics, (..., 2H+1): new harmonics are zero, unwanted harmonics are truncated."""
     changed = np.zeros((*values_h.shape[:-1], 2 * len(wanted) + 1))
     changed[..., 0] = values_h[..., 0]
     for place, order in enumerate(wanted):

@@ -1,4 +1,4 @@
-"""The condensed dynamic stiffness Z_r of Eq. (8) at all harmonics: how it is kept, and its product with a motion."""
+"""The condensed dynamic stiffness Z_r of Eq. (8) at all harmonics: storage, and product with a motion."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ class HarmonicStiffness(Protocol):
 
     @property
     def dense(self) -> ComplexArray:
-        """Matrices (H, n_rel, n_rel), N/m: made anew where they are not kept."""
+        """Matrices (H, n_rel, n_rel), N/m; computed at each call where they are not stored."""
 
     def matrix(self, place: int) -> ComplexArray:
-        """One of them."""
+        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
 
     @property
     def rough(self) -> RoughStiffness:
-        """The same in single precision: for directions of Newton's method, not for its residual."""
+        """Z_r in single precision, for directions of Newton's method, not for the residual."""
 
 
 @dataclass(frozen=True)
 class DenseStiffness:
-    """A matrix for each harmonic: of any structure. dense (H, n_rel, n_rel): N/m."""
+    """A matrix for each harmonic, for any structure. dense (H, n_rel, n_rel): N/m."""
 
     dense: ComplexArray
 
@@ -54,17 +54,21 @@ class DenseStiffness:
 
 @dataclass(frozen=True)
 class SharedStiffness:
-    """Real matrices K, M and C that all harmonics share, and the displacements behind the joint at each of them.
+    """Real matrices K, M, C, shared by all harmonics, and the compliance behind the joint at each harmonic.
 
     With A = K + i n w C - (n w)^2 M and the displacements split into those of the pairs (r) and all others (i),
 
         Z_r = A_rr - A_ri A_ii^-1 A_ir                                                                         (8)
 
-    A product takes three real ones for all harmonics at once and is bound by reading 3 n_rel^2 numbers, whatever H.
+    A product for all harmonics consists of three real products. Its time is the time of reading 3 n_rel^2 numbers from
+    memory, for any H.
 
-    n_rel: of the joint. rates (H,): n w, rad/s. columns (3, n, n_rel): columns r of K, M, C, rows r before rows i.
-    back (3, n_rel, n_i): K_ri, M_ri, C_ri. held_compliance (H, n_i, n_i): `A_ii^-1`, m/N. few: rough form
-    with few motions, None where that leaves too much out.
+    - n_rel: number of relative displacements of the joint.
+    - rates (H,): n w, rad/s.
+    - columns (3, n, n_rel): columns r of K, M, C, with rows r before rows i.
+    - back (3, n_rel, n_i): K_ri, M_ri, C_ri.
+    - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N.
+    - few: rough form with few motions; None where this form leaves out too much.
     """
 
     n_rel: int
@@ -76,7 +80,7 @@ class SharedStiffness:
 
     @property
     def dense(self) -> ComplexArray:
-        """As in HarmonicStiffness; not kept, as all harmonics together may take as much memory as all else."""
+        """As in HarmonicStiffness. Not stored: all harmonics together may need as much memory as all other data."""
         return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, self.n_rel, self.n_rel)
 
     def matrix(self, place: int) -> ComplexArray:
@@ -99,7 +103,7 @@ class SharedStiffness:
         return rough_of_each(self.dense) if self.few is None else self.few
 
     def _behind(self, forces: ComplexArray) -> FloatArray:
-        """Harmonics cosine, sine, ... (n_i, 2H) of `A_ii^-1 f` from f (n_i, H)."""
+        """`A_ii^-1 f` as harmonics cosine, sine, ... (n_i, 2H) from the complex f (n_i, H)."""
         behind = np.matmul(self.held_compliance, forces.T[:, :, None])[:, :, 0].T
         parts = np.empty((behind.shape[0], 2 * self.rates.size))
         parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag

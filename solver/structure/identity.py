@@ -1,10 +1,10 @@
-"""Keys of caches for objects that are large and never change: those very objects, not others of the same values."""
+"""Cache keys for large objects that never change. A key stands for the objects themselves, not for equal values."""
 
 from __future__ import annotations
 
 
 class Identity:
-    """Some objects as one hashable key. It keeps them alive, so that no other gets their identity."""
+    """Some objects as one hashable key. The key keeps the objects alive, so that their `id` is not used again."""
 
     def __init__(self, *objects: object) -> None:
         self.objects = objects

@@ -19,13 +19,19 @@ from solver.structure.penalty import Penalty, build_penalty, static_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """Everything that stays the same while a periodic state is sought, with H harmonics.
+    """All data that are constant while a periodic state is sought, with H harmonics.
 
-    model: what the structure was condensed from. omega: rad/s. excitation_amplitude: N.
-    friction_coefficient (n_contact,): of each pair.
-    component_index (n_rel,): `3 pair + component` of each relative displacement.
-    has_normal (n_contact,): False where the normal force is constant.
-    line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
+    - model: the model before condensation.
+    - omega: rad/s.
+    - excitation_amplitude: N.
+    - friction_coefficient (n_contact,): for each pair.
+    - structure: the condensed structure.
+    - contact: the contact pairs.
+    - basis: Fourier basis.
+    - component_index (n_rel,): `3 pair + component` of each relative displacement.
+    - penalty: penalties and masses of the pairs.
+    - has_normal (n_contact,): False where the normal force is constant.
+    - line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
     """
 
     model: ReducedModel
@@ -42,7 +48,7 @@ class Joint:
 
     @property
     def state_stiffness(self) -> FloatArray:
-        """Tangential state over slip (n_contact,), N/m; 1 where the state is the slip itself, of inertial pairs."""
+        """Tangential state over slip (n_contact,), N/m; 1 for inertial pairs, whose state is the displacement."""
         return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
 
     @property
@@ -51,11 +57,11 @@ class Joint:
         return 2.0 * np.pi / (self.omega * self.basis.n_samples)
 
     def step_mean_factor(self) -> FloatArray:
-        """Harmonics (2H+1,) of the mean over a step around each sample, over those of the samples."""
+        """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
         return step_mean_factor(self.basis.orders, self.basis.n_samples)
 
     def _inertial_compliance(self) -> ComplexArray:
-        """Displacement per force (n_inertial, H), m/N, of the marched masses, exactly as the steps see it."""
+        """Displacement per force (n_inertial, H), m/N, of the inertial pairs, exactly as in the steps of the march."""
         orders = np.array(self.basis.orders, np.float64)
         angle = np.pi * orders / self.basis.n_samples
         mass, drag = (part[self.penalty.inertial][:, None] for part in (self.penalty.mass, self.penalty.drag))
@@ -63,10 +69,10 @@ class Joint:
         return cast("ComplexArray", np.sin(angle) / angle / (1j * self.omega * orders * impedance))
 
     def motion(self, force_correction: FloatArray) -> FloatArray:
-        """Motion (n_contact, 3, 2H+1, ...), m, from the predicted less the contact force, N, of the same shape.
+        """Motion (n_contact, 3, 2H+1, ...), m, from predicted less contact force, N, of equal shape.
 
-        Linear; Eq. (12) divided by the penalty, for inertial pairs Newton's law. The mean position of inertial pairs is
-        relative to their history.
+        A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. The mean position of inertial
+        pairs is relative to their history.
         """
         shape = (-1,) + (1,) * (force_correction.ndim - 2)
         moved = np.empty_like(force_correction)
@@ -85,7 +91,7 @@ class Joint:
         moved[fast, 1:] = np.moveaxis(from_complex(mean, compliance * to_complex(force)), -1, 2)
 
     def force_correction(self, motion: FloatArray) -> FloatArray:
-        """Predicted less contact force, N, from a motion (n_contact, 3, 2H+1), m, Eqs. (10), (12); undoes `motion`."""
+        """Predicted less contact force, N, of a motion (n_contact, 3, 2H+1), m, Eqs. (10), (12); undoes `motion`."""
         force = np.empty_like(motion)
         force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
         force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]
@@ -102,24 +108,24 @@ class Joint:
         return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[self.component_index]
 
     def rows_of(self, pairs: IntArray | int) -> IntArray:
-        """Places of the relative displacements of one pair or of some, ascending: in the order of its components."""
+        """Indices of the relative displacements of one or more pairs, ascending."""
         chosen = np.zeros(self.contact.n_contact, bool)
         chosen[pairs] = True
         return np.flatnonzero(chosen[self.component_index // 3])
 
     def to_pairs(self, values: FloatArray) -> FloatArray:
-        """(n_contact, 3, m) from (n_rel, m): zero where a pair has no such displacement."""
+        """Values (n_contact, 3, m) of the pairs from (n_rel, m); zero where a pair has no such displacement."""
         spread = np.zeros((3 * self.contact.n_contact, values.shape[1]))
         spread[self.component_index] = values
         return spread.reshape(self.contact.n_contact, 3, values.shape[1])
 
     def to_relative(self, values: FloatArray) -> FloatArray:
-        """(n_rel, m) from (n_contact, 3, m)."""
+        """Values (n_rel, m) of the relative displacements from (n_contact, 3, m)."""
         return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.component_index]
 
 
 def step_mean_factor(orders: tuple[int, ...], n_samples: int) -> FloatArray:
-    """Harmonics (2H+1,) of the mean over a step around each of the samples, over those of the samples."""
+    """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
     factor = np.ones(2 * len(orders) + 1)
     angle = np.pi * np.array(orders) / n_samples
     factor[1::2] = factor[2::2] = np.sin(angle) / angle
@@ -129,18 +135,23 @@ def step_mean_factor(orders: tuple[int, ...], n_samples: int) -> FloatArray:
 @packable
 @dataclass(frozen=True)
 class Hold:
-    """A soft spring, N/m, on the mean position along a free `direction` (n_rel,), of norm 1, from `position` on, m."""
+    """A soft spring on the mean position of a joint along a direction in which the joint can slide freely.
+
+    - direction (n_rel,): of norm 1.
+    - stiffness: N/m.
+    - position: mean position along the direction at which the spring has no force, m.
+    """
 
     direction: FloatArray
     stiffness: float
     position: float
 
     def force(self, motion: FloatArray) -> float:
-        """What it holds, N, at mean relative displacements (n_rel,), m."""
+        """Force of the spring, N, at mean relative displacements (n_rel,), m."""
         return self.stiffness * (float(self.direction @ motion) - self.position)
 
     def on(self, structure: CondensedStructure) -> CondensedStructure:
-        """The structure with it."""
+        """The structure with the spring."""
         return replace(
             structure,
             static_stiffness=structure.static_stiffness + self.stiffness * np.outer(self.direction, self.direction),
@@ -150,10 +161,15 @@ class Hold:
 
 @dataclass(frozen=True)
 class Case:
-    """What all states of one computation have in common; `joint` gives the joint at a frequency and amplitude.
+    """Data that all states of one computation share. `joint` gives the joint at a frequency and amplitude.
 
-    friction_coefficient (n_contact,): of each pair. penalty_omega: rad/s, where the penalty is taken. resolution:
-    harmonics and samples in use. hold: of a joint that slides all over, see `solver.wear.free_slide`; None for none.
+    - model: the model.
+    - friction_coefficient (n_contact,): for each pair.
+    - penalty_omega: angular frequency for which the penalty is built, rad/s.
+    - penalty: penalties and masses of the pairs.
+    - settings: settings of the solver.
+    - resolution: harmonics and samples in use.
+    - hold: spring on a joint that slides as a whole, see `solver.wear.free_slide`; None without a spring.
     """
 
     model: ReducedModel
@@ -190,7 +206,7 @@ class Case:
         )
 
     def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
-        """One of the last that were asked for: a march has two at one frequency, in turns."""
+        """Condensed structure, from a small cache: a wear history uses two at one frequency in turns."""
         key = omega, excitation_amplitude, self.resolution.orders
         found = self._structures.get(key)
         if found is None:
@@ -202,11 +218,11 @@ class Case:
         return found
 
     def held(self, hold: Hold | None) -> Case:
-        """The same case with another hold."""
+        """The case with another hold."""
         return replace(self, hold=hold, _structures={})
 
     def at(self, resolution: Resolution) -> Case:
-        """The same case with other harmonics and samples."""
+        """The case with another resolution, and the penalty for its harmonics."""
         if resolution == self.resolution:
             return self
         penalty = build_penalty(self.model, self.penalty_omega, resolution.highest)
@@ -227,18 +243,18 @@ def build_case(
     model : ReducedModel
         The scene.
     friction_coefficient : float, array (n_contact,) or None
-        One for all pairs or one of each; None where the scene has one of each pair.
+        One number for all pairs or one for each pair; None where the scene has its own.
     omega : float
-        Where the penalty is taken, rad/s: the same for states that are compared.
+        Angular frequency for which the penalty is built, rad/s; equal for states that are compared.
     settings : SolverSettings
-        Of the solver.
+        Settings of the solver.
     resolution : Resolution, optional
-        To begin with; by default the first one that the settings allow.
+        First harmonics and samples; by default from the settings.
 
     Raises
     ------
     ValueError
-        Where the friction coefficient is given twice or not at all, or is not one of each pair.
+        The friction coefficient is given twice, not at all, or not for each pair.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
@@ -246,7 +262,7 @@ def build_case(
 
 
 def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
-    """Friction coefficient (n_contact,) of each pair; arguments and errors as in `build_case`."""
+    """Friction coefficient (n_contact,) for each pair; arguments and errors as in `build_case`."""
     own, n_contact = model.contact.friction_coefficient, model.contact.n_contact
     if own is None and friction_coefficient is None:
         raise ValueError("friction_coefficient is missing: the scene has none of its own")
@@ -259,7 +275,7 @@ def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatAr
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:
-    """The same joint under a part of its static load alone: no harmonics, one sample."""
+    """The joint under a fraction of its static load, without excitation: no harmonics, one sample."""
     structure = joint.structure
     held = replace(
         structure,
@@ -268,6 +284,6 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,
     )
-    # a static load has no velocity: every pair is held at displacement level
+    # a static state has no velocity: each pair is taken at displacement level
     penalty = static_penalty(joint.penalty)
     return replace(joint, excitation_amplitude=0.0, structure=held, basis=build_basis((), 1), penalty=penalty)

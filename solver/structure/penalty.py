@@ -1,17 +1,16 @@
-"""The penalty eps of each pair, Eq. (9), and the formulation that suits it, from the scene alone.
+"""The penalty eps of each pair, Eq. (9), and the formulation of the pair (elastic or inertial), from the scene alone.
 
-With any penalty the balance is exact as the number of harmonics grows; at a finite number its error comes from the
-harmonics of the *predicted* force that are left out. With the structure's stiffness `Z_n` these are
-`(1 - E_n / Z_n) lambda_n`, where E_n is the penalty as it acts on the displacement. So E_n has to be near Z_n above the
-highest harmonic:
+For a growing number of harmonics the balance is exact with any penalty. With a finite number its error comes from the
+harmonics of the *predicted* force that are left out. With the stiffness `Z_n` of the structure these harmonics are
+`(1 - E_n / Z_n) lambda_n`, where the penalty E_n acts on the displacement. So E_n has to be near Z_n above the highest
+harmonic:
 
-- a pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
-  E_n = eps near that stiffness, Eq. (10);
-- a mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is marched with its mass
-  (`solver.contact.rigid_slider`),
-  `E_n = -(n w)^2 m + i n w c`;
-- a mass that a stiff spring ties to its slider is marched with its mass as long as that dominates in the harmonics that
-  are left out, and taken at displacement level where the spring does.
+- A pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
+  E_n = eps near this stiffness, Eq. (10).
+- A mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is inertial: the pair is marched with its mass
+  (`solver.contact.rigid_slider`), with `E_n = -(n w)^2 m + i n w c`.
+- A mass on a stiff spring at its slider is inertial where the mass dominates in the harmonics that are left out. Where
+  the spring dominates, the pair is taken at displacement level.
 """
 
 from __future__ import annotations
@@ -27,12 +26,15 @@ from solver.structure.options import STRUCTURE
 
 @dataclass(frozen=True)
 class Penalty:
-    """Penalties of the pairs, Eq. (9), and the masses of those that are marched with them.
+    """Penalties of the pairs, Eq. (9), and masses of the inertial pairs.
 
-    normal, tangential (n_contact,): eps, N/m. inertial (n_contact,): whether the pair is marched with its mass.
-    mass (n_contact,): kg. drag (n_contact,): N s/m. mean (n_contact,): N/m, holds the mean tangential position of pairs
-    that are marched with their mass: their friction force alone leaves it undetermined while they stick. It is so small
-    that it does not hold one that slips. These three are used for inertial pairs only, `tangential` for the others.
+    - normal, tangential (n_contact,): eps, N/m; `tangential` for elastic pairs only.
+    - inertial (n_contact,): whether the pair is marched with its mass.
+    - mass (n_contact,): kg, for inertial pairs only.
+    - drag (n_contact,): N s/m, for inertial pairs only.
+    - mean (n_contact,): stiffness on the mean tangential position, N/m, for inertial pairs only. While such a pair
+      sticks, the friction force alone does not determine the mean position. The stiffness is too small to hold a pair
+      that slips.
     """
 
     normal: FloatArray
@@ -44,9 +46,9 @@ class Penalty:
 
 
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
-    """Penalty from the condensed `K + s^2 M` at the real rate s of the first harmonic left out, `(highest + 1) omega`.
+    """Penalty from the condensed `K + s^2 M` at the real rate s = `(highest + 1) omega`, the first harmonic left out.
 
-    At a real rate the structure has no resonances: an elastic joint appears as a stiffness, a slider as a mass.
+    At a real rate the structure has no resonances: an elastic joint acts as a stiffness, a slider as a mass.
 
     Parameters
     ----------
@@ -63,7 +65,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
     inertial = has_tangent & (high > STRUCTURE.inertial_ratio * low)
     if inertial.any() and highest + 1 > STRUCTURE.inertial_rate:
-        # a mass behind a spring: where the spring dominates in the harmonics left out, it is the penalty
+        # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
         inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > STRUCTURE.inertial_ratio * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
@@ -82,20 +84,20 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     """Diagonal of the condensed `K + s^2 M` at each pair, normal and (larger) tangential, (n_contact, 2), N/m.
 
     The diagonal is the stiffness of a pair that moves alone. Measured on the dovetail sector at resonance: three times
-    as much takes four times the Newton iterations, half as much takes as many, all within 1 % in the response.
+    the value takes four times the Newton iterations, half the value an equal number; all responses agree within 1 %.
     """
     _, components = relative_indices(model.contact)
     size = np.zeros((model.contact.n_contact, 2))
     diagonal = np.real(np.diag(_condensed_at(model, rate)))
     np.maximum.at(size, (components // 3, np.minimum(components % 3, 1)), diagonal)
-    # a pair without such a displacement, or one without stiffness, still needs a number to divide by
+    # a pair without such a displacement or without stiffness still needs a divisor
     return np.where(size > 0.0, size, 1.0)
 
 
 def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Mass (n_contact,), kg, that resists a tangential force on a pair, all other pairs being free."""
+    """Mass (n_contact,), kg, that a tangential force on a pair accelerates, with all other pairs free."""
     _, components = relative_indices(model.contact)
-    # 1 / G grows as k + m s^2 where it is inertial, G the compliance
+    # for an inertial pair 1 / G = k + m s^2, with the compliance G
     low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
     mass = np.full(model.contact.n_contact, np.inf)
     tangent = components % 3 > 0
@@ -104,7 +106,7 @@ def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
 
 
 def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, all others being free."""
+    """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, with all others free."""
     return np.asarray(np.real(np.diag(np.linalg.inv(_condensed_at(model, rate)))))
 
 
@@ -116,6 +118,6 @@ def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
 
 
 def static_penalty(penalty: Penalty) -> Penalty:
-    """The same penalty for a static state, in which nothing is inertial: every pair at displacement level."""
+    """The penalty for a static state: no pair is inertial, each pair is taken at displacement level."""
     none = np.zeros_like(penalty.inertial)
     return Penalty(penalty.normal, penalty.tangential, none, penalty.mass, penalty.drag, penalty.mean)

@@ -1,13 +1,13 @@
-"""The condensed dynamic stiffness Z_r in single precision, for products of three digits in less time than exact ones.
+"""The condensed dynamic stiffness Z_r in single precision, for fast products of three digits.
 
-Directions of Newton's method need no more. A product is bound by reading the matrices from memory. In a real structure
-all harmonics share the stiffness K of the displacements of the pairs; few motions of the joint carry the mass M and the
-part of the damping C that is no multiple `s K` of the stiffness. The structure behind the joint acts through as many
-motions as it has displacements. With a basis B of all these motions
+Three digits are enough for directions of Newton's method. The time of a product is the time of reading the matrices
+from memory. In a real structure all harmonics share the stiffness K of the displacements of the pairs. The mass M, and
+the part of the damping C that is not proportional to stiffness, `C - s K`, need only few motions of the joint. The
+structure behind the joint acts through as many motions as it has displacements. With a basis B of all these motions
 
     Z_n = (1 + i n w s) K + B G_n B^T,      G_n small and complex,
 
-and one product with K serves all harmonics. Any other structure keeps a matrix for each harmonic.
+and one product with K serves all harmonics. Other structures need a matrix for each harmonic.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SingleComplex = NDArray[np.complex64]
 class RoughStiffness(NamedTuple):
     """Z_r at H harmonics above the static one, in single precision.
 
-    - each (H, n_rel, n_rel): a matrix for each harmonic, N/m; or (0, 0, 0), and then the others hold:
+    - each (H, n_rel, n_rel): a matrix for each harmonic, N/m; or (0, 0, 0), and then the other fields are used:
     - shared (n_rel, n_rel): K, N/m.
     - drag (H,): `n w s`, dimensionless.
     - basis (n_rel, k), basis_t (k, n_rel): B and its transpose, orthonormal.
@@ -46,7 +46,7 @@ class RoughStiffness(NamedTuple):
 
 
 def rough_of_each(dense: ComplexArray) -> RoughStiffness:
-    """Form with a matrix for each harmonic, from these (H, n_rel, n_rel), N/m."""
+    """Rough form with a matrix for each harmonic, from `dense` (H, n_rel, n_rel), N/m."""
     none = np.empty((0, 0), np.float32)
     return RoughStiffness(
         np.ascontiguousarray(dense, np.complex64),
@@ -61,9 +61,9 @@ def rough_of_each(dense: ComplexArray) -> RoughStiffness:
 def rough_of_shared(
     linear: LinearModel, relative: IntArray, internal: IntArray, rates: FloatArray, held_compliance: ComplexArray
 ) -> RoughStiffness | None:
-    """Form of a real structure at the rates n w (H,), rad/s; None where too much would be left out of it.
+    """Rough form of a real structure at the rates n w (H,), rad/s; None where the form would leave out too much.
 
-    held_compliance (H, n_i, n_i): m/N, of the displacements `internal` (n_i,) with those of the pairs held.
+    held_compliance (H, n_i, n_i): compliance of the displacements `internal` (n_i,) with the pairs held, m/N.
     """
     common = _common_form(Identity(linear), tuple(relative.tolist()))
     highest = float(rates.max(initial=0.0))
@@ -90,12 +90,13 @@ def rough_of_shared(
 
 
 class _CommonForm(NamedTuple):
-    """What the rough forms of a structure at all frequencies share.
+    """Data that the rough forms of a structure share at all frequencies.
 
-    - stiffness (n_rel, n_rel), slope: K, N/m, and s, s.
+    - stiffness (n_rel, n_rel): K, N/m.
+    - slope: the factor s in `C = s K + ...`, s.
     - basis (n_rel, k): B.
     - mass, drag (k, k): M and `C - s K` in the basis.
-    - mass_left_out, drag_left_out: Frobenius norms of what the basis leaves out of these.
+    - mass_left_out, drag_left_out: Frobenius norms of the parts of mass and drag that the basis leaves out.
     - size: root mean square of the eigenvalues of K, N/m.
     """
 
@@ -147,9 +148,9 @@ def _leading(matrix: FloatArray, most: int) -> FloatArray:
 
 @njit(cache=True)
 def multiply_roughly(static: FloatArray, rough: RoughStiffness, motion: FloatArray) -> FloatArray:
-    """Forces `Z_r u` (n_rel, 2H+1), N, to three digits at least, of a motion u (n_rel, 2H+1), m.
+    """Forces `Z_r u` (n_rel, 2H+1), N, to at least three digits, from a motion u (n_rel, 2H+1), m.
 
-    static (n_rel, n_rel): stiffness at rest, N/m, in double precision: a joint that slides as a whole moves far.
+    static (n_rel, n_rel): static stiffness, N/m, in double precision, because a joint that slides as a whole moves far.
     """
     n_rel, m = motion.shape
     n_harmonics = (m - 1) // 2
@@ -165,7 +166,7 @@ def multiply_roughly(static: FloatArray, rough: RoughStiffness, motion: FloatArr
                 force[row, 2 * n + 1] = pushed[row].real
                 force[row, 2 * n + 2] = -pushed[row].imag
         return force
-    # motions of 1e-6 m and stiffnesses of 1e9 N/m are far within the range of single precision
+    # motions of 1e-6 m and stiffnesses of 1e9 N/m are well within the range of single precision
     moving = motion[:, 1:].astype(np.float32)
     spring, seen = np.dot(rough.shared, moving), np.dot(rough.basis_t, moving)
     bent = np.empty_like(seen)
