@@ -14,8 +14,8 @@ class ResultOptions:
     Strips that are open carry exactly 0; under a stroke whose scar is cut off the last one carries 0.96 of the largest
     pressure and has 0.88 of the largest depth."""
     held_force: float = 1e-5
-    """Fraction of the friction of all pairs that a hold of the mean position takes up at most. Motion and wear change by
-    this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 2e-6 after 20 000 cycles."""
+    """Fraction of the friction of all pairs that a hold of the mean position takes up at most. Motion and wear change
+    by this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 2e-6 after 20 000 cycles."""
 
 
 RESULTS = ResultOptions()
