@@ -5,7 +5,8 @@ The difference of a computation to its reference solution, pair by pair, is take
 - the sweep to the start state: half the nodes, placed between those of the fine sweep (`solver.loading_history`). The
   difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice this
   difference;
-- the harmonics: the next lower entry of `harmonic_levels`, with the samples that belong to it;
+- the harmonics: the next lower entry of `harmonic_levels`, with the samples that belong to it (the next higher entry
+  where the harmonics are few);
 - the steps on the slow time: adaptive steps with four times the tolerance, whatever the scheme of the history is.
 
 Some events make an error grow: pairs stick again, a resonance passes, a branch ends. The difference to the reference
@@ -15,7 +16,8 @@ solution grows as well, a sum of local errors does not.
 from __future__ import annotations
 
 from solver.accuracy.harmonic_levels import fewer, shifted
-from solver.settings import Resolution, SolverSettings
+from solver.model import ReducedModel
+from solver.settings import RESOLUTION, Resolution, SolverSettings
 
 RTOL_RATIO = 4.0
 """Ratio of the step tolerances of reference solution and history: BDF2 steps are then about twice as long.
@@ -25,6 +27,12 @@ AUTOMATIC = SolverSettings()
 """Settings that let `fewer` reduce both harmonics and samples."""
 
 
-def coarser(resolution: Resolution) -> Resolution:
-    """Resolution of the reference solution: the next lower one, or the next higher one for one harmonic only."""
-    return shifted(resolution, 1) if resolution.highest <= 1 else fewer(resolution, AUTOMATIC)
+def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
+    """Harmonics and samples of the reference solution: those of the next lower level.
+
+    With one harmonic alone a joint that slips is another joint. So the reference solution of a history with three
+    harmonics or one has the next higher level, where the model has matrices for it.
+    """
+    richer = shifted(resolution, 1)
+    few = resolution.highest <= RESOLUTION.first_harmonics
+    return richer if few and model.holds(richer.highest) else fewer(resolution, AUTOMATIC)

@@ -166,7 +166,7 @@ class Solutions:
         assert self.start.state is not None
         work, compared = self._joint(), self._compared(fine)
         end = float(compared[-1])
-        resolutions = tuple((count, coarser(resolution)) for count, resolution in course.resolutions)
+        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in course.resolutions)
         integration = Integration(
             AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False),
             PlainCheck(resolutions),

@@ -177,7 +177,7 @@ def test_strap_on_two_lugs(folder):
     volume = result.worn_volume.values
     assert 0.0 < volume[1] < volume[2]
     assert result.outcome == 0
-    assert result.error_estimate < 0.05
+    assert result.error_estimate < 0.06
 
 
 @pytest.mark.slow

@@ -142,7 +142,7 @@ def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share
     The reference solution starts from the state of the reference sweep, with fewer harmonics.
     """
     first = begin_reference(work, start, found.unworn.step_limit)
-    state = with_harmonics(work, first, coarser(found.final.state.resolution))
+    state = with_harmonics(work, first, coarser(found.final.state.resolution, work.case.model))
     if state is None:
         return np.full(first.depth.size, np.nan)
     state = work.noted(state)
