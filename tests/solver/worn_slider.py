@@ -30,7 +30,7 @@ CYCLES = np.linspace(0.0, END, 9)
 
 
 @lru_cache
-def slider_start(settings: SolverSettings = COARSE) -> tuple[ReducedModel, StartState]:
+def slider_start(settings: SolverSettings) -> tuple[ReducedModel, StartState]:
     model = scene("sdof_slider", settings.harmonics)
     (start,) = branch_states(model, FRICTION, FORCE, [OMEGA], settings)
     assert start.outcome is Outcome.CONVERGED
@@ -52,7 +52,7 @@ def march(
 
 def begun(wear: float = WEAR) -> tuple[WearingJoint, WearState]:
     """The wearing slider and its unworn state."""
-    model, start = slider_start()
+    model, start = slider_start(COARSE)
     assert start.state is not None
     case = build_case(model, FRICTION, start.penalty_omega, COARSE, start.resolution)
     work = WearingJoint.of(case, start.state, wear)
