@@ -1,5 +1,8 @@
 """What a point costs beyond its computing: a study of trivial points, the time and the memory of rank 0.
 
+Ends with 1 where a point takes rank 0 of 4 more than 0.5 ms of its processor, or 0.01 MiB. On a slow machine the
+limit is as many times higher as a fixed piece of work in Python takes longer there.
+
     python -m tests.benchmarks.overhead [POINTS]
 
 Tasks give made-up results at once. In one process, all of it runs in turn: the time is that of rank 0, of the ranks
@@ -21,6 +24,10 @@ from pathlib import Path
 from tests.mpi.launching import FAKED, ROOT, launcher
 
 FREQUENCIES = 10
+MILLISECONDS, MEMORY = 0.5, 1e-2
+"""Most that a point may take of rank 0: of its processor where `UNIT` is right, and in MiB."""
+UNIT = 14.0
+"""Milliseconds that the loop in `unit` takes where the limit was found."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +77,19 @@ def spent_on_points(n_ranks: int, n_points: int, folder: Path) -> Spent:
     return Spent(many.seconds - few.seconds, many.of_rank_0 - few.of_rank_0, many.memory - few.memory)
 
 
-def main() -> None:
-    """Prints a line for one process and one for 4 ranks."""
+def unit() -> float:
+    """Milliseconds of this processor for a fixed piece of work in Python, the least of some tries."""
+    tries = []
+    for _ in range(7):
+        began, texts = time.thread_time(), {}
+        for number in range(100_000):
+            texts[number & 1023] = str(number)
+        tries.append(1e3 * (time.thread_time() - began))
+    return min(tries)
+
+
+def main() -> int:
+    """Prints a line for one process and one for 4 ranks; 1 where the 4 ranks take more than the limits."""
     n_points = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
     with tempfile.TemporaryDirectory() as name:
         for n_ranks in (0, 4):
@@ -81,7 +99,9 @@ def main() -> None:
                 f" {1e3 * spent.seconds / n_points:.3f} ms a point, of which rank 0 is busy for"
                 f" {1e3 * spent.of_rank_0 / n_points:.3f} ms; it grows by {spent.memory:.0f} MiB"
             )
+    slowness = max(1.0, unit() / UNIT)
+    return int(1e3 * spent.of_rank_0 / n_points > MILLISECONDS * slowness or spent.memory > MEMORY * n_points)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -33,8 +33,7 @@ def wait_for_a_march(running: Running, folder: Path) -> None:
     time.sleep(1.0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("n_ranks", [0, 2])
+@pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGINT), (2, signal.SIGTERM)])
 def test_two_hundred_signals_end_it_with_a_result(n_ranks: int, number: int, tmp_path: Path) -> None:
     began = []
 

@@ -77,10 +77,9 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
     xr.testing.assert_identical(results[2], results[0])
 
 
-@pytest.mark.parametrize("n_ranks", [2, 4])
-def test_uneven_tasks_are_balanced_while_running(n_ranks: int, tmp_path: Path) -> None:
+def test_uneven_tasks_are_balanced_while_running(tmp_path: Path) -> None:
     """The most even of some tries counts: a rank that something else on the machine holds up gets less to do."""
-    tries = []
+    n_ranks, tries = 4, []
     for attempt in range(3):
         folder = tmp_path / str(attempt)
         folder.mkdir()
@@ -126,7 +125,7 @@ def default_signals() -> Iterator[None]:
 # the launcher of MPICH ends by itself at SIGHUP, and all ranks with it
 @pytest.mark.parametrize(
     ("n_ranks", "number"),
-    [(n, number) for n in (0, 2) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)] + [(0, signal.SIGHUP)],
+    [(0, signal.SIGINT), (0, signal.SIGHUP), (2, signal.SIGINT), (2, signal.SIGTERM), (2, signal.SIGUSR1)],
 )
 def test_an_interrupted_run_ends_at_once(
     n_ranks: int, number: signal.Signals, tmp_path: Path, default_signals: None
@@ -167,8 +166,8 @@ def test_printed_once(option: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "environment",
-    [{"PMI_SIZE": "3"}, {"SLURM_STEP_NUM_TASKS": "3"}, {"OMPI_COMM_WORLD_SIZE": "3"}],
-    ids=["more than MPI knows of", "srun without MPI", "launcher of Open MPI"],
+    [{"PMI_SIZE": "3"}, {"SLURM_STEP_NUM_TASKS": "3"}],
+    ids=["more than MPI knows of", "srun without MPI"],
 )
 def test_launcher_of_another_mpi(environment: dict[str, str], tmp_path: Path) -> None:
     """Processes that do not find each other say so once and compute nothing."""

@@ -62,8 +62,10 @@ def without_folder(_: Solver) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("leave", [finished, unfinished, killed, without_folder])
-@pytest.mark.parametrize("other", [OTHER, RENAMED], ids=["another scene", "another name"])
+@pytest.mark.parametrize(
+    ("leave", "other"),
+    [(finished, OTHER), (finished, RENAMED), (unfinished, OTHER), (killed, RENAMED), (without_folder, OTHER)],
+)
 def test_what_is_left_of_another_study_stays(
     leave: Callable[[Solver], None],
     other: list[str],

@@ -51,7 +51,7 @@ def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("at", range(1, N_RESULTS + 1))
+@pytest.mark.parametrize("at", [1, 4, 5, 8, N_RESULTS])
 def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
     expected = whole(solver)
 

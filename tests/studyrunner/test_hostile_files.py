@@ -23,6 +23,15 @@ from tests.studyrunner.reading_process import ReadingProcess
 # all files but those of the command alone
 pytestmark = pytest.mark.usefixtures("reader")
 
+IN_A_RESULT = (
+    *("huge matrix", "bomb within the limit", "inflating chunk", "external link", "circle of groups"),
+    *("many objects", "virtual dataset", "ragged rows", "long name", "not a number", "attribute of text"),
+)
+"""One of each kind of harm: behind this door is the same reader of scenes."""
+
+STUDIES_IN_A_RESULT = ("nested arrays", "dotted key", "huge integer", "escape sequence in a key", "points without end")
+"""The same for texts of studies."""
+
 VALUES_ONLY = {
     *("huge matrix", "huge vector", "bomb of zeros", "bomb within the limit", "huge extent without storage"),
     *("64 bit overflow", "name with a path", "label with an escape sequence", "not a number", "infinite", "denormal"),
@@ -122,7 +131,7 @@ def put_scene_into_result() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", SCENES)
+@pytest.mark.parametrize("case", IN_A_RESULT)
 def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
     put_scene_into_result()
@@ -158,11 +167,7 @@ def test_study_file(case: str, folder: Path, refused: Refused) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "case",
-    # an attribute is no text with a null; where the scene stands in the result, its name does not matter
-    [case for case in TEXTS if len(TEXTS[case]) < 2**22 and b"\0" not in TEXTS[case] and not case.startswith("scene ")],
-)
+@pytest.mark.parametrize("case", STUDIES_IN_A_RESULT)
 def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     with h5py.File("result", "r+", libver="latest") as result:
         del result.attrs["study"]
@@ -172,7 +177,7 @@ def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5", "result"])
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.999])
 def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> None:
     content = (folder / place).read_bytes()
     (folder / place).write_bytes(content[: int(share * len(content))])
@@ -213,7 +218,7 @@ def test_names_of_files_do_not_reach_the_terminal_raw(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["inflating chunk", "bomb within the limit", "next to the largest"])
+@pytest.mark.parametrize("case", ["inflating chunk", "next to the largest"])
 def test_the_command_alone(case: str, folder: Path) -> None:
     """Time of the processors and memory of the whole command, its start included."""
     change_scene(folder / "scene.h5", SCENES[case])

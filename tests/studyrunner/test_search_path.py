@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ import pytest
 from studies.sandboxed_read import check_result_readable, check_scene_readable
 from studies.scene_error import SceneError
 from studyrunner.cli import main
+from studyrunner.netcdf.output import parts_folder
 from tests.mpi.launching import PATIENCE, launcher
 
 ROOT = Path(__file__).parents[2]
@@ -32,15 +34,23 @@ SMALL = ("axes.frequency=150", "slow_time.cycles=0", "axes.scheme=implicit")
 PLUGIN = "[xarray.backends]\nforeign = foreign_plugin:Backend\n[pydantic]\nforeign = foreign_plugin:plugin\n"
 
 
-@pytest.fixture
-def hostile(tmp_path: Path) -> Path:
-    """A folder with a study, its scene, its result, and everything that could be mistaken for a module."""
-    folder = tmp_path / "hostile"
-    folder.mkdir()
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scene and a result."""
+    folder = tmp_path_factory.mktemp("made")
     scene, result = folder / "scene.h5", folder / "result.nc"
     study = ["sdof_slider", *(part for text in SMALL for part in ("--set", text))]
     assert main([*study, "--write-scene", str(scene)]) == 0
     assert main([*study, "-o", str(result)]) == 0
+    shutil.rmtree(parts_folder(result))
+    return folder
+
+
+@pytest.fixture
+def hostile(made: Path, tmp_path: Path) -> Path:
+    """A folder with a study, its scene, its result, and everything that could be mistaken for a module."""
+    folder = tmp_path / "hostile"
+    shutil.copytree(made, folder)
     text = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = 150.0\n'
     (folder / "study.toml").write_text(f"{text}[slow_time]\ncycles = 0\noutputs = 1\n", encoding="utf-8")
     for name in (*NAMES, "foreign_plugin.py"):
@@ -98,8 +108,13 @@ def test_study_report(hostile: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("python_path", [f":{ROOT}", f".:{ROOT}", f"{ROOT}:"])
-@pytest.mark.parametrize("module", ["studyrunner.cli", "studyrunner.report.cli"])
+@pytest.mark.parametrize(
+    ("module", "python_path"),
+    [
+        *(("studyrunner.cli", python_path) for python_path in (f":{ROOT}", f".:{ROOT}", f"{ROOT}:")),
+        ("studyrunner.report.cli", f":{ROOT}"),
+    ],
+)
 def test_commands_as_they_are_installed(module: str, python_path: str, hostile: Path, tmp_path: Path) -> None:
     """A PYTHONPATH with an empty entry, as scripts that extend it leave it, means the current folder."""
     script = tmp_path / "command"

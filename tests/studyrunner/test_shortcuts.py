@@ -23,7 +23,8 @@ STUDY = [
 BY_DEPTH = ["axes.wear_coefficient=1e-11", "slow_time.largest_depth=2e-8"]
 NO_CYCLES = ["slow_time.cycles=0", "slow_time.outputs=1"]
 EFFORT = ("newton_iterations", "run_time")
-FIXED = ["implicit", "explicit"]
+
+pytestmark = pytest.mark.slow
 
 
 def run(folder: Path, *overrides: str) -> xr.Dataset:
@@ -39,11 +40,6 @@ def both_ways(folder: Path, *overrides: str) -> tuple[xr.Dataset, xr.Dataset]:
     return run(folder, *overrides), run(folder, *overrides, "solver.shortcuts=false")
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, xr.Dataset]:
-    return both_ways(tmp_path_factory.mktemp("shortcuts"))
-
-
 def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
     """To round-off; violations are relative themselves, and what is left of them where they vanish is round-off."""
     if short[name].dtype.kind in "OU":
@@ -57,42 +53,20 @@ def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
 COMPARED = [name for name in (*ASKED, *KEPT) if name not in EFFORT]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COMPARED)
-def test_steps_of_given_length(name: str, results: tuple[xr.Dataset, xr.Dataset]) -> None:
-    short, long = (result.sel(scheme=FIXED) for result in results)
-    assert_same(name, short, long)
-
-
-def test_adaptive_steps_for_another_wear_coefficient(results: tuple[xr.Dataset, xr.Dataset]) -> None:
-    short, long = (result.sel(scheme="adaptive") for result in results)
+def test_what_is_shared_is_the_same_and_no_row_of_zeros(tmp_path: Path) -> None:
+    results = both_ways(tmp_path)
     for name in COMPARED:
-        assert_same(name, short, long)
+        assert_same(name, *results)
+    for result, shortcuts in zip(results, (True, False), strict=True):
+        (tmp_path / "again.toml").write_text(result.attrs["study"], encoding="utf-8")
+        assert read_study(str(tmp_path / "again.toml")).solver.shortcuts is shortcuts
+        worn = result.worn_volume.isel(cycle=-1)
+        assert (worn.sel(frequency=160.0).where(result.wear_coefficient > 0.0, drop=True) > 0.0).all()
+        assert (worn.sel(wear_coefficient=0.0) == 0.0).all()
 
 
-@pytest.mark.parametrize("name", COMPARED)
-def test_adaptive_steps_whatever_the_step_axis_says(name: str, results: tuple[xr.Dataset, xr.Dataset]) -> None:
-    short, long = (result.sel(scheme="adaptive", wear_coefficient=[0, 1e-11]) for result in results)
-    assert_same(name, short, long)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("overrides", [BY_DEPTH, NO_CYCLES], ids=["largest depth", "no cycles"])
 def test_other_reasons(overrides: list[str], tmp_path: Path) -> None:
     short, long = both_ways(tmp_path, *overrides, "axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")
     for name in COMPARED:
         assert_same(name, short, long)
-
-
-def test_the_result_says_whether_there_were_shortcuts(results: tuple[xr.Dataset, xr.Dataset], tmp_path: Path) -> None:
-    for result, shortcuts in zip(results, (True, False), strict=True):
-        (tmp_path / "again.toml").write_text(result.attrs["study"], encoding="utf-8")
-        assert read_study(str(tmp_path / "again.toml")).solver.shortcuts is shortcuts
-
-
-def test_points_wear_at_all(results: tuple[xr.Dataset, xr.Dataset]) -> None:
-    """What is compared is no row of zeros."""
-    for result in results:
-        worn = result.worn_volume.isel(cycle=-1)
-        assert (worn.sel(frequency=160.0).where(result.wear_coefficient > 0.0, drop=True) > 0.0).all()
-        assert (worn.sel(wear_coefficient=0.0) == 0.0).all()

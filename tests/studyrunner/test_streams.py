@@ -15,11 +15,8 @@ from tests.mpi.launching import PATIENCE, launcher, results
 ROOT = Path(__file__).parents[2]
 STUDY = "two_masses --set axes.wear_coefficient=1e-11 --set slow_time.cycles=20000 --set slow_time.outputs=3 -o out.nc"
 DEAF = {
-    "full log": "2>/dev/full",
     "full log of everything": ">/dev/full 2>&1",
-    "closed": ">&- 2>&-",
-    "closed, and stdin": "<&- >&- 2>&-",
-    "a reader that has gone": "2>&1 | true",
+    "closed": "<&- >&- 2>&-",
     "a reader of one line": "2>&1 | head -1",
 }
 
@@ -56,7 +53,7 @@ def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
     assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
 
 
-@pytest.mark.parametrize("case", ["full log", "closed"])
+@pytest.mark.parametrize("case", ["full log of everything", "closed"])
 def test_a_mistake_that_nobody_hears(case: str, tmp_path: Path) -> None:
     status, _, _ = shell(faked("no_study", DEAF[case]), tmp_path)
     assert status == 2
@@ -75,7 +72,7 @@ def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["full log of everything", "closed", "a reader that has gone"])
+@pytest.mark.parametrize("case", ["closed", "a reader of one line"])
 def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
     assert shell(faked(STUDY, ""), tmp_path)[0] == 0
     status, _, _ = shell(f"{sys.executable} -m studyrunner.report.cli out.nc {DEAF[case]}", tmp_path)
