@@ -101,10 +101,6 @@ def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> 
     assert len(solver.tasks) > N_POINTS
 
 
-def make_text(path: Path) -> None:
-    path.write_text("two years of measurements", encoding="utf-8")
-
-
 def make_netcdf(path: Path) -> None:
     xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
 
@@ -113,11 +109,7 @@ def make_scene(path: Path) -> None:
     assert main(["sdof_slider", "--write-scene", str(path)]) == 0
 
 
-def make_damaged(path: Path) -> None:
-    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 10)
-
-
-@pytest.mark.parametrize("make", [make_text, make_netcdf, make_scene, make_damaged])
+@pytest.mark.parametrize("make", [make_netcdf, make_scene])
 def test_a_file_of_something_else_is_not_overwritten(
     make: object, solver: Solver, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -122,24 +120,6 @@ def test_unexpected_failure_keeps_the_old_file(
     assert (folder / "out.nc").read_bytes() == earlier
     assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.parts"]
     assert main(SMALL) == 0
-
-
-def test_written_scene_gives_the_same_result(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    use_fake(monkeypatch, lambda _, result: result)
-    assert main(SMALL) == 0
-    assert main([*SMALL[:-2], "--write-scene", "scene.h5"]) == 0
-    frequency = (
-        "[study]\nname = 'file'\n[axes]\nscheme = 'implicit'\nfrequency = [100, 110, 120]\nexcitation_amplitude = 10\n"
-    )
-    slow_time = "[slow_time]\ncycles = 20000\noutputs = 21\n"
-    scene = "[scene]\nmodel = 'scene.h5'\nfriction_coefficient = 0.5\n"
-    (folder / "sub").mkdir()
-    (folder / "scene.h5").rename(folder / "sub" / "scene.h5")
-    (folder / "sub" / "file.toml").write_text(frequency + slow_time + scene, encoding="utf-8")
-    assert main(["sub/file.toml"]) == 0
-    with xr.open_dataset("out.nc") as bundled, xr.open_dataset("file.nc") as from_file:
-        xr.testing.assert_equal(bundled.drop_vars("run_time"), from_file.drop_vars("run_time"))
-        assert bundled.attrs["scene_sha256"] == from_file.attrs["scene_sha256"]
 
 
 def march_task(*overrides: str) -> MarchTask:
@@ -261,15 +241,3 @@ def test_response_is_amplitude_and_phase() -> None:
 @pytest.mark.parametrize(("seconds", "text"), [(3.4, "3 s"), (90.0, "1.5 min"), (7200.0, "2.0 h")])
 def test_times(seconds: float, text: str) -> None:
     assert format_seconds(seconds) == text
-
-
-def test_a_reader_that_has_gone_is_no_failure() -> None:
-    root = Path(__file__).parents[2]
-    command = [sys.executable, "-m", "studyrunner.cli", "sdof_slider", "--plan"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root, text=True) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.close()
-        said = process.stderr.read()
-        assert process.wait(timeout=240) == 0
-    assert said == ""

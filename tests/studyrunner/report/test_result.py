@@ -126,12 +126,6 @@ def test_points_in_words() -> None:
     )
 
 
-def test_whole_numbers_of_failed_points_are_no_numbers() -> None:
-    stable = make_result(failed=[0]).read("stable")
-    assert np.isnan(stable.values.reshape(8, -1)[0]).all()
-    assert (stable.values.reshape(8, -1)[1:] == 1).all()
-
-
 def test_outcomes_are_told_by_the_file() -> None:
     result = make_result(failed=[1], failing=-1)
     assert result.endings[-1].word == "not_computed"
