@@ -142,11 +142,8 @@ def test_predict_is_the_inverse_for_masses_on_sliders(free: str, wear: bool, res
 @pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 32), Resolution((1, 3, 5), 48)])
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("free", MASSES)
-@pytest.mark.parametrize("seed", [4, 8])
-def test_jacobian_of_elastic_pairs_and_masses_on_sliders(
-    free: str, wear: bool, resolution: Resolution, seed: int
-) -> None:
-    balance, predicted = mass_balance(free, seed, wear, resolution)
+def test_jacobian_of_elastic_pairs_and_masses_on_sliders(free: str, wear: bool, resolution: Resolution) -> None:
+    balance, predicted = mass_balance(free, 4, wear, resolution)
     at = balance.evaluate(predicted)
     inertial = balance.joint.penalty.inertial
     assert SLIP in at.status_t[inertial]

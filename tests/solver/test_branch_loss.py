@@ -93,6 +93,7 @@ def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) ->
     assert found.wear_depth[-1, 0] == pytest.approx(history(5.0, "implicit").wear_depth[-1, 0], rel=0.05, abs=0.0)
 
 
+@pytest.mark.slow
 def test_the_jump_cycle_does_not_depend_much_on_the_step() -> None:
     fine = history(5.0, "implicit").jump_cycle
     assert history(50.0, "implicit").jump_cycle == pytest.approx(fine, rel=0.1, abs=0.0)

@@ -107,6 +107,7 @@ def test_a_dovetail_state_that_slips_and_lifts_holds() -> None:
     assert certificate.penetration > 1e-4, "a pair that lifts has a corner in its motion, which no series follows"
 
 
+@pytest.mark.slow
 def test_penetration_falls_as_harmonics_are_added() -> None:
     for omega in (1.2, 1.5):
         values = [certify(*vibro_impact(omega, n)).penetration for n in (3, 5, 11, 21)]
@@ -114,6 +115,7 @@ def test_penetration_falls_as_harmonics_are_added() -> None:
         assert values[-1] < values[0] / 8.0
 
 
+@pytest.mark.slow
 def test_the_energy_of_marched_masses_is_balanced_but_for_their_samples() -> None:
     # what is cut off the series goes through the march: nothing is lost but what lies between the samples
     for states in ([slider(n) for n in (3, 5, 11, 21)], [two_masses(0.4, n) for n in (3, 5, 11, 21)]):

@@ -164,8 +164,9 @@ def run_converged(case: Case) -> WearHistory:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("friction", [0.0, 0.05, 2.0])
+@pytest.mark.parametrize(
+    ("friction", "scheme"), [(0.0, "implicit"), (0.05, "explicit"), (2.0, "implicit"), (2.0, "explicit")]
+)
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
 def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
     case = replace(base, friction=friction, scheme=scheme)
@@ -178,8 +179,10 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e2, 1e4])
+@pytest.mark.parametrize(
+    ("factor", "scheme"),
+    [(1e-3, "implicit"), (1.0, "explicit"), (1e2, "implicit"), (1e2, "explicit"), (1e4, "implicit")],
+)
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
 def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
     ended = run(replace(base, wear=factor * base.wear, scheme=scheme))
@@ -191,7 +194,7 @@ def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1e-4, 1e-2, 1.0, 5.0, 50.0])
+@pytest.mark.parametrize("factor", [1e-4, 1.0, 50.0])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
 def test_amplitude(base: Case, factor: float) -> None:
     history = run_converged(replace(base, amplitude=factor * base.amplitude))
@@ -219,8 +222,7 @@ def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("n_steps", [1, 7, 200])
+@pytest.mark.parametrize(("n_steps", "scheme"), [(1, "implicit"), (1, "explicit"), (7, "explicit"), (200, "implicit")])
 def test_step_from_one_cycle_to_all_cycles(n_steps: int, scheme: Scheme) -> None:
     cycles = 200.0
     case = replace(elastic(), wear=WEAR * CYCLES / cycles, cycles=cycles, step=cycles / n_steps, scheme=scheme)

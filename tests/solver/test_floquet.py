@@ -122,7 +122,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("damping", [-0.3, -1.0, -3.0])
+@pytest.mark.parametrize("damping", [-0.3, -3.0])
 @pytest.mark.parametrize("kind", ["slider", "two masses", "jenkins"])
 def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
     """Friction holds some of these vibrations, and some not."""
@@ -142,7 +142,7 @@ def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("seed", [1, 2, 3, 5, 17, 26, 29, 32, 41, 54, 57])
+@pytest.mark.parametrize("seed", [1, 2, 5, 17, 29, 54])
 def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
@@ -152,9 +152,10 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_samples", [128, 256])
-@pytest.mark.parametrize("n_harmonics", [3, 5, 9])
-@pytest.mark.parametrize("omega", [1.0, 1.2, 1.5])
+@pytest.mark.parametrize(
+    ("omega", "n_harmonics", "n_samples"),
+    [(1.0, 3, 128), (1.0, 9, 256), (1.2, 5, 128), (1.2, 3, 256), (1.5, 9, 128), (1.5, 5, 256)],
+)
 def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
     omega: float, n_harmonics: int, n_samples: int
 ) -> None:
@@ -207,6 +208,7 @@ def test_a_growing_vibration_is_no_result(
     assert np.isnan(history.response).all()
 
 
+@pytest.mark.slow
 def test_friction_bounds_a_vibration_with_little_negative_damping() -> None:
     """The structure alone is unstable, the state is not: it is an exact periodic motion that attracts."""
     model = driven(-0.02)

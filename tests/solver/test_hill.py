@@ -58,6 +58,7 @@ def test_the_branches_have_alternating_stability() -> None:
     assert not lower.evaluation.force_h.any()
 
 
+@pytest.mark.slow
 def test_between_its_folds_the_branch_is_unstable() -> None:
     middle, lower = crossings()[1.3]
     assert middle.evaluation.force_h.any()

@@ -131,6 +131,7 @@ def test_a_pair_with_one_tangent_moves_along_it_alone(line: int) -> None:
     assert not tangent.any()
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(seed=st.integers(0, 2**31), limit=st.floats(0.1, 20.0))
 def test_the_derivative_of_a_step_in_the_plane_is_that_of_differences(seed: int, limit: float) -> None:
@@ -458,6 +459,7 @@ def test_the_derivative_of_the_periodic_march_is_that_of_differences(seed: int) 
     assert assert_derivative(case) >= 9
 
 
+@pytest.mark.slow
 def test_the_derivative_holds_for_odd_harmonics_alone() -> None:
     assert assert_derivative(mass_case(9, 4, build_basis((1, 3, 7), 48))) >= 6
 

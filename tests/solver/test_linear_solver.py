@@ -49,6 +49,7 @@ def test_a_large_system_is_solved_to_round_off_by_a_fresh_factorisation() -> Non
     assert error(step, oracle(balance, predicted, right)) < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wear", [False, True])
 def test_a_kept_factorisation_follows_jacobians_that_change(wear: bool) -> None:
     balance, predicted = large(6, wear)

@@ -158,6 +158,7 @@ def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
     assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
 
 
+@pytest.mark.slow
 def test_loops_of_a_joint_enclose_the_energy_that_friction_takes() -> None:
     history = dovetail_march()
     assert loop_work(history)[0].sum() == pytest.approx(FRICTION * history.wear_rate[0] / WEAR, rel=0.02, abs=0.0)

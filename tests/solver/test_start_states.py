@@ -15,7 +15,7 @@ from solver.packing import Packed
 from solver.results.history import PeriodicState
 from solver.settings import SolverSettings
 from solver.structure.penalty import build_penalty
-from tests.references import coulomb_orbit, den_hartog_amplitude, slider_orbit, vibro_impact_orbit
+from tests.references import coulomb_orbit, vibro_impact_orbit
 from tests.solver import mass_twin
 from tests.solver.models import branch_states, converged_state, random_model, scene
 from tests.solver.reconstruction import full_motion, series
@@ -38,24 +38,6 @@ def first_harmonic(model: str, state: PeriodicState, **values: float) -> np.ndar
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [0.6, 0.7, 0.8, 0.9, 1.1, 1.3, 1.6])
-def test_the_slider_has_the_amplitude_of_den_hartog(ratio: float) -> None:
-    mass, _, stiffness, force, friction = SLIDER
-    expected = den_hartog_amplitude(mass, stiffness, force, friction, ratio * NATURAL)
-    moved = series(slider_state(ratio, 21, 256).displacement_h[0, 1], 4096)
-    assert np.abs(moved).max() == pytest.approx(expected, rel=0.02, abs=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("omega", [0.3, 0.4, 0.6, 0.7, 1.3])
-def test_two_masses_have_their_exact_first_harmonics(omega: float) -> None:
-    orbit = coulomb_orbit(*TWO_MASSES, omega)
-    state = converged_state(scene("two_masses"), 0.5, 20.0, omega, FINE)
-    expected = [abs(orbit.harmonic(dof)) for dof in (0, 1)]
-    assert first_harmonic("two_masses", state) == pytest.approx(expected, rel=0.02, abs=0.0)
-
-
-@pytest.mark.slow
 def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None:
     orbit = coulomb_orbit(*TWO_MASSES, 0.5)
     expected = abs(orbit.harmonic(1))
@@ -68,32 +50,7 @@ def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None
 
 
 @pytest.mark.slow
-def test_the_slider_converges_with_harmonics() -> None:
-    exact = abs(slider_orbit(*SLIDER, 0.6 * NATURAL).harmonic(0))
-    errors = [
-        abs(first_harmonic("sdof_slider", slider_state(0.6, n, 512), normal_stiffness=0.0)[0] / exact - 1)
-        for n in (1, 3, 5, 11, 21)
-    ]
-    slope = np.polyfit(np.log([2, 4, 6, 12, 22]), np.log(errors), 1)[0]
-    assert slope < -0.9
-    assert errors == sorted(errors, reverse=True)
-
-
-@pytest.mark.slow
-def test_the_slider_converges_with_samples() -> None:
-    def amplitude(samples: int) -> float:
-        return float(first_harmonic("sdof_slider", slider_state(0.6, 21, samples), normal_stiffness=0.0)[0])
-
-    limit = amplitude(2048)
-    # a turn is found to a sample: the friction force is off by up to its double for the 2 pi / N of it, twice a period
-    for samples in (64, 128, 256, 512):
-        friction_error = 3.0 / 10.0 * 2 * 2 * np.pi / samples
-        assert abs(amplitude(samples) / limit - 1) < friction_error
-    assert abs(amplitude(512) / limit - 1) < 1e-4
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ratio", [0.6, 0.9, 1.3])
+@pytest.mark.parametrize("ratio", [0.6, 1.3])
 def test_the_slider_balances_its_energy(ratio: float) -> None:
     state = slider_state(ratio, 21, 256)
     model = scene("sdof_slider", normal_stiffness=0.0)
@@ -139,20 +96,15 @@ def test_a_sweep_gives_one_state_a_frequency_in_its_own_order(sweep: str) -> Non
     assert all(start.penalty_omega > 2 * np.pi * frequencies[index] for index, start in found)
 
 
-@pytest.fixture(scope="module")
-def rising() -> dict[float, PeriodicState | None]:
+@pytest.mark.slow
+def test_a_sweep_up_stays_on_the_branch_with_impacts() -> None:
     omegas = np.round(np.arange(0.85, 1.501, 0.05), 10)
     starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, "up")
-    return {float(omega): start.state for omega, start in zip(omegas, starts, strict=True)}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("omega", [1.05, 1.2, 1.3, 1.4, 1.5])
-def test_a_sweep_up_stays_on_the_branch_with_impacts(rising: dict[float, PeriodicState | None], omega: float) -> None:
-    state = rising[omega]
-    assert state is not None
-    expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
-    assert first_harmonic("vibro_impact", state)[1] == pytest.approx(expected, rel=0.005, abs=0.0)
+    for omega, start in zip(omegas, starts, strict=True):
+        if omega in (1.05, 1.2, 1.3, 1.4, 1.5):
+            assert start.state is not None
+            expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
+            assert first_harmonic("vibro_impact", start.state)[1] == pytest.approx(expected, rel=0.005, abs=0.0)
 
 
 def test_a_sweep_down_stays_on_the_branch_without_impacts() -> None:
@@ -187,7 +139,7 @@ def test_a_single_frequency_knows_its_branch() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("omega", [1.2, 1.5])
+@pytest.mark.parametrize("omega", [1.5])
 def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: float) -> None:
     # both branches exist from 1.0919 to 1.5576 rad/s
     model = scene("vibro_impact")
@@ -249,6 +201,7 @@ def test_a_sweep_says_where_it_is() -> None:
     assert nodes[-1] < 0.1
 
 
+@pytest.mark.slow
 def test_a_sweep_is_the_same_twice() -> None:
     model = random_model(3, ("3d", "one_tangent"))
     settings = SolverSettings(3, 64)

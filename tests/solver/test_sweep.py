@@ -78,6 +78,7 @@ def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: s
         assert_same_state(followed()[0][BESIDE], alone())
 
 
+@pytest.mark.slow
 def test_the_three_loading_histories_leave_different_states() -> None:
     works = [slip_work(alone(sweep)) for sweep in ("up", "down", "ramp")]
     assert all(work > 0.0 for work in works)
@@ -159,6 +160,7 @@ def test_a_ramp_finds_a_state_at_every_frequency() -> None:
     assert all(np.isnan(start.fold_frequency) for start in found.values())
 
 
+@pytest.mark.slow
 def test_a_joint_without_grip_ends_within_bounded_effort() -> None:
     """Two masses on a structure that friction alone keeps in place: no state stays, and the search for one ends."""
     model = scene("two_masses")

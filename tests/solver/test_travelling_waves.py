@@ -74,6 +74,7 @@ def test_every_point_is_marched_to_its_end_or_keeps_what_it_had(nodal_diameter: 
     assert finished == [True] * len(OFFSETS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
 def test_what_wears_does_so_at_the_resonance(nodal_diameter: int) -> None:
     volumes = [float(history.worn_volume[-1]) for history in histories(nodal_diameter, 0.5)]

@@ -151,6 +151,7 @@ def test_widths_are_rounded_up_to_three_digits() -> None:
     assert round_up(9.999e-4) == 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "key", "fewest"), [("cylinder_on_flat", "strips", 10), ("sphere_on_flat", "patches", 4)]
 )

@@ -128,6 +128,7 @@ def test_in_python(capsys: pytest.CaptureFixture[str]) -> None:
         assert 'name = "two_masses"' in result.attrs["study"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"a text", b"\x89HDF\r\n\x1a\nand no more"])
 def test_what_is_no_result_is_not_replaced_at_all(
     content: bytes, solver: Solver, capsys: pytest.CaptureFixture[str]

@@ -27,6 +27,7 @@ def interrupt(_: Task, n_results: int) -> None:
         raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [VARIANT, LARGER, [*APART, "--fresh"]], ids=["variant", "larger", "fresh"])
 def test_a_finished_result_is_not_replaced_by_less(
     command: list[str], solver: Solver, folder: Path, capsys: pytest.CaptureFixture[str]

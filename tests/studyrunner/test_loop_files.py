@@ -98,6 +98,7 @@ def test_without_loops_there_are_no_such_names(write: Callable[[int, str], Path]
         assert not {"phase", "component"} & set(result.sizes)
 
 
+@pytest.mark.slow
 def test_points_that_share_a_march_have_its_loops_at_their_own_counts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

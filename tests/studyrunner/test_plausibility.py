@@ -171,6 +171,7 @@ def test_scenes_with_mass_have_one(name: str, resonance: float) -> None:
 # --- through the command ---
 
 
+@pytest.mark.slow
 def test_lines_come_once_on_stderr_and_in_the_result(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     target = tmp_path / "out.nc"
     wrong = ["axes.frequency=150", "axes.wear_coefficient=2.9e-8", "slow_time.cycles=100", "slow_time.outputs=2"]

@@ -74,6 +74,7 @@ def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path: 
     assert describe_scene(build_scene("cylinder_on_flat", **given)).digest == digest
 
 
+@pytest.mark.slow
 def test_a_result_that_keeps_its_scene_keeps_the_edge_and_is_run_again_from_it(path: Path) -> None:
     unworn = {"slow_time.cycles": 0, "slow_time.outputs": 1, "outputs.scene": True, "scene.half_width": 1e-5}
     with run_study(path, path.with_name("kept.nc"), overrides=unworn, progress=False) as result:

@@ -103,6 +103,7 @@ def test_points_above_rtol_are_computed_points(
         assert there.message.item() == message
 
 
+@pytest.mark.slow
 def test_unexpected_failure_keeps_the_old_file(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -79,6 +79,7 @@ def wave_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "s.toml"
 
 
+@pytest.mark.slow
 def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert describe_scene(build_study_scene(read_study(wave_file))).largest_harmonics == 3
     assert main([wave_file, "--plan"]) == 0

@@ -111,6 +111,7 @@ def test_mesh_and_natural_frequencies_of_the_sector(tmp_path: Path, monkeypatch:
         assert result.mesh_part.values.tolist() == list(mesh.parts)
 
 
+@pytest.mark.slow
 def test_natural_frequencies_of_a_scene_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     wave = ("scene.mesh=1", "scene.nodal_diameter=3", "solver.harmonics=2", "scene.n_sectors=20")

@@ -200,6 +200,7 @@ def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
     assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.slow
 def test_a_saved_figure_is_the_same_each_time(tmp_path) -> None:
     texts = []
     for folder in (tmp_path / "a", tmp_path / "b"):

@@ -76,6 +76,7 @@ ITEMS: Sequence[Drawing | Missing | Table] = (
 FILES = ("svg", "png")
 
 
+@pytest.mark.slow
 def test_items_stand_in_their_order(tmp_path: Path) -> None:
     result = as_result(build_file(), tmp_path / "some.nc")
     items = [drawing("first"), *ITEMS, drawing("second")]
@@ -134,6 +135,7 @@ def test_the_policy_allows_the_scripts_of_the_page_only(tmp_path: Path) -> None:
     assert "default-src 'none'" in policy
 
 
+@pytest.mark.slow
 def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
     axes = {**AXES, "scheme": (EVIL, "explicit")}
     surfaces = [EVIL] * 12 + ["other"] * 12
@@ -157,6 +159,7 @@ def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
     assert "<" not in found.scripts[0]
 
 
+@pytest.mark.slow
 def test_ids_are_unique_and_references_find_them(tmp_path: Path) -> None:
     items = [drawing("first"), drawing("second")]
     write_page(as_result(build_file(), tmp_path / "some.nc"), items, tmp_path / "index.html")
@@ -223,6 +226,7 @@ def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
     assert "most worn of 2500 points" in read(tmp_path / "index.html").text
 
 
+@pytest.mark.slow
 def test_too_many_points_leave_a_page_without_scripts(tmp_path: Path) -> None:
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, MOST_POINTS).tolist()}
     dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))

@@ -197,6 +197,7 @@ def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.Monkey
             assert build_page_data(result_of(dataset), 2e5) == whole
 
 
+@pytest.mark.slow
 def test_ten_thousand_points(tmp_path: Path) -> None:
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, 1250).tolist(), "step": (1.0, 2.0)}
     path = tmp_path / "big.nc"

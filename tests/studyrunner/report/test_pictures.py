@@ -57,6 +57,7 @@ def test_final_volumes_are_written_down_with_their_errors() -> None:
     np.testing.assert_allclose(sorted(panel["bars"]), sorted(expected), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> None:
     """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
 

@@ -206,6 +206,7 @@ def test_the_name_of_the_file_is_text(folder: Path) -> None:
     assert "\\x1b[2J&lt;b&gt;.nc" in Path("report/index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_numbers_that_are_damaged_where_they_are_large(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What is not read beforehand shows its damage while it is drawn."""
     made = build_file(

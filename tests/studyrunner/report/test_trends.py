@@ -98,6 +98,7 @@ def test_which_there_are(result: Result, names: list[str]) -> None:
         drawing.figure.draw_without_rendering()
 
 
+@pytest.mark.slow
 def test_they_come_first_among_the_results() -> None:
     names = [item.name for item in draw_report(many()) if isinstance(item, Drawing)]
     assert names[:2] == ["trends", "trend_maps"]
