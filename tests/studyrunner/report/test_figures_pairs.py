@@ -135,7 +135,6 @@ def test_a_pair_with_one_tangent_has_no_path() -> None:
     assert loops.figure.axes[0].get_xlabel() == "displacement along\ntangent 1 (µm)"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "first", "second"),
     [
@@ -155,7 +154,6 @@ def test_tangents_are_told_in_the_words_of_the_scene(model: str, first: str, sec
     assert [motion.get_xlabel().replace("\n", " "), motion.get_ylabel().replace("\n", " ")] == [first, second]
 
 
-@pytest.mark.slow
 def test_arrows_go_the_way_of_the_loop() -> None:
     """From each sample to the next, in the units of the figure; the normal force over the phase needs none."""
     result = with_loops(make_result())

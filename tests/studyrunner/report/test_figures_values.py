@@ -195,7 +195,6 @@ def test_table_of_folds_and_jumps() -> None:
     )
 
 
-@pytest.mark.slow
 def test_table_of_stability() -> None:
     assert find_table(make_result(), "stability") is None
     result = make_result(failed=[7])
@@ -216,7 +215,6 @@ def test_table_of_stability() -> None:
     assert table.note.startswith("3 points with an explicit step longer than step_limit, 2 with a wear rate")
 
 
-@pytest.mark.slow
 def test_what_a_figure_leaves_out_is_told() -> None:
     coefficients = np.geomspace(1e-12, 1e-10, 7).tolist()
     drawing = draw_figure(make_result(wear_coefficient=coefficients), "final_worn_volume")

@@ -184,7 +184,6 @@ def test_nothing_is_marked_where_all_is_within_rtol() -> None:
     assert "Squares" not in drawing.caption
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("figure", ["worn_volume", "final_worn_volume", "worn_volume_map", "frequency_response"])
 def test_a_file_where_all_points_ended_early_is_drawn(figure: str) -> None:
     result = with_endings(make_result(), dict.fromkeys(range(8), (3, 6000.0)), {})
