@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,11 +71,18 @@ def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, large
     assert describe_scene(build_study_scene(study)).largest_harmonics == largest
 
 
+@pytest.fixture(scope="module")
+def wave_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scene") / "wave.h5"
+    write_scene(holding(build_study_scene(read_study("dovetail", WAVE)), 3), path)
+    return path
+
+
 @pytest.fixture
-def wave_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def wave_file(wave_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """Study of a scene file with the nodal diameters of 3 harmonics."""
     monkeypatch.chdir(tmp_path)
-    write_scene(holding(build_study_scene(read_study("dovetail", WAVE)), 3), tmp_path / "wave.h5")
+    shutil.copy(wave_scene, tmp_path)
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
     return "s.toml"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,15 +22,21 @@ def parameters(density: int = 1) -> Parameters:
     return Parameters(friction_coefficient=0.5, mesh=density)
 
 
+@lru_cache
 def dovetail_pairs(density: int = 1) -> ContactPairs:
     pairs = define_sector(parameters(density))[1].pairs
     assert pairs is not None
     return pairs
 
 
+@lru_cache
+def dovetail_mesh(density: int) -> SurfaceMesh:
+    return describe_mesh(parameters(density))
+
+
 def with_mesh(dataset: xr.Dataset, mesh: SurfaceMesh) -> xr.Dataset:
     """The file with the variables of a mesh."""
-    nodes = {f"mesh_{axis}": ("mesh_node", mesh.nodes[:, i], {"units": "m"}) for i, axis in enumerate("xyz")}
+    nodes = {f"mesh_{axis}": ("mesh_node", mesh.nodes[:, i].copy(), {"units": "m"}) for i, axis in enumerate("xyz")}
     quads = (("mesh_quad_index", "mesh_corner"), mesh.quads.astype(np.int32))
     return dataset.assign(**nodes, mesh_quad=quads, mesh_part=("mesh_quad_index", np.array(mesh.parts)))
 
@@ -37,9 +44,9 @@ def with_mesh(dataset: xr.Dataset, mesh: SurfaceMesh) -> xr.Dataset:
 def dovetail_file(density: int = 1, **options: Any) -> xr.Dataset:
     """A file of the dovetail sector with random numbers. density: of its mesh."""
     pairs = dovetail_pairs(density)
-    dataset = build_file(positions=pairs.position, study=STUDY, **options)
-    dataset = dataset.assign_coords(contact_area=("contact", pairs.area, dataset["contact_area"].attrs))
-    return with_mesh(dataset, describe_mesh(parameters(density)))
+    dataset = build_file(positions=pairs.position.copy(), study=STUDY, **options)
+    dataset = dataset.assign_coords(contact_area=("contact", pairs.area.copy(), dataset["contact_area"].attrs))
+    return with_mesh(dataset, dovetail_mesh(density))
 
 
 def volume(nodes: NDArray[np.float64], quads: NDArray[np.int64]) -> float:

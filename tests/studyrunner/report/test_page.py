@@ -17,7 +17,7 @@ import pytest
 from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
 from studyrunner.report.page import page
 from studyrunner.report.page.data import MOST_POINTS
-from studyrunner.report.page.page import inline_svg, write_page
+from studyrunner.report.page.page import Summary, inline_svg, write_page
 from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 
 EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'{{ 7 * 7 }}{% endif %}"
@@ -76,22 +76,31 @@ ITEMS: Sequence[Drawing | Missing | Table] = (
 FILES = ("svg", "png")
 
 
-@pytest.mark.slow
-def test_items_stand_in_their_order(tmp_path: Path) -> None:
-    result = as_result(build_file(), tmp_path / "some.nc")
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    """A page with all kinds of items."""
+    folder = tmp_path_factory.mktemp("page")
     items = [drawing("first"), *ITEMS, drawing("second")]
-    summary = write_page(result, items, tmp_path / "index.html")
+    return folder, write_page(as_result(build_file(), folder / "some.nc"), items, folder / "index.html")
+
+
+@pytest.fixture
+def found(written: tuple[Path, Summary]) -> Reader:
+    return read(written[0] / "index.html")
+
+
+def test_items_stand_in_their_order(written: tuple[Path, Summary], found: Reader) -> None:
+    folder, summary = written
     assert (summary.n_drawings, summary.n_tables, summary.n_missing) == (2, 1, 1)
-    assert summary.n_bytes == (tmp_path / "index.html").stat().st_size
-    found = read(tmp_path / "index.html")
+    assert summary.n_bytes == (folder / "index.html").stat().st_size
     sections = [attributes.get("id") for attributes in found.all("section")]
     assert sections == ["study", "explore", "first", "numbers", "second", "missing"]
     assert "Add pairs to [outputs] loops." in found.text
     for link in (attributes["href"] for attributes in found.all("a")):
         assert link is not None
-        assert (tmp_path / link).is_file()
+        assert (folder / link).is_file()
     figures = {f"{name}{width}.{kind}" for name in ("first", "second") for width in ("", "_column") for kind in FILES}
-    assert {path.name for path in tmp_path.iterdir()} == {"some.nc", "index.html", *figures}
+    assert {path.name for path in folder.iterdir()} == {"some.nc", "index.html", *figures}
 
 
 def test_the_study_is_told(tmp_path: Path) -> None:
@@ -110,9 +119,7 @@ def test_the_study_is_told(tmp_path: Path) -> None:
         assert part in text
 
 
-def test_nothing_comes_from_elsewhere(tmp_path: Path) -> None:
-    write_page(as_result(build_file(), tmp_path / "some.nc"), [drawing("first")], tmp_path / "index.html")
-    found = read(tmp_path / "index.html")
+def test_nothing_comes_from_elsewhere(found: Reader) -> None:
     for tag, attributes in found.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
         for name in ("src", "href", "xlink:href", "srcset", "data"):
@@ -122,9 +129,7 @@ def test_nothing_comes_from_elsewhere(tmp_path: Path) -> None:
     assert "@import" not in style
 
 
-def test_the_policy_allows_the_scripts_of_the_page_only(tmp_path: Path) -> None:
-    write_page(as_result(build_file(), tmp_path / "some.nc"), [], tmp_path / "index.html")
-    found = read(tmp_path / "index.html")
+def test_the_policy_allows_the_scripts_of_the_page_only(found: Reader) -> None:
     (policy,) = [each["content"] for each in found.all("meta") if each.get("http-equiv") == "Content-Security-Policy"]
     assert policy is not None
     kinds = [attributes.get("type") for attributes in found.all("script")]
@@ -159,11 +164,8 @@ def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
     assert "<" not in found.scripts[0]
 
 
-@pytest.mark.slow
-def test_ids_are_unique_and_references_find_them(tmp_path: Path) -> None:
-    items = [drawing("first"), drawing("second")]
-    write_page(as_result(build_file(), tmp_path / "some.nc"), items, tmp_path / "index.html")
-    elements = read(tmp_path / "index.html").elements
+def test_ids_are_unique_and_references_find_them(found: Reader) -> None:
+    elements = found.elements
     ids = [attributes["id"] for _, attributes in elements if "id" in attributes]
     assert len(ids) == len(set(ids))
     references = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -195,29 +194,6 @@ def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.Monkey
         monkeypatch.setattr(page_data, "_BYTES_A_BLOCK", size)
         with xr.open_dataset(tmp_path / "some.nc") as dataset:
             assert build_page_data(result_of(dataset), 2e5) == whole
-
-
-@pytest.mark.slow
-def test_ten_thousand_points(tmp_path: Path) -> None:
-    axes = {**AXES, "frequency": np.linspace(1.0, 2.0, 1250).tolist(), "step": (1.0, 2.0)}
-    path = tmp_path / "big.nc"
-    build_file(axes, cycles=np.arange(11.0), failed=range(0, 10_000, 7)).to_netcdf(path)
-    began = time.process_time()
-    with xr.open_dataset(path) as dataset:
-        data = build_page_data(result_of(dataset), PLENTY)
-    assert time.process_time() - began < 20.0
-    assert len(json.dumps(data.content)) < PLENTY + 1e5
-    content = content_of(data)
-    assert len(content["outcome"]) == 10_000
-    assert data.notes
-
-
-def test_too_many_points() -> None:
-    axes = {**AXES, "frequency": np.linspace(1.0, 2.0, page_data.MOST_POINTS).tolist()}
-    dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))
-    data = build_page_data(result_of(dataset), PLENTY)
-    assert data.content is None
-    assert f"{dataset['outcome'].size} points" in data.notes[0]
 
 
 def test_all_points_failed() -> None:
