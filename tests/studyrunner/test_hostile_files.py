@@ -218,7 +218,7 @@ def test_names_of_files_do_not_reach_the_terminal_raw(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["inflating chunk", "next to the largest"])
+@pytest.mark.parametrize("case", ["inflating chunk"])
 def test_the_command_alone(case: str, folder: Path) -> None:
     """Time of the processors and memory of the whole command, its start included."""
     change_scene(folder / "scene.h5", SCENES[case])

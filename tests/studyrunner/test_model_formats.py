@@ -217,23 +217,6 @@ def test_eliminated_nodes_are_counted(folder):
     )
 
 
-def test_a_mesh_of_other_matrices_is_found(folder):
-    stiffness, mass, node, direction = Plates().system()
-    write_abaqus(folder, system=(stiffness, mass, node + 1000, direction))
-    assert "job_STIF1.mtx and lap.inp have no node in common" in message("scene.matrices=job")
-
-
-def test_decks_as_editors_write_them(folder):
-    """Line ends of Windows, small letters, tabs and a byte order mark change nothing; another encoding is said."""
-    text = Plates().deck()
-    expected = scene_of()
-    for other in (text.replace("\n", "\r\n"), text.lower(), text.replace(", ", ",\t"), "\ufeff" + text):
-        (folder / "lap.inp").write_bytes(other.encode())
-        check_same(scene_of(), expected, 0.0)
-    (folder / "lap.inp").write_bytes(text.encode("utf-16"))
-    assert "lap.inp, line 1: no text" in message()
-
-
 @pytest.mark.parametrize(
     ("units", "young", "density", "expected"),
     [

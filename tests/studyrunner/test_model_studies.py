@@ -317,32 +317,15 @@ def test_nodes_of_cut_faces_that_do_not_match_are_named(folder):
     assert "scene.cut_faces = 1 nodes of one cut face have no image among the 12 of the other: 1: mesh" in message()
 
 
-def test_typing_errors_in_the_deck_are_found(folder):
-    """A name with a letter missing ends in a sentence with the line, wherever it is."""
-    text = SECTOR.read_text()
-    for old, new, expected in (
-        ("ELSET=BLADE,MATERIAL", "ELSET=BLAD,MATERIAL", "there is no set of elements BLAD"),
-        ("MATERIAL=STEEL\n*TIE", "MATERIAL=STEL\n*TIE", "there is no material STEL"),
-        ("BLADES,DISKS", "BLADES,DISCS", "there is no surface DISCS"),
-        ("BOREF,1,3", "BORF,1,3", "there is no set of nodes BORF"),
-        ("TIE=CYC", "TIE=CYCL", "there is no tie CYCL"),
-        ("210e9,0.3", "210e9,0.3O", "'0.3O' in place of a number"),
-        ("BLADE,CENTRIF,250000.0", "BLADE,CENTRIF,25000.0", "give all of the model one speed"),
-    ):
-        assert text.count(old) == 1
-        (folder / "sector.inp").write_text(text.replace(old, new))
-        assert expected in message()
-
-
 def test_decks_that_are_cut_off_are_read_or_refused(folder):
     text = SECTOR.read_text()
     said = []
-    for share in np.linspace(0.05, 0.99, 25):
+    for share in np.linspace(0.05, 0.99, 8):
         (folder / "sector.inp").write_text(text[: int(share * len(text))])
         try:
             scene_of()
         except UserError as error:
             said.append(str(error))
     # without the last steps it is a model without a speed
-    assert len(said) >= 22
+    assert len(said) >= 6
     assert all("\n" not in each and each.startswith("wear.toml: scene.") for each in said)

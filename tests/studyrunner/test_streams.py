@@ -72,7 +72,7 @@ def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["closed", "a reader of one line"])
+@pytest.mark.parametrize("case", ["closed"])
 def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
     assert shell(faked(STUDY, ""), tmp_path)[0] == 0
     status, _, _ = shell(f"{sys.executable} -m studyrunner.report.cli out.nc {DEAF[case]}", tmp_path)

@@ -150,7 +150,17 @@ def test_included_files(tmp_path):
         assert deck.steps[0].line == f"rest.inp, line {line}"
 
 
-@pytest.mark.parametrize("text", [CUBES.lower(), CUBES.replace("\n", "\r\n"), CUBES.replace(", ", ",  ")])
+@pytest.mark.parametrize(
+    "text",
+    [
+        CUBES.lower(),
+        CUBES.replace("\n", "\r\n"),
+        CUBES.replace(", ", ",  "),
+        CUBES.replace(", ", ",\t"),
+        "\xef\xbb\xbf" + CUBES,
+    ],
+    ids=["small", "Windows", "blanks", "tabs", "byte order mark"],
+)
 def test_case_line_ends_and_blanks_do_not_matter(tmp_path: Path, cubes, text: str):
     deck = read_deck(write(tmp_path, text))
     np.testing.assert_array_equal(deck.coordinates, cubes.coordinates)

@@ -188,8 +188,9 @@ def test_all_points_failed() -> None:
 @pytest.mark.slow
 def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
     before = dict(mpl.rcParams)
+    # one of lines, of maps, and in three dimensions; saving takes long
     for item in draw_report(_complete()):
-        if isinstance(item, Drawing):
+        if isinstance(item, Drawing) and item.name in ("worn_volume", "wear_rate_map", "worn_root"):
             svg, png = item.save(tmp_path)
             assert svg.name == f"{item.name}.svg"
             assert svg.read_text(encoding="utf-8").rstrip().endswith("</svg>")

@@ -106,6 +106,16 @@ def test_of_unworn_states_no_volume_is_told() -> None:
     assert "known to rtol" not in table.columns
 
 
+def test_an_error_just_above_rtol_is_not_shown_as_rtol() -> None:
+    result = make_result(frequency=(200.0,), scheme=("adaptive",))
+    errors = result.dataset["error_estimate"] * 0.0 + 0.010003
+    just = Result(result.path, result.dataset.assign(error_estimate=errors))
+    assert tell_volumes(just) == (
+        "The worn volume of 0 of 1 point is known to rtol = 1 %, of 1 less well; the worst is known to 1.0003 %."
+        " What may help: rtol = 0.0099."
+    )
+
+
 def test_the_report_and_the_run_advise_the_same() -> None:
     """Settings of a point by its file are those by its study."""
     changes = ("axes.frequency=[200, 201]", "axes.scheme=['implicit', 'explicit']", "solver.harmonics=5")
