@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -242,3 +244,15 @@ def test_response_is_amplitude_and_phase() -> None:
 @pytest.mark.parametrize(("seconds", "text"), [(3.4, "3 s"), (90.0, "1.5 min"), (7200.0, "2.0 h")])
 def test_times(seconds: float, text: str) -> None:
     assert format_seconds(seconds) == text
+
+
+def test_a_reader_that_has_gone_is_no_failure() -> None:
+    root = Path(__file__).parents[2]
+    command = [sys.executable, "-m", "studyrunner.cli", "sdof_slider", "--plan"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        said = process.stderr.read()
+        assert process.wait(timeout=240) == 0
+    assert said == ""
