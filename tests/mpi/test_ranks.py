@@ -65,7 +65,7 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
         *("--set", "outputs.loops=[0, 5]"),
     ]
     results = []
-    for n_ranks in (0, 2, 3):
+    for n_ranks in (0, 3):
         done = start(n_ranks, [*arguments, "-o", f"{n_ranks}.nc"], tmp_path, {"PYTHONPATH": str(ROOT)})
         assert done.returncode in (0, 3), done.stderr
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
@@ -74,7 +74,6 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
     assert results[0].loop_force.notnull().any(["frequency", "cycle", "phase", "component"]).sum() == 2 * 3
     assert "mesh_quad" in results[0]
     xr.testing.assert_identical(results[1], results[0])
-    xr.testing.assert_identical(results[2], results[0])
 
 
 def test_uneven_tasks_are_balanced_while_running(tmp_path: Path) -> None:

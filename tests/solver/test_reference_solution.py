@@ -29,8 +29,6 @@ CYCLES = np.linspace(0.0, 4e4, 9)
 BESIDE = 213.0  # Hz: the coarse sector wears there, and stops
 SCHEMES: list[tuple[Scheme, float]] = [
     ("implicit", 4000.0),
-    ("implicit", 1000.0),
-    ("explicit", 4000.0),
     ("explicit", 1000.0),
     ("adaptive", 1e-2),
 ]
