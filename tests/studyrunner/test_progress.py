@@ -158,29 +158,6 @@ def build_slow(model: object, *_: object) -> Callable[..., Iterator[StartResult 
     return evaluate
 
 
-@pytest.mark.slow
-def test_the_run_itself_says_how_far_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(run, "build_evaluator", build_slow)
-    monkeypatch.setattr(progress, "FIRST_LINE", 0.05)
-    monkeypatch.setattr(progress, "LONGEST_SILENCE", 0.05)
-    study = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "-o", str(tmp_path / "out.nc")]
-    assert main(study) == 0
-    said = capsys.readouterr().err.splitlines()
-    found = [match for line in said if (match := LINE.fullmatch(line))]
-    assert len(found) >= 8, said
-    percents = [int(match["percent"]) for match in found]
-    assert percents[0] < 50 < percents[-1]
-    done = [int(match["done"]) for match in found]
-    assert done == sorted(done)
-    assert done[0] == 0 < done[-1]
-    assert all(match["left"] for match in found)
-    running = [match["running"] for match in found if match["running"]]
-    assert any(name.startswith("sweep up to 1") for name in running)
-    assert any(name in ("100 Hz implicit", "110 Hz explicit", "120 Hz explicit", "120 Hz implicit") for name in running)
-
-
 @pytest.mark.parametrize("compiles", [True, False])
 def test_a_run_that_has_to_compile_says_so_once(
     compiles: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
