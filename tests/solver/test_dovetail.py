@@ -16,6 +16,9 @@ from tests.solver.contact_twin import pair_period
 from tests.solver.models import branch_states, dovetail, march_wear
 from tests.solver.reconstruction import contact_work, full_motion, series
 
+# the states that all tests share take seconds
+pytestmark = pytest.mark.slow
+
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 FRICTION = 0.5
 WEAR = 1.1e-11  # 1/Pa
@@ -64,7 +67,6 @@ def law(nodal_diameter: int, start: StartState, state: PeriodicState, passes: in
 SLIPPING = [(0, -1.0, 2.0), (0, -0.45, 2.0), (0, -0.1, 0.5), (3, -1.0, 2.0), (20, -0.5, 2.0)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "offset", "amplitude"), SLIPPING)
 def test_a_state_balances_forces_and_energy(nodal_diameter: int, offset: float, amplitude: float) -> None:
     _, state = state_at(nodal_diameter, offset, amplitude)
@@ -76,7 +78,6 @@ def test_a_state_balances_forces_and_energy(nodal_diameter: int, offset: float, 
     assert work == pytest.approx(motion.viscous_work() + taken, rel=1e-6, abs=0.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "offset", "amplitude"), SLIPPING)
 def test_a_state_repeats_from_one_period_to_the_next(nodal_diameter: int, offset: float, amplitude: float) -> None:
     start, state = state_at(nodal_diameter, offset, amplitude)
@@ -106,7 +107,6 @@ def test_every_sample_obeys_the_contact_law(nodal_diameter: int, offset: float, 
     assert np.abs(mean - state.contact_force_h[:, 0, 0]).max() < 1e-2 * mean.max()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("nodal_diameter", "amplitude"), [(0, 2.0), (3, 0.5), (20, 0.5)])
 def test_the_resonance_is_passed_on_a_sweep(nodal_diameter: int, amplitude: float) -> None:
     frequencies = glued_frequency(nodal_diameter) + np.array([-2.0, -1.0, -0.5, -0.1, 0.3, 1.0])
@@ -128,7 +128,6 @@ def worn(step: float, scheme: Scheme) -> WearHistory:
     return history
 
 
-@pytest.mark.slow
 def test_both_schemes_are_of_first_order_and_have_one_limit() -> None:
     volumes = {scheme: [worn(step, scheme).worn_volume[-1] for step in STEPS] for scheme in ("explicit", "implicit")}
     gap = np.abs(np.subtract(volumes["explicit"], volumes["implicit"]))
@@ -145,7 +144,6 @@ def test_an_implicit_step_costs_what_an_explicit_one_does() -> None:
     assert iterations[1] <= 1.5 * iterations[0]
 
 
-@pytest.mark.slow
 def test_away_from_resonance_wear_is_round_off() -> None:
     start, _ = state_at(0, -5.0, 0.5)
     history = march_wear(dovetail(), FRICTION, start, WEAR, 1000.0, "implicit", CYCLES, SETTINGS)
