@@ -44,10 +44,10 @@ def followed() -> tuple[dict[float, StartState], dict[float, Packed]]:
     kept: dict[float, Packed] = {}
 
     def note(progress: Packed) -> None:
-        kept[max(found)] = progress
+        kept[max(found, default=0.0)] = progress
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(start_states, "LOADING", replace(start_states.LOADING, iterations_per_report=1))
+        patch.setattr(start_states, "LOADING", replace(start_states.LOADING, seconds_per_save=0.0))
         for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
             found[float(frequencies[index])] = start
     return found, kept
