@@ -63,12 +63,10 @@ class LoadingOptions:
     some pairs stick; a joint that slips everywhere takes all of them in vain."""
     sweep_iterations: int = 8000
     """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
-    results_per_save: int = 16
+    results_per_save: int = 10
     """Results of the journal (solves, determinants) after which a sweep is saved at the next node and its
-    factorisation dropped, so that a resumed sweep is identical. The cost is one more factorisation in about six nodes.
+    factorisation dropped, so that a resumed sweep is identical. The cost is one more factorisation in about four nodes.
     Where one node takes longer, the journal has save points of its own."""
-    seconds_per_save: float = 2.0
-    """Shortest time between two reports of what is saved, s. The report of 48 pairs takes 5 ms."""
 
     # where the first attempt fails
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))

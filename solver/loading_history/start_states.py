@@ -8,15 +8,12 @@
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from solver.clock import computing_time
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.options import LOADING
 from solver.loading_history.sweep_start import Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
@@ -76,14 +73,10 @@ def follow_branch(
     line.budget.tell = tell or line.budget.tell
     if resume is not None:
         line.load_state(unpack(resume))
-    kept = -math.inf
 
     def save() -> None:
-        nonlocal kept
-        now = time.monotonic()
-        if keep is not None and now >= kept + LOADING.seconds_per_save and (state := line.state_dict()) is not None:
+        if keep is not None and (state := line.state_dict()) is not None:
             keep(pack(state))
-            kept = now
 
     line.save = save
     started = computing_time()

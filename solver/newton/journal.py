@@ -20,9 +20,9 @@ T = TypeVar("T")
 Results = tuple[tuple[object, ...], ...]
 """Results in their order: (value,), or () where the matrix was singular."""
 
-RESULTS_PER_SAVE = 24
-"""Results from one save point to the next: 0.5 s of the dovetail with 48 pairs, 2 s with 160. The factorisation is
-built anew about once in two results in any case."""
+RESULTS_PER_SAVE = 12
+"""Results from one save point to the next: 0.2 s of the dovetail with 48 pairs, 4 s with 336. In any case a new
+factorisation is built about once in two results."""
 
 
 class KeepsFactor(Protocol):

@@ -50,7 +50,7 @@ def last_error(stream: TextIO) -> OSError | None:
 
 def _open_patiently(number: int, stream: TextIO | None) -> TextIO:
     encoding = None if stream is None else stream.encoding
-    errors = "backslashreplace" if stream is None else stream.errors
     raw: Any = _Patient(number, "w", closefd=False)
     # line by line: those of several processes do not get mixed
-    return io.TextIOWrapper(raw, encoding, errors, line_buffering=True)
+    # a name that the encoding does not have is shown by its numbers
+    return io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True)

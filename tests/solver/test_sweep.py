@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.loading_history import start_states
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.options import LOADING
@@ -46,10 +45,8 @@ def followed() -> tuple[dict[float, StartState], dict[float, Packed]]:
     def note(progress: Packed) -> None:
         kept[max(found, default=0.0)] = progress
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(start_states, "LOADING", replace(start_states.LOADING, seconds_per_save=0.0))
-        for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
-            found[float(frequencies[index])] = start
+    for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
+        found[float(frequencies[index])] = start
     return found, kept
 
 
