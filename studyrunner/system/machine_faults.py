@@ -1,4 +1,7 @@
-"""Faults of the machine, which say nothing of the point that was computed: a disk, memory, the cache of the kernels."""
+"""Faults of the machine, which say nothing of the point that was computed: a disk, memory, the cache of the kernels.
+
+By hand: numba has no option by which a cache that is damaged or full costs time only.
+"""
 
 from __future__ import annotations
 

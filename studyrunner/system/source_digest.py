@@ -1,4 +1,7 @@
-"""Hash of what computes: the source of a package of ours, and the versions of the packages that all of them use."""
+"""Hash of what computes: the source of a package of ours, and the versions of the packages that all of them use.
+
+By hand: the hashes in the metadata of a package are missing where the package is installed in editable form.
+"""
 
 from __future__ import annotations
 

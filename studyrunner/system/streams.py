@@ -1,4 +1,7 @@
-"""What a command says, and nobody hears: a terminal that is gone, a closed pipe or a full log does not end a run."""
+"""What a command says, and nobody hears: a terminal that is gone, a closed pipe or a full log does not end a run.
+
+By hand: the streams of Python raise an error where nobody reads, at the end of the process as well.
+"""
 
 from __future__ import annotations
 
