@@ -20,6 +20,7 @@ from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.result import open_vetted
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
 from studyrunner.run import Interrupted, RunOptions, serve_study
+from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -100,12 +101,14 @@ def run_study(
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
         with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
             alone = Alone()
-            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study))
+            computed = InMemory()
+            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study, computed=computed))
             serve_study(
                 alone,
                 study,
                 model,
                 target,
+                computed,
                 shown,
                 RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked),
             )

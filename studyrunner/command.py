@@ -14,8 +14,9 @@ from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
 from studyrunner.options import Options, parse_options
 from studyrunner.system.endings import INTERRUPTED, begin_ending, is_ending, raise_ending, say_at_last
+from studyrunner.system.machine_faults import LEAST_ADDRESS_SPACE, address_space
 from studyrunner.system.streams import keep_talking, last_error
-from studyrunner.user_error import StorageError, UserError, show_text
+from studyrunner.user_error import StorageError, UserError, Verbatim, show_text
 
 if TYPE_CHECKING:
     from studyrunner.mpi.version_check import Machine
@@ -119,6 +120,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
         machines = check_versions(ranks)
         options = parse_options(arguments)
+        _check_memory()
         raise_ending()
         from studyrunner.study.study_file import read_study
 
@@ -145,6 +147,13 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     for rank in range(1, ranks.size):
         ranks.send(None, rank)
     return status
+
+
+def _check_memory() -> None:
+    """Raises UserError where a limit of the address space leaves no room for the libraries."""
+    if (limit := address_space()) < LEAST_ADDRESS_SPACE:
+        remedy = f"give each process at least {1e-6 * LEAST_ADDRESS_SPACE:.0f} MB of address space, or no limit"
+        raise UserError("limits of the process", "ulimit -v", Verbatim(f"{1e-6 * limit:.0f} MB"), remedy)
 
 
 def _follow(ranks: Ranks) -> int:
@@ -211,6 +220,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.run import Interrupted, RunOptions, serve_study
+    from studyrunner.scene.computed import InMemory
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
@@ -218,7 +228,8 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
     # Before anything is said: a wrong scene is bad input, which ends with one line.
-    model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say))
+    computed = InMemory()
+    model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say, computed))
     for line in compare_with_archived(study, model.value):
         print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
     try:
@@ -230,6 +241,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
                 study,
                 model,
                 target,
+                computed,
                 progress,
                 RunOptions(
                     fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
     from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.gather import Gathered
+    from studyrunner.scene.computed import Computed
 
 
 class Interrupted(KeyboardInterrupt):
@@ -162,6 +163,7 @@ def serve_study(
     study: Study,
     broadcast: Broadcast[ReducedModel],
     target: Target,
+    computed: Computed,
     progress: ProgressDisplay,
     options: RunOptions,
 ) -> RunSummary:
@@ -177,6 +179,8 @@ def serve_study(
         The reduced model of the scene, which every rank gets.
     target
         The result file, as `check_result` gives it. The folder of an earlier run lies beside the file.
+    computed
+        Holds what takes long and is the same in each run, such as the natural frequencies of the scene.
     progress
         What the user sees during the run.
     options
@@ -191,7 +195,7 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; finished points have been written.
     """
-    store, completion, writer = _prepare(study, broadcast.value, target, progress, options)
+    store, completion, writer = _prepare(study, broadcast.value, target, computed, progress, options)
     with contextlib.closing(store):
         n_found = _begin(completion, writer.plan.n_points, options, progress)
         try:
@@ -214,7 +218,12 @@ def serve_study(
 
 
 def _prepare(
-    study: Study, model: ReducedModel, target: Target, progress: ProgressDisplay, options: RunOptions
+    study: Study,
+    model: ReducedModel,
+    target: Target,
+    computed: Computed,
+    progress: ProgressDisplay,
+    options: RunOptions,
 ) -> tuple[Store, CompletionIndex, _ResultWriter]:
     """The open folder of the run, the index of finished points, and the writer of the result.
 
@@ -224,7 +233,7 @@ def _prepare(
     plan = build_tasks(study, facts.n_displacements)
     if "natural_frequency" in study.outputs.variables:
         progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model)
+    of_scene = build_scene_variables(study, model, computed)
     kept_scene = scene_to_keep(study, model)
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])

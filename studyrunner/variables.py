@@ -250,7 +250,8 @@ KEPT = {
         "1",
         "Newton iterations of the point, start state included",
         "int32",
-        comment="Of the march that the point was read from, where points share one.",
+        comment="With the whole sweep to the start state, as for this point alone. Of the march that the point was read"
+        " from, where points share one.",
     ),
     "run_time": Variable(
         (),

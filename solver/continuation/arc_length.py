@@ -16,7 +16,8 @@ from solver.harmonic_balance.converged import BalanceAt, PathPoint, vibration_ch
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.solve_balance import Budget, solve_balance, solve_linearised
+from solver.packing import packable
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def follow_arc(
         if budget.exhausted:
             break
         point = points[-1]
-        tangent = arc.tangent(point.parameter, point.evaluation)
+        tangent = arc.tangent(point.parameter, point.evaluation, budget)
         if tangent is None:
             break
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
@@ -141,6 +142,16 @@ def _jumps(folds: list[float], turns: list[int], points: list[PathPoint], toward
     return tuple(jumps)
 
 
+@packable
+@dataclass(frozen=True)
+class _Corrected:
+    """End of the corrector of an arc-length step. unknown: scaled unknowns, dimensionless."""
+
+    converged: bool
+    unknown: FloatArray
+    iterations: int
+
+
 @dataclass
 class _Arc:
     """Arc-length steps in the scaled unknowns (p / size, parameter / span). The tangential history is held."""
@@ -164,10 +175,10 @@ class _Arc:
         ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 
-    def tangent(self, parameter: float, evaluation: Evaluation) -> FloatArray | None:
+    def tangent(self, parameter: float, evaluation: Evaluation, budget: Budget) -> FloatArray | None:
         """Unit tangent of the branch, of either sign; None where the tangent is not defined."""
-        balance = self.balance_at(parameter, self.history)
-        step = self.solver.solve(balance.linearise(evaluation), -self.slope(parameter, evaluation)) / self.size
+        balance, slope = self.balance_at(parameter, self.history), self.slope(parameter, evaluation)
+        step = solve_linearised(balance, evaluation, -slope, self.solver, budget) / self.size
         tangent = np.append(step.ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
@@ -180,11 +191,25 @@ class _Arc:
         self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, budget: Budget
     ) -> PathPoint | None:
         """Point of the branch at the given length along the tangent; None where the corrector does not converge."""
+        corrected = budget.once(
+            self.solver,
+            lambda: self._corrected(point, tangent, length, tolerance),
+            lambda known: isinstance(known, _Corrected) and known.unknown.shape == tangent.shape,
+        )
+        budget.iterations += corrected.iterations
+        if not corrected.converged:
+            return None
+        parameter = float(corrected.unknown[-1] * self.span)
+        predicted_h = corrected.unknown[:-1].reshape(point.evaluation.predicted_h.shape) * self.size
+        return PathPoint(parameter, self.balance_at(parameter, self.history).evaluate(predicted_h), self.history)
+
+    def _corrected(self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float) -> _Corrected:
+        """The scaled unknowns of `step`."""
         shape = point.evaluation.predicted_h.shape
         base = self.place(point.parameter, point.evaluation)
         unknown = base + length * tangent
         slope: FloatArray | None = None
-        for _ in range(CONTINUATION.arc_iterations):
+        for iteration in range(CONTINUATION.arc_iterations):
             parameter = float(unknown[-1] * self.span)
             balance = self.balance_at(parameter, self.history)
             evaluation = balance.evaluate(unknown[:-1].reshape(shape) * self.size)
@@ -192,9 +217,9 @@ class _Arc:
             ahead = float(tangent @ (unknown - base)) - length
             norm = evaluation.scaled_residual()
             if norm <= tolerance:
-                return PathPoint(parameter, evaluation, self.history)
+                return _Corrected(True, unknown, iteration)
             if not np.isfinite(norm) or np.linalg.norm(unknown - base) > CONTINUATION.arc_wander * length:
-                return None
+                return _Corrected(False, unknown, iteration)
             if slope is None:
                 slope = self.slope(parameter, evaluation)
             # [J slope; tangent] by blocks: the step with the parameter held, and the step per change of the parameter
@@ -202,11 +227,10 @@ class _Arc:
             held, moved = held.ravel() / self.size, moved.ravel() / self.size
             pivot = tangent[-1] - tangent[:-1] @ moved
             if pivot == 0.0 or not np.isfinite(pivot):
-                return None
+                return _Corrected(False, unknown, iteration)
             change = (ahead - tangent[:-1] @ held) / pivot
             unknown = unknown - np.append(held - change * moved, change)
-            budget.iterations += 1
-        return None
+        return _Corrected(False, unknown, CONTINUATION.arc_iterations)
 
     def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget
@@ -223,7 +247,7 @@ class _Arc:
             ahead = base + length * tangent
             parameter = float(ahead[-1] * self.span)
             behind = self.balance_at(parameter, self.history).evaluate(ahead[:-1].reshape(shape) * self.size)
-            turned = self.tangent(parameter, behind)
+            turned = self.tangent(parameter, behind, budget)
             if turned is None:
                 continue
             for sign in (np.sign(turned @ tangent) or 1.0, -np.sign(turned @ tangent) or -1.0):

@@ -15,7 +15,7 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
-from solver.stability.hill import is_stable
+from solver.stability.hill import stays
 from solver.structure.fourier import change_orders, from_complex
 from solver.structure.joint import Case, Joint, static_joint
 
@@ -119,10 +119,10 @@ def solve_first_state(
 
     unstable = False
 
-    def stays(point: PathPoint) -> bool:
+    def accepted(point: PathPoint) -> bool:
         nonlocal unstable
         at = point.evaluation
-        stable = is_stable(balance_at(1.0, at.history).linearise(at), solver)
+        stable = stays(balance_at(1.0, at.history), at, solver, budget)
         unstable = unstable or not stable
         return stable
 
@@ -137,14 +137,14 @@ def solve_first_state(
         return Outcome.START_FAILED, None
     rest = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
     point, arrived = follow_naturally(balance_at, rest, 1.0, solver, tolerance, budget)
-    if arrived and stays(point):
+    if arrived and accepted(point):
         return Outcome.CONVERGED, point
     whole = balance_at(1.0, static.history)
     sliding = start + _free_motion(whole)
     result = solve_balance(whole, sliding, solver, tolerance, budget)
     if result.converged:
         slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
-        if stays(slid):
+        if accepted(slid):
             return Outcome.CONVERGED, slid
     for fraction in CONTINUATION.relief:
         relieved = Balance.frozen(quiet, _relieved(quiet, static, fraction), wear_depth)
@@ -152,7 +152,7 @@ def solve_first_state(
         if result.converged:
             held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
             loaded, reached_load = follow_naturally(balance_at, held, 1.0, solver, tolerance, budget)
-            if reached_load and stays(loaded):
+            if reached_load and accepted(loaded):
                 return Outcome.CONVERGED, loaded
     joint = case.joint(omega, excitation_amplitude)
     why, relaxed = relax_to_periodic(case, joint, wear_depth, rest.evaluation, quiet, rest.history, solver, budget)
@@ -162,7 +162,7 @@ def solve_first_state(
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
         limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
         span = CONTINUATION.load_length
-        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, stays).point
+        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, accepted).point
         budget.limit = limit
         if reached is not None:
             return Outcome.CONVERGED, reached

@@ -33,7 +33,7 @@ from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
-from solver.stability.hill import is_stable
+from solver.stability.hill import stays
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -248,7 +248,7 @@ def _periodic(
     if not result.converged:
         return None, False
     found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
-    return found, is_stable(balance.linearise(result.evaluation), solver)
+    return found, stays(balance, result.evaluation, solver, budget)
 
 
 def _change(before: Motion, after: Motion) -> float:

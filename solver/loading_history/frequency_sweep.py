@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypedDict
 
@@ -17,6 +19,7 @@ from solver.loading_history.path_step import Step
 from solver.loading_history.sweep import NodeSweep, SweepState
 from solver.loading_history.sweep_start import Origin, Sweep, find_origin
 from solver.model import FloatArray, ReducedModel
+from solver.newton.journal import Journal, Results
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import Outcome
@@ -48,17 +51,27 @@ class Found:
 
 
 class FrequencySweepState(TypedDict):
-    """Saved attributes of a `FrequencySweep` and of its current `NodeSweep`, with which the sweep goes on."""
+    """State of a `FrequencySweep` with which another one goes on.
+
+    origin, omega: of the current `NodeSweep`, as its arguments.
+    nodes, results: its saved state, and its journal since then.
+    frequency, own_results: the frequency to which the sweep is under way, Hz, and the journal of the state there.
+    """
 
     origin: Origin
     omega: float | None
-    own_iterations: int
-    sweep_iterations: int
-    nodes: SweepState
+    nodes: SweepState | None
+    results: Results
+    frequency: float
+    own_results: Results
 
 
 class FrequencySweep:
-    """The sweep over frequencies: one `NodeSweep` for all points with a common origin, or one for each point (ramp)."""
+    """The sweep over frequencies: one `NodeSweep` for all points with a common origin, or one for each point (ramp).
+
+    budget: of the state at the current frequency, without the sweep to this frequency.
+    save: called at each save point of the sweep and of the state.
+    """
 
     def __init__(
         self,
@@ -73,10 +86,13 @@ class FrequencySweep:
         self.excitation_amplitude = excitation_amplitude
         self.sweep = sweep
         self.settings = settings
-        self.budget = Budget()
+        self.save: Callable[[], None] = lambda: None
+        self.journal = Journal(lambda: self.save())
+        self.budget = Budget(journal=self.journal)
+        self.frequency = float("nan")
         self.origin: Origin | None = None
         self.nodes: NodeSweep | None = None
-        self._counted = 0
+        self._begun = False
 
     @property
     def penalty_omega(self) -> float:
@@ -90,7 +106,7 @@ class FrequencySweep:
 
     @property
     def n_iterations(self) -> int:
-        """Newton iterations so far."""
+        """Newton iterations to the current frequency: of the sweep from its origin, and of the state."""
         return self.budget.iterations + (0 if self.nodes is None else self.nodes.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
@@ -99,53 +115,71 @@ class FrequencySweep:
         if self.nodes is not None:
             self.nodes.budget.deadline = deadline
 
-    def state_dict(self) -> FrequencySweepState:
-        """Values with which another sweep goes on, to be packed."""
-        assert self.nodes is not None
-        assert self.nodes.saved is not None
-        assert self.origin is not None
+    def state_dict(self) -> FrequencySweepState | None:
+        """Values with which another sweep goes on, to be packed; None where nothing is saved yet."""
+        if self.nodes is None or self.origin is None or not (self.nodes.saved or self.nodes.journal.saved):
+            return None
         return {
             "origin": self.origin,
             "omega": self.nodes.path.omega,
-            "own_iterations": self.budget.iterations,
-            "sweep_iterations": max(self.nodes.budget.iterations, self._counted),
             "nodes": self.nodes.saved,
+            "results": self.nodes.journal.saved,
+            "frequency": self.frequency,
+            "own_results": self.journal.saved,
         }
 
     def load_state(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
-        self.origin = state["origin"]
-        self.budget.iterations = state["own_iterations"]
-        self._counted = state["sweep_iterations"]
+        self.origin, self.frequency = state["origin"], state["frequency"]
         self.nodes = self._new_sweep(self.origin, state["omega"])
-        self.nodes.load_state(state["nodes"])
+        self.nodes.load_state(state["nodes"], state["results"])
+        self._begun = state["nodes"] is not None
+        self.journal.begin(state["own_results"])
+
+    def abandon(self) -> None:
+        """Forget the results of a search that an error has ended: what follows begins elsewhere."""
+        if self.nodes is not None and (self.nodes.here is not None or self.nodes.saved is not None):
+            self.nodes.save()
+        elif self.nodes is not None:
+            self.nodes.budget.journal = None
+            self.nodes.journal.begin()
+        self.journal.begin()
+
+    def _sweep_to(self, origin: Origin, omega: float) -> NodeSweep:
+        """The current sweep, or a new one where the current one does not lead to this frequency, rad/s."""
+        nodes, ramp = self.nodes, self.sweep == "ramp"
+        passed = nodes is not None and (nodes.path.omega != omega if ramp else nodes.has_passed(omega))
+        if nodes is None or passed or self.origin is None or origin.cell != self.origin.cell:
+            self.origin, self._begun = origin, False
+            nodes = self.nodes = self._new_sweep(origin, omega if ramp else None)
+        return nodes
 
     def _new_sweep(self, origin: Origin, omega: float | None) -> NodeSweep:
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
         nodes = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
         nodes.budget.deadline, nodes.budget.tell = self.budget.deadline, self.budget.tell
+        nodes.journal.save = lambda: self.save()
         return nodes
 
     def advance(self, frequency: float) -> Found:
         """State at the next frequency, Hz, with the harmonics that it needs."""
         origin, omega = find_origin(self.model, frequency, self.sweep), 2.0 * np.pi * frequency
-        other_cell = self.origin is None or origin.cell != self.origin.cell
-        if self.nodes is None or self.sweep == "ramp" or other_cell or self.nodes.has_passed(omega):
-            self.origin = origin
-            # a loaded sweep stands at an earlier node with fewer iterations
-            self.budget.iterations += max(0 if self.nodes is None else self.nodes.budget.iterations, self._counted)
-            self._counted = 0
-            self.nodes = self._new_sweep(origin, omega if self.sweep == "ramp" else None)
-            self._begin(self.nodes, origin)
-        nodes, target = self.nodes, 1.0 if self.sweep == "ramp" else omega
+        ramp = self.sweep == "ramp"
+        self.budget.iterations, self.budget.limit = 0, LOADING.node_iterations
+        if frequency != self.frequency:
+            self.frequency = frequency
+            self.journal.begin()
+        nodes, target = self._sweep_to(origin, omega), 1.0 if ramp else omega
+        if not self._begun:
+            self._begun = True
+            self._begin(nodes, origin)
         self._advance_to(nodes, target)
-        self.budget.limit = self.budget.iterations + LOADING.node_iterations
         try:
             reached, coarse = nodes.state_at(target, self.budget)
             case = nodes.case
             if reached is None:
                 self.budget.limit = self.budget.iterations + LOADING.first_iterations
-                case, point = self._first(omega)
+                case, point = self._first(omega, self.budget)
                 reached = None if point is None else Step(point)
             if reached is None:
                 lost = Found(self._why_lost(nodes))
@@ -157,7 +191,7 @@ class FrequencySweep:
         except np.linalg.LinAlgError:
             return Found(Outcome.SINGULAR)
         # folds of a ramp are load factors
-        fold = float("nan") if self.sweep == "ramp" else (nodes.state.fold, *reached.folds)[-1]
+        fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
         return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
 
@@ -184,7 +218,7 @@ class FrequencySweep:
 
     def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
         """Find the first state of the sweep; no success where there is none, or where the structure is singular."""
-        self.budget.limit = self.budget.iterations + LOADING.first_iterations
+        nodes.budget.limit = nodes.budget.iterations + LOADING.first_iterations
         places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(nodes, place):
@@ -192,19 +226,17 @@ class FrequencySweep:
 
     def _begin_at(self, nodes: NodeSweep, place: float) -> bool:
         omega, load_factor = (place, 1.0) if nodes.path.omega is None else (nodes.path.omega, place)
-        self.budget.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
-        try:
-            case, point = self._first(omega, load_factor)
-        except np.linalg.LinAlgError:
-            return False
-        if point is None:
-            return False
-        return nodes.begin(case, PathPoint(place, point.evaluation, point.history))
+        nodes.budget.tell(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
+        before, point = nodes.budget.iterations, None
+        with contextlib.suppress(np.linalg.LinAlgError):
+            case, point = self._first(omega, nodes.budget, load_factor)
+        if not np.isnan(nodes.state.lost_at):
+            searched = nodes.state.searched + nodes.budget.iterations - before
+            nodes.state = replace(nodes.state, searched=searched)
+        return point is not None and nodes.begin(case, PathPoint(place, point.evaluation, point.history))
 
     def _advance_to(self, nodes: NodeSweep, target: float) -> None:
         """Advance the sweep to the target; where the sweep is lost before, begin it again a little further on."""
-        # budget of all attempts: where every pair slips, all of them fail
-        self.budget.limit = self.budget.iterations + LOADING.first_iterations
         while True:
             try:
                 nodes.advance_to(target)
@@ -215,8 +247,11 @@ class FrequencySweep:
             behind = nodes.state.lost_at * (1.0 + LOADING.search_distance * nodes.direction)
             if (behind - target) * nodes.direction >= 0.0:
                 return
-            if self.budget.exhausted:
+            # budget of all attempts: where every pair slips, all of them fail
+            left = LOADING.first_iterations - nodes.state.searched
+            if left < 0:
                 return
+            nodes.budget.limit = nodes.budget.iterations + left
             if not self._begin_at(nodes, behind):
                 nodes.state = replace(nodes.state, lost_at=behind)
 
@@ -235,7 +270,7 @@ class FrequencySweep:
     def _restarted_from_static(self, omega: float) -> Refined | None:
         """An accurate state from the static one with other harmonics than the branch; None if there is none."""
         for resolution in _other_starts()[1:]:
-            case, point = self._first_at(omega, 1.0, resolution)[1:]
+            case, point = self._first_at(omega, 1.0, resolution, self.budget)[1:]
             refined = None
             if point is not None:
                 refined = refine(case, omega, self.excitation_amplitude, point, self.budget)
@@ -243,33 +278,33 @@ class FrequencySweep:
                 return refined
         return None
 
-    def _first(self, omega: float, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
+    def _first(self, omega: float, budget: Budget, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
         """A state from the static one with the harmonics of the sweep, or else with others."""
         assert self.nodes is not None
         others = _other_starts() if self.settings.automatic else ()
         why = Outcome.START_FAILED
         for attempt, resolution in enumerate((self.nodes.case.resolution, *others)):
-            outcome, case, point = self._first_at(omega, load_factor, resolution)
+            outcome, case, point = self._first_at(omega, load_factor, resolution, budget)
             if point is not None:
                 return case, point
             # the reason comes from the first attempt
             why = outcome if attempt == 0 else why
             if outcome is Outcome.STATIC_FAILED:
                 why = outcome
-            if outcome is Outcome.STATIC_FAILED or self.budget.exhausted:
+            if outcome is Outcome.STATIC_FAILED or budget.exhausted:
                 break
         self.nodes.state = replace(self.nodes.state, failure=why)
         return self.nodes.case, None
 
     def _first_at(
-        self, omega: float, load_factor: float, resolution: Resolution
+        self, omega: float, load_factor: float, resolution: Resolution, budget: Budget
     ) -> tuple[Outcome, Case, PathPoint | None]:
         """A state from the static one with these harmonics and samples, as far as the settings allow them."""
         assert self.nodes is not None
         case = self.nodes.case.at(allowed(resolution, self.settings))
         unworn = np.zeros(self.model.contact.n_contact)
         outcome, found = solve_first_state(
-            case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), self.budget
+            case, omega, load_factor * self.excitation_amplitude, unworn, JacobianSolver(), budget
         )
         return outcome, case, None if found is None else PathPoint(omega, found.evaluation, found.history)
 

@@ -12,7 +12,7 @@ from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, move_point
+from solver.newton.solve_balance import Budget, move_point, solve_linearised
 from solver.settings import Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
@@ -50,7 +50,7 @@ def _moved(
     balance, start = transfer(other, other_joint, point.evaluation, case.resolution.orders, case.penalty.inertial)
     at = balance.evaluate(start)
     for _ in range(iterations):
-        step = JacobianSolver().solve(balance.linearise(at), -at.residual)
+        step = solve_linearised(balance, at, -at.residual, JacobianSolver(), budget)
         at = balance.evaluate(at.predicted_h + step)
         budget.iterations += 1
     return ResolvedState(other, other_joint, replace(point, evaluation=at))

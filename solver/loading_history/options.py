@@ -63,11 +63,10 @@ class LoadingOptions:
     some pairs stick; a joint that slips everywhere takes all of them in vain."""
     sweep_iterations: int = 8000
     """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
-    nodes_per_save: int = 8
-    """Nodes after which a sweep is saved and its factorisation dropped, so that a resumed sweep is identical. The cost
-    is one more factorisation in eight nodes."""
-    iterations_per_report: int = 100
-    """Newton iterations between two reports of the progress: about a second of 48 pairs."""
+    results_per_save: int = 10
+    """Results of the journal (solves, determinants) after which a sweep is saved at the next node and its
+    factorisation dropped, so that a resumed sweep is identical. The cost is one more factorisation in about four nodes.
+    Where one node takes longer, the journal has save points of its own."""
 
     # where the first attempt fails
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))

@@ -25,7 +25,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.stability.hill import is_stable
+from solver.stability.hill import stays
 from solver.structure.joint import Case, Joint
 
 
@@ -101,7 +101,7 @@ class LoadingPath:
             begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
         limit = self.case.settings.tolerance if tolerance is None else tolerance
         result = solve_balance(balance, begin, solver, limit, budget, CONTINUATION.near_iterations)
-        if not result.converged or not is_stable(balance.linearise(result.evaluation), solver):
+        if not result.converged or not stays(balance, result.evaluation, solver, budget):
             return None
         return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
 
@@ -124,20 +124,20 @@ class LoadingPath:
         scale = self.scale(target)
         folds: list[float] = []
 
-        def stays(point: PathPoint) -> bool:
+        def accepted(point: PathPoint) -> bool:
             balance = self.balance_at(point.parameter, point.evaluation.history)
-            return is_stable(balance.linearise(point.evaluation), solver)
+            return stays(balance, point.evaluation, solver, budget)
 
         while not budget.exhausted:
             point, arrived = follow_naturally(
                 self.balance_at, start, target, solver, tolerance, budget, fine=LOADING.free_step * scale
             )
-            if arrived and stays(point):
+            if arrived and accepted(point):
                 return Step(point, tuple(folds))
             # natural steps may have passed the unknown start of an unstable part: then the search begins before them
             end = start if arrived else point
             span = LOADING.search_distance * scale
-            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, stays, beyond=False)
+            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, accepted, beyond=False)
             if arc.point is not None:
                 return Step(arc.point, (*folds, *arc.jumps))
             if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:

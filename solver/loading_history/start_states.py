@@ -14,7 +14,6 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.options import LOADING
 from solver.loading_history.sweep_start import Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
@@ -57,7 +56,7 @@ def follow_branch(
     settings
         Harmonics, samples, tolerances, limit of time.
     keep
-        Called from time to time with the progress of the sweep, after a state was taken from the iterator.
+        Called from time to time with the progress of the sweep, also on the way to a state.
     resume
         Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
         frequencies not yet passed. The states are equal to the last bit, except `run_time`.
@@ -72,11 +71,14 @@ def follow_branch(
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
     line.budget.tell = tell or line.budget.tell
-    counted = 0
     if resume is not None:
-        counted, state = unpack(resume)
-        line.load_state(state)
-    kept = counted
+        line.load_state(unpack(resume))
+
+    def save() -> None:
+        if keep is not None and (state := line.state_dict()) is not None:
+            keep(pack(state))
+
+    line.save = save
     started = computing_time()
     for index in order:
         line.set_deadline(started + settings.time_limit)
@@ -85,9 +87,11 @@ def follow_branch(
             found = line.advance(float(frequencies[index]))
         except OutOfTimeError:
             found = Found(Outcome.TIME_LIMIT)
+            line.abandon()
         except Exception as error:
             # an error spoils one point only: the sweep goes on from the state before
             found, message = Found(Outcome.EXCEPTION), describe_error(error)
+            line.abandon()
         now = computing_time()
         yield (
             int(index),
@@ -99,16 +103,12 @@ def follow_branch(
                 resolution=found.resolution or line.resolution,
                 response_error=found.estimate.response,
                 wear_rate_error=found.estimate.wear_rate,
-                newton_iterations=line.n_iterations - counted,
+                newton_iterations=line.n_iterations,
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
                 message=message or found.message,
             ),
         )
-        started, counted = now, line.n_iterations
-        # a sweep without a first state has nothing to resume
-        begun = line.nodes is not None and line.nodes.saved is not None
-        if keep is not None and begun and counted >= kept + LOADING.iterations_per_report:
-            keep(pack((counted, line.state_dict())))
-            kept = counted
+        started = now
+        save()

@@ -27,6 +27,7 @@ from solver.harmonic_balance.converged import PathPoint, vibration_change, vibra
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import LoadingPath, Step, in_rows
+from solver.newton.journal import Journal, Results
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -66,6 +67,8 @@ class SweepState:
         Reason why there is no state, and the parameter of the last node before, NaN if there was none.
     iterations : int
         Newton iterations so far.
+    searched : int
+        Of these, the iterations of attempts to begin the sweep again where it was lost.
     """
 
     resolution: Resolution
@@ -81,6 +84,7 @@ class SweepState:
     failure: Outcome = Outcome.START_FAILED
     lost_at: float = float("nan")
     iterations: int = 0
+    searched: int = 0
 
 
 class NodeSweep:
@@ -91,11 +95,14 @@ class NodeSweep:
     state : SweepState
         State at the current node.
     saved : SweepState or None
-        State at the last saved node. A resumed sweep that starts from this state is equal to the last bit.
+        State at the last saved node, None before the first node. A resumed sweep that starts from this state and from
+        the journal is equal to the last bit.
+    journal : Journal
+        Results since the last saved node.
     ahead : Step or None
         The next node, where it is known.
     budget : Budget
-        Counts and limits the Newton iterations.
+        Counts and limits the Newton iterations, those of all attempts to begin included.
     """
 
     def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
@@ -103,17 +110,20 @@ class NodeSweep:
         self.path = self.reference_path = LoadingPath(case, excitation_amplitude, omega)
         self.direction = direction
         self.solver, self.reference_solver = JacobianSolver(), JacobianSolver()
-        self.budget = Budget()
+        self.journal = Journal()
+        self.budget = Budget(journal=self.journal)
         self.state = SweepState(case.resolution, case.resolution)
         self.saved: SweepState | None = None
         self.ahead: Step | None = None
 
-    def load_state(self, state: SweepState) -> None:
-        """Go on from the `saved` state of another sweep; the following nodes are equal to the last bit."""
-        self.saved = self.state = state
-        self._take_cases(self.case.at(state.resolution), self.case.at(state.reference_resolution))
-        self.budget.iterations = state.iterations
+    def load_state(self, state: SweepState | None, results: Results) -> None:
+        """Go on from the `saved` state and the journal of another sweep; all nodes are equal to the last bit."""
+        if state is not None:
+            self.saved = self.state = state
+            self._take_cases(self.case.at(state.resolution), self.case.at(state.reference_resolution))
+            self.budget.iterations = state.iterations
         self._forget()
+        self.journal.begin(results)
 
     @property
     def here(self) -> PathPoint | None:
@@ -139,7 +149,7 @@ class NodeSweep:
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, nodes=(), reference=(), failure=Outcome.UNSETTLED)
             return False
-        self._save()
+        self.save()
         return True
 
     def lose(self) -> None:
@@ -268,8 +278,8 @@ class NodeSweep:
                 self.state = replace(self.state, checked=step.point)
             else:
                 self._choose_resolution()
-        if self.state.n_nodes % LOADING.nodes_per_save == 0:
-            self._save()
+        if len(self.journal) >= LOADING.results_per_save:
+            self.save()
 
     def _advance_reference(self, target: float) -> None:
         """Solve the next node of the reference sweep; after a failure or a jump, begin this sweep anew."""
@@ -331,7 +341,7 @@ class NodeSweep:
         self.path, self.reference_path = (replace(self.path, case=one) for one in (case, reference))
         self.state = replace(self.state, resolution=case.resolution, reference_resolution=reference.resolution)
 
-    def _save(self) -> None:
+    def save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
         state = self.state
         self.state = replace(
@@ -343,6 +353,8 @@ class NodeSweep:
         )
         self._forget()
         self.saved = self.state
+        self.journal.begin()
+        self.journal.save()
 
     def _forget(self) -> None:
         """Drop the factorisations that are kept from node to node, and the next node."""

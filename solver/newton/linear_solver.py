@@ -25,6 +25,12 @@ class JacobianSolver:
 
     _factor: Factor | None = field(default=None, repr=False)
     _recycled: Recycled = field(default_factory=Recycled, repr=False)
+    _epoch: int = field(default=0, repr=False)
+
+    def renew(self, epoch: int) -> None:
+        """Drop the factorisation unless it was kept in this epoch of a journal (`solver.newton.journal`)."""
+        if epoch != self._epoch:
+            self._factor, self._recycled, self._epoch = None, Recycled(), epoch
 
     def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""

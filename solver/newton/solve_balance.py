@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,9 +14,13 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import transfer
 from solver.model import FloatArray
 from solver.newton.iteration import NewtonResult, solve_newton
+from solver.newton.journal import Journal
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
+from solver.packing import packable
 from solver.structure.joint import Case, Joint
+
+T = TypeVar("T")
 
 
 def _silent(_: str) -> None:
@@ -30,12 +35,14 @@ class Budget:
     limit: iterations after which the search along a branch ends.
     deadline: CPU time of the thread, s, after which the whole computation ends.
     tell: called with a description of the progress, in words, at every change.
+    journal: results of the computation for a later run, where the computation can be interrupted.
     """
 
     iterations: int = 0
     limit: float = np.inf
     deadline: float = np.inf
     tell: Callable[[str], None] = _silent
+    journal: Journal | None = None
 
     @property
     def exhausted(self) -> bool:
@@ -46,6 +53,20 @@ class Budget:
         """Raise OutOfTimeError after the deadline."""
         if self.deadline < np.inf and computing_time() > self.deadline:
             raise OutOfTimeError
+
+    def once(self, solver: JacobianSolver, compute: Callable[[], T], fits: Callable[[object], bool]) -> T:
+        """Result of a computation with a solver, as `Journal.once`."""
+        return compute() if self.journal is None else self.journal.once(solver, compute, fits)
+
+
+@packable
+@dataclass(frozen=True)
+class _Solved:
+    """A `NewtonResult` without its evaluation, as a journal holds it."""
+
+    converged: bool
+    unknown: FloatArray
+    iterations: int
 
 
 class OutOfTimeError(Exception):
@@ -89,9 +110,36 @@ def solve_balance(
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(at.scaled_residual(), tolerance))
         return solver.solve(balance.linearise(at), -at.residual, rtol)
 
-    result = solve_newton(balance.evaluate, direction, start, tolerance, most)
-    budget.iterations += result.iterations
-    return result
+    ends: list[NewtonResult[Evaluation]] = []
+
+    def newton() -> _Solved:
+        end = solve_newton(balance.evaluate, direction, start, tolerance, most)
+        if not end.unknown.flags.c_contiguous:
+            # evaluated from the memory layout that an unknown from a journal has
+            unknown = np.ascontiguousarray(end.unknown)
+            end = replace(end, unknown=unknown, evaluation=balance.evaluate(unknown))
+        ends.append(end)
+        return _Solved(end.converged, end.unknown, end.iterations)
+
+    def solves(known: object) -> bool:
+        if not isinstance(known, _Solved) or known.unknown.shape != start.shape:
+            return False
+        ends.append(NewtonResult(known.converged, known.unknown, balance.evaluate(known.unknown), known.iterations))
+        return not known.converged or ends[-1].evaluation.scaled_residual() <= 2.0 * tolerance
+
+    budget.iterations += budget.once(solver, newton, solves).iterations
+    return ends[-1]
+
+
+def solve_linearised(
+    balance: Balance, at: Evaluation, right: FloatArray, solver: JacobianSolver, budget: Budget
+) -> FloatArray:
+    """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state of a balance."""
+
+    def step() -> FloatArray:
+        return np.ascontiguousarray(solver.solve(balance.linearise(at), right))
+
+    return budget.once(solver, step, lambda known: isinstance(known, np.ndarray) and known.shape == right.shape)
 
 
 def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, budget: Budget) -> PathPoint | None:

@@ -45,7 +45,7 @@ class StartState:
     penalty_omega: rad/s, frequency at which the penalty is taken, common to all points of a quarter octave.
     resolution: harmonics and samples of the state.
     response_error, wear_rate_error: estimated relative errors of the state, errors by the steps of the sweep included.
-    newton_iterations: iterations spent since the last frequency.
+    newton_iterations: iterations of the whole sweep to this frequency and of the state, as for this frequency alone.
     run_time: CPU seconds of the computing thread since the last frequency.
     branch: number of folds that the sweep has jumped over since its start; 0 on its first branch.
     fold_frequency: Hz, frequency of the last such fold; NaN if none. NaN for a ramp, whose folds are load factors.

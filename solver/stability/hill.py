@@ -19,8 +19,9 @@ reported states. Disturbances of friction are taken as slow, with the closure ov
 
 from __future__ import annotations
 
-from solver.harmonic_balance.dlft import Linearisation
+from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Budget
 
 
 def is_stable(tangent: Linearisation, solver: JacobianSolver) -> bool:
@@ -28,4 +29,9 @@ def is_stable(tangent: Linearisation, solver: JacobianSolver) -> bool:
 
     tangent: of a state at a fixed wear depth (`wear_gain` zero): the vibration is fast, the wear is slow.
     """
-    return solver.determinant_sign(tangent) >= 0.0
+    return bool(solver.determinant_sign(tangent) >= 0.0)
+
+
+def stays(balance: Balance, at: Evaluation, solver: JacobianSolver, budget: Budget) -> bool:
+    """`is_stable` for a state of a balance, from the journal of the budget where the journal has this result."""
+    return budget.once(solver, lambda: is_stable(balance.linearise(at), solver), lambda known: isinstance(known, bool))

@@ -3,6 +3,8 @@
 Rank 0 sends the object to one rank of every other machine. This rank, and rank 0 on its own machine, puts the object
 into shared memory and tells the other ranks of the machine the address. A rank that cannot map the memory gets a copy
 of its own.
+
+By hand: a broadcast of MPI waits for all ranks, cannot be interrupted, and gives each rank a copy of its own.
 """
 
 from __future__ import annotations

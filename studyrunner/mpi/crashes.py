@@ -5,6 +5,8 @@ handler writes the position in the code behind it. A process that is killed from
 
 The signal of a crash may also come from outside or from a faulty machine, so that one crash says nothing about the
 task. Therefore the text is kept under the hash of the task, and the crashes of each task are counted.
+
+By hand: `faulthandler` writes where a process was; no library notes which task the process had, and counts.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNE
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import os
 import signal
@@ -27,6 +28,7 @@ POLL_SECONDS = 1e-3
 """Time between two looks for a message, s. A blocking receive would keep a core busy."""
 
 _SECONDS_TO_PRINT = 1.0
+_SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
 
 _TOLERANT = "OMPI_MCA_mpi_ft_enable"
@@ -131,6 +133,10 @@ class MpiRanks:
         self._many = _MANY_SENT
         self.rank: int = self._world.Get_rank()
         self.size: int = self._world.Get_size()
+        if library == "MPICH":
+            # behind the barrier all ranks have mapped the memory
+            self._world.Barrier()
+            _unlink_shared_memory()
 
     def send(self, message: object, rank: int) -> None:
         """As in Ranks."""
@@ -175,6 +181,16 @@ class MpiRanks:
 
     def _is_through(self, request: MPI.Request) -> bool:
         return request.Test()
+
+
+def _unlink_shared_memory() -> None:
+    """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end."""
+    # systems other than Linux have no such list; another rank may be faster, and a name that stays is no harm
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines():
+            if _SHARED in line:
+                with contextlib.suppress(OSError):
+                    Path(line[line.index(_SHARED) :]).unlink()
 
 
 class TolerantRanks(MpiRanks):

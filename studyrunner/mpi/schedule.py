@@ -3,6 +3,8 @@
 A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
 so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
 a second thread computes. `dispatch` decides which rank gets which task.
+
+By hand: in the pools of mpi4py and schwimmbad a task has one result, no progress, and ends with the rank that has it.
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 The memory is a file without a name (`memfd_create` of Linux). It exists until the last process that holds it ends, in
 whatever way. The end of one process does not disturb the others.
+
+By hand: all ranks together free a window of MPI, also after one was killed; `multiprocessing.shared_memory` leaves a
+name behind.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The ranks compare the versions of their software before anything else: with other versions the numbers may differ."""
+"""The ranks compare the versions of their software before anything else: with other versions the numbers may differ.
+
+By hand: mpi4py exchanges messages between ranks of any versions.
+"""
 
 from __future__ import annotations
 

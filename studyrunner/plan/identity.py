@@ -9,19 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import platform
 from collections.abc import Sequence
 from dataclasses import asdict, astuple
 from functools import cache
-from importlib import metadata
-from importlib.util import find_spec
-from pathlib import Path
 
 from studyrunner.plan.sharing import ScaledHistory
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study import Study
-
-_COMPUTING = ("fretwear", "numba", "numpy", "scipy")
+from studyrunner.system.source_digest import package_digest
 
 
 class Identities:
@@ -81,19 +76,7 @@ class Identities:
 @cache
 def solver_digest() -> str:
     """Hash of the source of the solver and of the versions of the packages that it uses."""
-    specification = find_spec("solver")
-    if specification is None or not specification.submodule_search_locations:
-        raise ModuleNotFoundError("the package solver is not installed")
-    versions = [platform.python_version(), *(metadata.version(name) for name in _COMPUTING)]
-    return _digest(versions, source_hashes(Path(next(iter(specification.submodule_search_locations)))))
-
-
-def source_hashes(folder: Path) -> list[tuple[str, str]]:
-    """Path and hash of all source files of a package."""
-    return [
-        (path.relative_to(folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest())
-        for path in sorted(folder.rglob("*.py"))
-    ]
+    return package_digest("solver")
 
 
 def _digest(*values: object) -> str:

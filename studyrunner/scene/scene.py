@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import surface_factors
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
+from studyrunner.scene.computed import Computed, InMemory, model_once
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
@@ -52,10 +54,12 @@ def _silent(_: str) -> None:
     """Tells nobody."""
 
 
-def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -> ReducedModel:
+def build_study_scene(
+    study: Study, progress: Callable[[str], None] = _silent, computed: Computed | None = None
+) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
-    progress: takes a line on the next step, where a step may take long.
+    progress: takes a line on the next step, where a step may take long. computed: holds the model of an earlier run.
 
     With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE. A scene file may have
     as few nodal diameters as one harmonic needs; `largest_harmonics` then gives the limit.
@@ -65,7 +69,7 @@ def build_study_scene(study: Study, progress: Callable[[str], None] = _silent) -
     UserError
         Where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
     """
-    model = _build(study, progress)
+    model = _build(study, progress, InMemory() if computed is None else computed)
     check_outputs(study, model)
     _check_surfaces(study, model)
     return model
@@ -78,12 +82,13 @@ def harmonics_to_build(study: Study) -> int:
     return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
 
 
-def _build(study: Study, progress: Callable[[str], None]) -> ReducedModel:
+def _build(study: Study, progress: Callable[[str], None], computed: Computed) -> ReducedModel:
     given, scene = max(study.given_harmonics, default=1), study.scene
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
         if scene.path is None:
-            return _build_here(study, progress)
+            build = partial(_build_here, study, progress)
+            return model_once(study, harmonics_to_build(study), computed, build)
         # h5py is loaded for scene files only: the bundled scenes do without it.
         from studies.scene_file import read_scene
 

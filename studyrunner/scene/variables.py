@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_answer, scene_frequencies, scene_has, scene_mesh
+from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
@@ -69,8 +71,12 @@ def loop_numbers(study: Study) -> int:
     return len(study.outputs.loops) * len(study.cycles_kept) * each
 
 
-def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
+def build_scene_variables(
+    study: Study, model: ReducedModel, computed: Computed | None = None
+) -> tuple[SceneVariable, ...]:
     """All that the study asks of its scene. Natural frequencies of a bundled sector take some seconds.
+
+    computed: holds those of an earlier run.
 
     Raises
     ------
@@ -78,10 +84,11 @@ def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVaria
         Where the scene cannot give them.
     """
     asked = study.outputs.variables
+    kept = InMemory() if computed is None else computed
     with _user_errors(study):
         return tuple(
             variable
-            for name, build in (("mesh", _mesh), ("natural_frequency", _frequencies), ("exact", _exact))
+            for name, build in (("mesh", _mesh), ("natural_frequency", partial(_frequencies, kept)), ("exact", _exact))
             if name in asked
             for variable in build(study, model)
         )
@@ -131,9 +138,10 @@ def _mesh(study: Study, _: ReducedModel) -> Iterator[SceneVariable]:
         yield SceneVariable(name, entry, values[name])
 
 
-def _frequencies(study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
+def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
     if _has_frequencies(study):
-        found = scene_frequencies(study.scene.model, study.scene.parameters)
+        scene = study.scene
+        found = frequencies_once(study, computed, lambda: scene_frequencies(scene.model, scene.parameters))
     else:
         found = stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()

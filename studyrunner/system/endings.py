@@ -3,6 +3,8 @@
 The first signal raises KeyboardInterrupt in the main thread. A callback of an import or of a library may lose this
 exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called. A run that takes
 longer than `SECONDS_OF_GRACE` to end is ended at once by one more signal.
+
+By hand: `signal` of Python raises at any instruction, and nothing in it defers a signal or keeps a lost one.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Files as a run opens them: no link is followed, nothing is waited for, and what is written can be put on the disk.
 
 A folder of results may hold anything: what somebody has put there, a link for one, is neither written through nor read.
+
+By hand: `tempfile` and `os.replace` are used, but neither of them refuses links or puts the folder on the disk.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""What one thread tells another one, which waits for it in a way that no signal makes endless."""
+"""What one thread tells another one, which waits for it in a way that no signal makes endless.
+
+By hand: `queue.SimpleQueue` may wait for ever after a signal, see `Mailbox`.
+"""
 
 from __future__ import annotations
 

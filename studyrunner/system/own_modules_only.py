@@ -1,4 +1,7 @@
-"""The first import of the commands: from here on no module is taken from the current folder."""
+"""The first import of the commands: from here on no module is taken from the current folder.
+
+By hand: the options -P and -I of Python cannot be given to an installed command.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Work in a process of its own, which a crash of a library ends without ending this one."""
+"""Work in a process of its own, which a crash of a library ends without ending this one.
+
+By hand: `multiprocessing` does not pass the signals that end this process on to its processes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Progress of a run on stderr: a bar with the time left on a terminal, a plain line now and then elsewhere."""
+"""Progress of a run on stderr: a bar with the time left on a terminal, a plain line now and then elsewhere.
+
+By hand are the words alone: `rich` draws the bar.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What a command says, and nobody hears: a terminal that is gone, a closed pipe or a full log does not end a run."""
+"""What a command says, and nobody hears: a terminal that is gone, a closed pipe or a full log does not end a run.
+
+By hand: the streams of Python raise an error where nobody reads, at the end of the process as well.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ def last_error(stream: TextIO) -> OSError | None:
 
 def _open_patiently(number: int, stream: TextIO | None) -> TextIO:
     encoding = None if stream is None else stream.encoding
-    errors = "backslashreplace" if stream is None else stream.errors
     raw: Any = _Patient(number, "w", closefd=False)
     # line by line: those of several processes do not get mixed
-    return io.TextIOWrapper(raw, encoding, errors, line_buffering=True)
+    # a name that the encoding does not have is shown by its numbers
+    return io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True)

@@ -94,6 +94,12 @@ class Running:
                 found[int(path.name)] = dict(each.split(b"=", 1) for each in variables if b"=" in each)
         return found
 
+    def shared_memory(self) -> dict[str, bool]:
+        """Memory that MPICH shares between the ranks, and whether it still has a name, which a kill would leave."""
+        lines = [line for pid in self.ranks().values() for line in Path(f"/proc/{pid}/maps").read_text().splitlines()]
+        names = {line[line.index("/dev/shm/") :] for line in lines if "/dev/shm/mpich_shm_" in line}
+        return {name: Path(name).exists() for name in names}
+
     def ranks(self) -> dict[int, int]:
         """The processes that compute, by their number: run-study alone, or those that the launcher has given one."""
         found = {}

@@ -60,11 +60,15 @@ def test_two_hundred_signals_end_it_with_a_result(n_ranks: int, number: int, tmp
 def test_the_launcher_is_gone_with_a_rank(victim: int, tmp_path: Path) -> None:
     def kill(running: Running) -> None:
         wait_for_a_march(running, tmp_path)
+        memory.update(running.shared_memory())
         os.kill(running.ranks()[victim], signal.SIGKILL)
 
+    memory: dict[str, bool] = {}
     ended = run_to_end(3, STUDY, tmp_path, ENVIRONMENT, kill)
     assert ended.status != 0
     assert ended.seconds < 10.0
+    assert memory
+    assert not any(memory.values())
 
 
 STUCK = """

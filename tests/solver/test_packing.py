@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history import start_states, sweep
+from solver.loading_history import sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -158,7 +158,6 @@ def test_a_start_state_comes_back() -> None:
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""
-    monkeypatch.setattr(start_states, "LOADING", replace(start_states.LOADING, iterations_per_report=1))
     for model, friction, amplitude, frequencies in (
         (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
         (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),

@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.loading_history import start_states
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.options import LOADING
@@ -44,12 +43,10 @@ def followed() -> tuple[dict[float, StartState], dict[float, Packed]]:
     kept: dict[float, Packed] = {}
 
     def note(progress: Packed) -> None:
-        kept[max(found)] = progress
+        kept[max(found, default=0.0)] = progress
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(start_states, "LOADING", replace(start_states.LOADING, iterations_per_report=1))
-        for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
-            found[float(frequencies[index])] = start
+    for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
+        found[float(frequencies[index])] = start
     return found, kept
 
 

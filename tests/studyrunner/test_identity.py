@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import itertools
 import shutil
 from pathlib import Path
@@ -212,7 +213,7 @@ def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
     before = hashes()
     identity.solver_digest.cache_clear()
     assert hashes() == before
-    monkeypatch.setattr(identity.metadata, "version", lambda _: "0.0.0")
+    monkeypatch.setattr(importlib.metadata, "version", lambda _: "0.0.0")
     identity.solver_digest.cache_clear()
     try:
         assert hashes()[POINT][0] != before[POINT][0]

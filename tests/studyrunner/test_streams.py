@@ -80,6 +80,34 @@ def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
     assert (tmp_path / "out-report" / "index.html").exists()
 
 
+REFUSED = {
+    "stdout in a file that is gone": ("exec >gone; rm gone;", "-o /dev/stdout", "give the name of an ordinary file"),
+    "stdout in a file": ("exec >file;", "-o /dev/stdout", "give the name of an ordinary file"),
+    "no UTF-8": ("", "-o $'caf\\xe9.nc'", "give a name in UTF-8"),
+    "a folder that is no UTF-8": ("mkdir $'\\xe9'; cd $'\\xe9';", "-o out.nc", "give a name in UTF-8"),
+    "little memory": ("ulimit -v 450000;", "", "ulimit -v = 461 MB: give each process at least 1000 MB"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_end_well_is_refused_at_the_beginning(case: str, tmp_path: Path) -> None:
+    before, options, said = REFUSED[case]
+    status, _, line = shell(f"{before} {sys.executable} -m studyrunner.cli two_masses {options}", tmp_path)
+    assert status == 2
+    assert line.startswith("run-study: ")
+    assert said in line
+    assert line.count("\n") == 1
+    assert not list(tmp_path.rglob("*.parts"))
+
+
+@pytest.mark.slow
+def test_a_name_that_the_terminal_cannot_show(tmp_path: Path) -> None:
+    command = faked(STUDY.replace("out.nc", "caf\xe9.nc"), "")
+    status, said, _ = shell(f"PYTHONIOENCODING=ascii {command}", tmp_path)
+    assert status == 0
+    assert said.startswith(r"caf\xe9.nc: ")
+
+
 def test_nothing_else_gets_the_number_of_a_stream(tmp_path: Path) -> None:
     """A library that complains on stderr must not write into a file of the run."""
     code = (

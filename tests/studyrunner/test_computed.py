@@ -1,0 +1,118 @@
+"""What takes long is computed once: a later run takes it from the file, equal to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pytest
+
+from solver.model import ReducedModel
+from solver.packed_model import pack_model
+from solver.packing import Packed, pack
+from studyrunner.scene import computed as computed_module
+from studyrunner.scene import scene as scene_module
+from studyrunner.scene import variables as variables_module
+from studyrunner.scene.computed import InMemory
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene
+from studyrunner.scene.variables import build_scene_variables
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import read_study
+
+SCENES: dict[str, tuple[str, list[str]]] = {
+    "sector": ("dovetail", ["scene.mesh=1"]),
+    "travelling wave": ("dovetail", ["scene.mesh=1", "scene.nodal_diameter=3"]),
+    "half-space": ("cylinder_on_flat", []),
+    "finite-element model": ("blade_root", []),
+    "masses": ("two_masses", []),
+}
+
+
+@pytest.fixture(autouse=True)
+def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes no time is kept as well."""
+    monkeypatch.setattr(computed_module, "LEAST_SECONDS", -1.0)
+
+
+def forbid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on nothing is computed."""
+
+    def compute(*_: object) -> NoReturn:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr(scene_module, "_build_here", compute)
+    monkeypatch.setattr(variables_module, "scene_frequencies", compute)
+
+
+def memory(model: ReducedModel) -> list[tuple[object, ...]]:
+    """All that the last bits of a result depend on."""
+    arrays = [(name, np.asarray(value)) for name, value in _parts(model)]
+    return [(name, a.dtype.str, a.shape, a.strides, a.flags.c_contiguous, a.tobytes()) for name, a in arrays]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", SCENES)
+def test_a_scene_is_built_once(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, kept = read_study(*SCENES[case]), InMemory()
+    built = build_study_scene(study, computed=kept)
+    forbid(monkeypatch)
+    again = build_study_scene(read_study(*SCENES[case]), computed=kept)
+    assert memory(again) == memory(built)
+    assert list(again.linear) == list(built.linear)
+    assert describe_scene(again).digest == describe_scene(built).digest
+    assert type(again.contact.surface) is type(built.contact.surface)
+
+
+def test_natural_frequencies_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    study, kept = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['natural_frequency']"]), InMemory()
+    model = build_study_scene(study, computed=kept)
+    first = build_scene_variables(study, model, kept)
+    forbid(monkeypatch)
+    for one, other in zip(build_scene_variables(study, model, kept), first, strict=True):
+        assert one.name == other.name
+        np.testing.assert_array_equal(one.values, other.values)
+        assert one.values.dtype == other.values.dtype
+
+
+def key_of(study: Study) -> set[str]:
+    return {computed_module._key("model", study, scene_module.harmonics_to_build(study))}
+
+
+@pytest.mark.parametrize(
+    "overrides", [["scene.mesh=2"], ["scene.rotation_speed=3000.0000000001"], ["solver.harmonics=21"]]
+)
+def test_another_scene_is_another_one(overrides: Sequence[str]) -> None:
+    own = ["scene.mesh=1"]
+    assert key_of(read_study("dovetail", own)) == key_of(read_study("dovetail", [*own, "axes.frequency=200"]))
+    assert key_of(read_study("dovetail", own)) != key_of(read_study("dovetail", [*own, *overrides]))
+
+
+def test_a_changed_file_or_source_makes_another_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = key_of(read_study("blade_root"))
+    from studies.fe_models.from_files import scene as from_files
+
+    monkeypatch.setattr(from_files, "file_digest", lambda _: "of another file")
+    assert key_of(read_study("blade_root")) != before
+    monkeypatch.undo()
+    assert key_of(read_study("blade_root")) == before
+    monkeypatch.setattr(computed_module, "package_digest", lambda package: f"another {package}")
+    assert key_of(read_study("blade_root")) != before
+
+
+@pytest.mark.parametrize("wrong", [Packed("{", ()), pack(None), pack((1, 2)), pack(((0, 1), "model"))])
+def test_what_is_no_model_is_built_again(wrong: Packed) -> None:
+    study, kept = read_study("two_masses"), InMemory()
+    built = build_study_scene(study, computed=kept)
+    (key,) = kept
+    kept[key] = wrong
+    assert memory(build_study_scene(study, computed=kept)) == memory(built)
+    assert kept[key] is not wrong
+
+
+def test_matrices_by_columns_are_not_kept() -> None:
+    model = build_study_scene(read_study("two_masses"))
+    turned = replace(model.linear[0], stiffness=np.asfortranarray(model.linear[0].stiffness))
+    assert pack_model(replace(model, linear={0: turned})) is None
