@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
+import json
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
+from solver.packing import Packed
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import march_variables
 from studyrunner.scene.scene import SceneFacts
@@ -27,10 +28,9 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 
 
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
-    """Data type of the record of a history: the hash, then all values of a result."""
+    """Data type of the record of a history: all values of a result."""
     sizes = variable_sizes(study, facts)
-    fields: list[tuple[str, str, tuple[int, ...]]] = [(KEY, KEY_TYPE, ())]
-    fields.extend((name, entry.dtype, ()) for name, entry in KEPT.items())
+    fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in KEPT.items()]
     for name in march_variables(study):
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
@@ -39,12 +39,30 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     return np.dtype(fields)
 
 
-def pack(kind: np.dtype[np.void], key: str, result: MarchResult) -> NDArray[np.void]:
-    """Record (1,) of a history with the hash `key`."""
+def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
+    """Record (1,) of a history."""
     records = empty_record(kind)
-    records[KEY] = key.encode("ascii")
     for name, values in result.values.items():
         records[name] = values
+    return records
+
+
+def pack_record(record: NDArray[np.void]) -> Packed:
+    """Names and values of a record (1,), for a file."""
+    names = record.dtype.names or ()
+    return Packed(json.dumps(names), tuple(np.array(record[name][0]) for name in names))
+
+
+def unpack_record(packed: Packed, kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """Record (1,) from the output of `pack_record`. Raises ValueError where it has other values than `kind`."""
+    names = kind.names or ()
+    records = empty_record(kind)
+    if packed.text != json.dumps(names) or len(packed.arrays) != len(names):
+        raise ValueError("a record with other values")
+    for name, array in zip(names, packed.arrays, strict=True):
+        if array.shape != kind[name].shape or array.dtype.kind != kind[name].base.kind:
+            raise ValueError("a record with other values")
+        records[name] = array
     return records
 
 
