@@ -51,6 +51,8 @@ def decompress(size: int, content: bytes) -> Packed:
         if len(raw) != size or stream.decompress(stream.unconsumed_tail, 1) or not stream.eof:
             raise ValueError("another size than it says")
         first = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
+        if first > size:
+            raise ValueError("less than it says")
         text, layout = json.loads(raw[_HEAD_BYTES:first])
         if not isinstance(text, str):
             raise ValueError("no text")

@@ -87,9 +87,13 @@ def connect(path: Path, options: str) -> sqlite3.Connection:
     database = sqlite3.connect(address, uri=True, timeout=0.0, isolation_level=None, check_same_thread=False)
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST + 2**20)
     database.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    database.text_factory = lambda text: text.decode("utf-8", "replace")
+    return database
+
+
+def _set_up(database: sqlite3.Connection) -> None:
     for pragma in _PRAGMAS:
         database.execute(f"PRAGMA {pragma}").fetchall()
-    return database
 
 
 def open_locked(path: Path, *, lock: bool = True) -> tuple[sqlite3.Connection, str]:
@@ -149,8 +153,9 @@ def _lock(database: sqlite3.Connection, path: Path) -> None:
     latest = time.monotonic() + _SECONDS_TO_DIE
     while True:
         try:
-            # takes effect in a file without tables
-            database.execute("PRAGMA auto_vacuum=INCREMENTAL").fetchall()
+            _set_up(database)
+            if path.stat().st_size == 0:
+                database.execute("PRAGMA auto_vacuum=INCREMENTAL").fetchall()
             database.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as error:
             if _code(error) != sqlite3.SQLITE_BUSY:
@@ -233,6 +238,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     if os.path.realpath(path) not in _open:
         check_plain(path)
     with contextlib.closing(connect(path, "mode=ro&immutable=1")) as database, damage_told():
+        _set_up(database)
         yield database
 
 

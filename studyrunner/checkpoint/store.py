@@ -230,7 +230,7 @@ class Store:
         with contextlib.suppress(StorageError):
             self.remove_forgotten()
             with faults_told(self.path), uninterrupted():
-                self._database.execute("PRAGMA incremental_vacuum").fetchall()
+                self._database.executescript("PRAGMA incremental_vacuum")
 
     def tick(self) -> None:
         """Called many times a second: hands over to the writer what waits, without delay after a pause.
