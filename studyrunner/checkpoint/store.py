@@ -12,8 +12,8 @@ import secrets
 import socket
 import sqlite3
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -33,7 +33,7 @@ MOST_BYTES_WAITING = 32e6
 """Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
 
 _BYTES_A_TRANSACTION = 8e6
-_LEVELS = {UNDER_WAY: 1}  # what is replaced after seconds is compressed fast
+_LEVELS = {UNDER_WAY: 1, COMPUTED: 1}  # compressed fast: what is replaced after seconds, and what is large
 _LEVEL = 6
 
 Name = tuple[str, str]
@@ -48,12 +48,8 @@ class _Entry:
     shown: Mapping[str, object]
 
 
-@dataclass
-class _Batch:
-    """Entries that are written in one transaction; None for one that is removed."""
-
-    entries: dict[Name, _Entry | None] = field(default_factory=dict)
-    n_bytes: float = 0.0
+Batch = dict[Name, _Entry | None]
+"""Entries that are written in one transaction; None for one that is removed."""
 
 
 class Store:
@@ -67,7 +63,9 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._waiting, self._handed_over = _Batch(), _Batch()
+        self._waiting: Batch = {}
+        self._handed_over: Batch = {}
+        self._n_bytes = 0.0  # that wait
         self._forgotten: set[Name] = set()
         self._used: set[str] = set()
         self._written = 0.0
@@ -122,20 +120,20 @@ class Store:
         """
         if packed.n_bytes > LARGEST:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
-        self._waiting.entries[table, key] = _Entry(packed, shown)
+        self._waiting[table, key] = _Entry(packed, shown)
         if finished:
-            self._waiting.entries[UNDER_WAY, finished] = None
-        self._waiting.n_bytes += packed.n_bytes
-        if self._waiting.n_bytes > _BYTES_A_TRANSACTION:
-            self._take(wait=self._waiting.n_bytes > MOST_BYTES_WAITING)
+            self._waiting[UNDER_WAY, finished] = None
+        self._n_bytes += packed.n_bytes
+        if self._n_bytes > _BYTES_A_TRANSACTION:
+            self._take(wait=self._n_bytes > MOST_BYTES_WAITING)
             if not self._writer.busy:
                 self._begin()
 
     def has(self, table: str, key: str) -> bool:
         """Whether there is an entry, on the disk or on its way."""
         for batch in (self._waiting, self._handed_over):
-            if (table, key) in batch.entries:
-                return batch.entries[table, key] is not None
+            if (table, key) in batch:
+                return batch[table, key] is not None
         return key in self._keys[table]
 
     def on_disk(self, table: str) -> Collection[str]:
@@ -145,8 +143,8 @@ class Store:
     def read(self, table: str, key: str) -> Packed | None:
         """Contents of an entry; None where there is none, or a damaged one. Raises StorageError."""
         for batch in (self._waiting, self._handed_over):
-            if (table, key) in batch.entries:
-                entry = batch.entries[table, key]
+            if (table, key) in batch:
+                entry = batch[table, key]
                 return None if entry is None else entry.packed
         if key not in self._keys[table]:
             return None
@@ -183,9 +181,12 @@ class Store:
         return self.read(COMPUTED, key)
 
     def forget(self, table: str, key: str) -> None:
-        """Makes an entry invalid in this run. A new entry replaces it, `remove_forgotten` removes it."""
-        for batch in (self._waiting, self._handed_over):
-            batch.entries.pop((table, key), None)
+        """Makes an entry invalid in this run. A new entry replaces it, `remove_forgotten` removes it.
+
+        Raises StorageError.
+        """
+        self._take(wait=True)
+        self._waiting.pop((table, key), None)
         if key in self._keys[table]:
             self._keys[table].discard(key)
             self._forgotten.add((table, key))
@@ -193,7 +194,7 @@ class Store:
     def remove_forgotten(self) -> None:
         """Removes what was forgotten from the disk, so that no later run finds it. Raises StorageError."""
         self.flush()
-        self._waiting.entries.update(dict.fromkeys(self._forgotten))
+        self._waiting.update(dict.fromkeys(self._forgotten))
         self.flush()
 
     def with_outcome(self, outcomes: Collection[str], *, other: bool = False) -> set[str]:
@@ -242,13 +243,13 @@ class Store:
         """
         self._take()
         late = time.monotonic() > self._written + SECONDS_A_TRANSACTION
-        if self._waiting.entries and late and not self._writer.busy:
+        if self._waiting and late and not self._writer.busy:
             self._begin()
 
     def flush(self) -> None:
         """Waits until everything is on the disk. Raises StorageError."""
         self._take(wait=True)
-        while self._waiting.entries:
+        while self._waiting:
             self._begin()
             self._take(wait=True)
 
@@ -265,52 +266,39 @@ class Store:
         """Makes everything that waits a job of the idle writer."""
         self._handed_over = self._waiting
         self._writer.begin(self._waiting)
-        self._waiting = _Batch()
+        self._waiting, self._n_bytes = {}, 0.0
         self._written = time.monotonic()
 
     def _take(self, *, wait: bool = False) -> None:
         self._writer.take(self._accept, self._refuse, wait=wait)
 
-    def _accept(self, batch: _Batch, written: Sequence[Name]) -> None:
+    def _accept(self, batch: Batch, _: None) -> None:
         """Notes what is on the disk now."""
-        for table, key in written:
-            self._forgotten.discard((table, key))
-            entry = batch.entries.get((table, key), _MISSING)
-            if isinstance(entry, _Entry):
-                self._keys[table].add(key)
-            elif entry is None:
+        self._forgotten.difference_update(batch)
+        for (table, key), entry in batch.items():
+            if entry is None:
                 self._keys[table].discard(key)
-            else:  # forgotten while it was written
-                self._forgotten.add((table, key))
-        self._handed_over = _Batch()
+            else:
+                self._keys[table].add(key)
+        self._handed_over = {}
 
-    def _refuse(self, batch: _Batch) -> None:
+    def _refuse(self, batch: Batch) -> None:
         """Puts a failed batch back to those that wait."""
-        waiting = self._waiting
-        self._waiting = _Batch(batch.entries | waiting.entries, batch.n_bytes + waiting.n_bytes)
-        self._handed_over = _Batch()
+        self._waiting, self._handed_over = batch | self._waiting, {}
 
-    def _write(self, batch: _Batch) -> Sequence[Name]:
+    def _write(self, batch: Batch) -> None:
         """The job of the writer: one transaction with all of a batch, or nothing of it. Raises StorageError."""
         now = datetime.now(UTC).isoformat(" ", "milliseconds")
-        entries = list(batch.entries.items())
         with faults_told(self.path):
-            rows = [(name, None if entry is None else self._row(name, entry, now)) for name, entry in entries]
+            rows = [(*name, None if entry is None else _row(name, entry, now)) for name, entry in batch.items()]
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
             with self._transaction():
-                for (table, key), row in rows:
+                for table, key, row in rows:
                     if row is None:
                         self._database.execute(f"DELETE FROM {table} WHERE key=?", [key])
                     else:
                         self._insert(table, row)
-        return [name for name, _ in entries]
-
-    def _row(self, name: Name, entry: _Entry, now: str) -> dict[str, object]:
-        table, key = name
-        size, content = compress(entry.packed, _LEVELS.get(table, _LEVEL))
-        own = {"key": key, "written": now, "size": size, "checksum": database.checksum(key, content)}
-        return {**entry.shown, **own, "content": content}
 
     def _insert(self, table: str, row: Mapping[str, object]) -> None:
         places = ", ".join("?" * len(row))
@@ -360,4 +348,8 @@ class Store:
             self.notes.append(f"{other.name} is not used: it is damaged, or another run writes it now")
 
 
-_MISSING = object()
+def _row(name: Name, entry: _Entry, now: str) -> dict[str, object]:
+    table, key = name
+    size, content = compress(entry.packed, _LEVELS.get(table, _LEVEL))
+    own = {"key": key, "written": now, "size": size, "checksum": database.checksum(key, content)}
+    return {**entry.shown, **own, "content": content}
