@@ -44,8 +44,8 @@ def run_study(
     """Run a study in this process, as the command `run-study` does, and open its result.
 
     What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
-    goes on where it was when it is called again, from here or by the command; what it needs for that is in the folder
-    `<output>.parts`. This process computes alone, one point after the other and with one thread of the linear algebra,
+    goes on where it was when it is called again, from here or by the command; what it needs for that is in the file
+    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear algebra,
     so that the numbers are those of the command to the last bit. For several processes give
     `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
 
@@ -64,7 +64,7 @@ def run_study(
     retry_failed
         Compute points that failed in an earlier run once more.
     prune
-        Remove what other studies have left in the folder, once this is finished.
+        Remove what other studies have left in this file, once this is finished.
     date
         `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
     progress

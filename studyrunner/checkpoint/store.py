@@ -98,6 +98,7 @@ class Store:
     def note_study(self, name: str, scene: str, tasks: Iterable[Mapping[str, object]]) -> None:
         """Writes the study that the file belongs to, and its tasks, for people. The run does not read them."""
         columns = database.columns("tasks")
+        self.flush()
         with faults_told(self.path), self._transaction():
             self._database.execute("UPDATE study SET name=?, scene=?", [name, scene])
             self._database.execute("DELETE FROM tasks")
@@ -264,10 +265,10 @@ class Store:
 
     def _begin(self) -> None:
         """Makes everything that waits a job of the idle writer."""
-        self._handed_over = self._waiting
-        self._writer.begin(self._waiting)
-        self._waiting, self._n_bytes = {}, 0.0
-        self._written = time.monotonic()
+        with uninterrupted():
+            self._handed_over, self._waiting, self._n_bytes = self._waiting, {}, 0.0
+            self._writer.begin(self._handed_over)
+            self._written = time.monotonic()
 
     def _take(self, *, wait: bool = False) -> None:
         self._writer.take(self._accept, self._refuse, wait=wait)
