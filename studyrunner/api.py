@@ -45,8 +45,8 @@ def run_study(
 
     What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
     goes on where it was when it is called again, from here or by the command; what it needs for that is in the file
-    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear algebra,
-    so that the numbers are those of the command to the last bit. For several processes give
+    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear
+    algebra, so that the numbers are those of the command to the last bit. For several processes give
     `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
 
     Parameters

@@ -12,7 +12,7 @@ from solver.clock import n_compiled
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.database import StoreInUseError
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.records import layout_of, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
@@ -237,7 +237,7 @@ def _prepare(
             remove_leftovers(path, alone=store.locked)
         completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store, kind)
         label = Label.of(study)
-        store.note_study(label.name, label.model, completion.describe_tasks())
+        store.note_study(label.name, label.model, layout_of(kind), completion.describe_tasks())
     except BaseException:
         store.close()
         raise

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.database import RESULTS, STARTS, UNDER_WAY
-from studyrunner.checkpoint.records import empty_record, pack_record, record_of, unpack_record
+from studyrunner.checkpoint.records import empty_record, pack_record, record_of, unpack_records, values_in
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
@@ -70,14 +70,11 @@ class CompletionIndex:
 
         Raises StorageError where the disk fails.
         """
-        records, there = np.repeat(empty_record(self.kind), len(keys)), np.zeros(len(keys), np.bool_)
-        for place, key in enumerate(keys):
-            packed = self.store.read(RESULTS, key)
-            if packed is not None:
-                try:
-                    records[place : place + 1], there[place] = unpack_record(packed, self.kind), True
-                except ValueError:
-                    self.store.forget(RESULTS, key)
+        values = [values_in(self.store.read(RESULTS, key), self.kind) for key in keys]
+        there = np.array([value is not None for value in values], np.bool_)
+        records = np.repeat(empty_record(self.kind), len(keys))
+        if there.any():
+            records[there] = unpack_records(np.stack([value for value in values if value is not None]), self.kind)
         return records, there
 
     @property

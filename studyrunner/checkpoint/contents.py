@@ -37,7 +37,7 @@ def compress(packed: Packed, level: int) -> tuple[int, bytes]:
     size = _HEAD_BYTES + len(head) + sum(array.nbytes for array in packed.arrays)
     stream = zlib.compressobj(level)
     pieces = [stream.compress(len(head).to_bytes(_HEAD_BYTES, "little") + head)]
-    pieces += [stream.compress(_sort_bytes(array)) for array in packed.arrays]
+    pieces += [stream.compress(sort_bytes(array)) for array in packed.arrays]
     return size, b"".join((*pieces, stream.flush()))
 
 
@@ -69,27 +69,27 @@ def _arrays_in(raw: memoryview, layout: Any) -> Iterator[NDArray[np.generic]]:
         n_bytes = kind.itemsize * math.prod(shape)
         if n_bytes > len(raw):
             raise ValueError("less than it says")
-        yield _join_bytes(raw[:n_bytes], kind, tuple(shape))
+        yield join_bytes(np.frombuffer(raw[:n_bytes], np.uint8)[None], kind, tuple(shape)).reshape(shape)
         raw = raw[n_bytes:]
     if len(raw):
         raise ValueError("more than it says")
 
 
-def _sort_bytes(array: NDArray[np.generic]) -> bytes:
-    """Bytes of an array, byte place by byte place."""
+def sort_bytes(array: NDArray[np.generic]) -> bytes:
+    """Bytes of an array of numbers or texts, byte place by byte place."""
     if _has_differences(array.dtype, array.shape):
         bits = np.asarray(array, order="C").view(np.uint64)
         array = np.concatenate([bits[:1], bits[1:] - bits[:-1]])
     return np.frombuffer(array.tobytes(), np.uint8).reshape(-1, _width(array.dtype)).T.tobytes()
 
 
-def _join_bytes(content: memoryview, kind: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[np.generic]:
-    """The array of `_sort_bytes`."""
-    places = np.frombuffer(content, np.uint8).reshape(_width(kind), -1)
-    array = np.frombuffer(bytearray(places.T.tobytes()), kind).reshape(shape)
+def join_bytes(content: NDArray[np.uint8], kind: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[np.generic]:
+    """Arrays (n, *shape) from the bytes (n, n_bytes) of n outputs of `sort_bytes`."""
+    places = content.reshape(len(content), _width(kind), -1).transpose(0, 2, 1)
+    arrays = np.frombuffer(bytearray(places.tobytes()), kind).reshape(len(content), *shape)
     if _has_differences(kind, shape):
-        array = np.add.accumulate(array.view("<u8"), axis=0).view(kind)
-    return array
+        arrays = np.add.accumulate(arrays.view("<u8"), axis=1).view(kind)
+    return arrays
 
 
 def _has_differences(kind: np.dtype[Any], shape: tuple[int, ...]) -> bool:

@@ -32,6 +32,7 @@ _CASE = "sweep TEXT, excitation_amplitude REAL, frequency REAL"
 _HISTORY = "scheme TEXT, wear_coefficient REAL, step REAL"
 _COLUMNS = {
     "study": "name TEXT, scene TEXT, run TEXT",
+    "layouts": "hash TEXT PRIMARY KEY NOT NULL, layout TEXT",
     "tasks": f"{_KEY}, kind TEXT, {_CASE}, {_HISTORY}, points INTEGER",
     STARTS: f"{_KEY}, {_CASE}, unknowns INTEGER, moves INTEGER, {_CONTENT}",
     UNDER_WAY: f"{_KEY}, kind TEXT, {_CASE}, {_HISTORY}, {_CONTENT}",
@@ -199,7 +200,7 @@ def check(database: sqlite3.Connection, *, create: bool = True) -> None:
         raise DamagedError("was written by another version of this program")
     if found != _SCHEMA or application != _APPLICATION:
         raise DamagedError("is no file of a run")
-    if database.execute("PRAGMA quick_check(1)").fetchall() != [("ok",)]:
+    if database.execute("PRAGMA integrity_check(1)").fetchall() != [("ok",)]:
         raise DamagedError("is damaged")
 
 

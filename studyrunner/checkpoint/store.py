@@ -95,12 +95,13 @@ class Store:
                 raise
         self._writer = Writer(self._write)
 
-    def note_study(self, name: str, scene: str, tasks: Iterable[Mapping[str, object]]) -> None:
-        """Writes the study that the file belongs to, and its tasks, for people. The run does not read them."""
+    def note_study(self, name: str, scene: str, layout: tuple[str, str], tasks: Iterable[Mapping[str, object]]) -> None:
+        """Writes the study that the file belongs to, and for people its tasks and the layout of its results."""
         columns = database.columns("tasks")
         self.flush()
         with faults_told(self.path), self._transaction():
             self._database.execute("UPDATE study SET name=?, scene=?", [name, scene])
+            self._database.execute("INSERT OR REPLACE INTO layouts VALUES (?, ?)", layout)
             self._database.execute("DELETE FROM tasks")
             self._database.executemany(
                 f"INSERT OR REPLACE INTO tasks VALUES ({', '.join('?' * len(columns))})",
@@ -214,13 +215,15 @@ class Store:
         self.flush()
         named = {table: frozenset(used.get(table, ())) for table in TABLES}
         named[COMPUTED] |= self._used
-        idle: list[tuple[str, int, Name]] = []
+        idle: list[tuple[str, int, int, Name]] = []
         with faults_told(self.path):
             for table in TABLES:
-                rows = self._database.execute(f"SELECT key, written, length(content) FROM {table}")
-                idle += [(when, n_bytes, (table, key)) for key, when, n_bytes in rows if key not in named[table]]
-        too_much = sum(n_bytes for _, n_bytes, _ in idle) - most
-        for _, n_bytes, (table, key) in sorted(idle):
+                rows = self._database.execute(f"SELECT key, written, rowid, length(content) FROM {table}")
+                idle += [
+                    (str(when), row, size, (table, key)) for key, when, row, size in rows if key not in named[table]
+                ]
+        too_much = sum(size for _, _, size, _ in idle) - most
+        for _, _, n_bytes, (table, key) in sorted(idle):
             if too_much <= 0.0:
                 break
             too_much -= n_bytes
@@ -256,12 +259,14 @@ class Store:
 
     def close(self) -> None:
         """Writes what waits, as far as there is room, and closes the file."""
-        # an error was said before, or there is nothing that waits for an answer
-        with contextlib.suppress(StorageError):
-            self.flush()
-        self._writer.close()
-        with contextlib.suppress(sqlite3.Error):
-            database.close(self._database, self.path)
+        try:
+            # an error was said before, or there is nothing that waits for an answer
+            with contextlib.suppress(StorageError):
+                self.flush()
+        finally:
+            self._writer.close()
+            with contextlib.suppress(sqlite3.Error):
+                database.close(self._database, self.path)
 
     def _begin(self) -> None:
         """Makes everything that waits a job of the idle writer."""
@@ -289,7 +294,7 @@ class Store:
 
     def _write(self, batch: Batch) -> None:
         """The job of the writer: one transaction with all of a batch, or nothing of it. Raises StorageError."""
-        now = datetime.now(UTC).isoformat(" ", "milliseconds")
+        now = datetime.now(UTC).isoformat(" ", "seconds")[:19]
         with faults_told(self.path):
             rows = [(*name, None if entry is None else _row(name, entry, now)) for name, entry in batch.items()]
             if self.path.stat().st_ino != self._file:

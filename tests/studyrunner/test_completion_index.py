@@ -276,7 +276,7 @@ def test_a_study_that_starts_over_leaves_those_of_others(finished: Path) -> None
 
 def test_a_person_can_read_the_file(finished: Path) -> None:
     with completion_of(finished) as completion:
-        completion.store.note_study("a joint", "sdof_slider", completion.describe_tasks())
+        completion.store.note_study("a joint", "sdof_slider", ("hash", "layout"), completion.describe_tasks())
         march = completion.plan.marches[1][2]
         completion.keep(march, Packed("march", ()))
         completion.keep(completion.plan.branches[1], Packed("branch", ()))

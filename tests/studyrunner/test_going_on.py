@@ -78,7 +78,7 @@ def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.Captur
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 2, 3, 6, 9])
-@pytest.mark.parametrize("where", ["flush", "_write", "add_history"])
+@pytest.mark.parametrize("where", ["flush", "_begin", "put"])
 def test_an_interrupt_anywhere_in_the_main_thread(
     where: str, at: int, solver: Solver, monkeypatch: pytest.MonkeyPatch
 ) -> None:

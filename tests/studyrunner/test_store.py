@@ -294,7 +294,6 @@ def test_pruning_keeps_what_is_named(path: Path) -> None:
 def test_of_what_is_not_named_the_latest_stays(path: Path) -> None:
     for number in range(6):
         fill(path, range(number, number + 1), (RESULTS,))
-        time.sleep(0.002)
     with contextlib.closing(Store(path)) as store:
         (size,) = store._database.execute("SELECT max(length(content)) FROM results").fetchone()
         store.prune({RESULTS: {key(1)}}, 2.5 * size)
@@ -595,10 +594,12 @@ def test_a_run_waits_for_the_end_of_one_that_is_just_dying(path: Path, monkeypat
 
 def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store) -> None:
     assert database.read_study(path) is None
-    opened.note_study("joint", "sdof_slider", [{"key": key(1), "kind": "sweep", "frequency": 100.0}])
+    opened.note_study(
+        "joint", "sdof_slider", ("hash", "layout"), [{"key": key(1), "kind": "sweep", "frequency": 100.0}]
+    )
     assert database.read_study(path) == ("joint", "sdof_slider")
     assert database.read_study(path.with_name("none")) is None
-    opened.note_study("joint", "two_masses", [])
+    opened.note_study("joint", "two_masses", ("hash", "layout"), [])
     opened.close()
     assert database.read_study(path) == ("joint", "two_masses")
     assert shutil.which("sqlite3") is None or b"two_masses" in subprocess.check_output(
