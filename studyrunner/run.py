@@ -290,7 +290,7 @@ def _tidy(completion: CompletionIndex, folder: Path, *, prune: bool) -> None:
     completion.prune(0.0 if prune else MOST_OF_OTHERS)
     # The result is written. The next run does what a signal interrupts.
     try:
-        completion.shrink()
+        completion.store.shrink()
     except KeyboardInterrupt:
         begin_ending()
 

@@ -222,20 +222,16 @@ class CompletionIndex:
         self.store.remove_forgotten()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
-        """Removes results of other studies until they take at most so many bytes.
+        """Removes what a finished study does not need, and results of others until they take at most so many bytes.
 
         With 0 bytes only results of this study stay.
         """
-        starts = set(itertools.chain.from_iterable(self._starts))
-        self.store.prune({RESULTS: self._all_histories(), STARTS: starts, UNDER_WAY: self.keys}, most)
-
-    def shrink(self) -> None:
-        """Removes what a finished study does not need; the last call before the file is closed."""
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             # nothing is left to be followed; that of a march which was given up for its time is what it goes on from
             if all(self.store.has(STARTS, key) for key in keys):
                 self.store.forget(UNDER_WAY, self.key(branch))
-        self.store.shrink()
+        starts = set(itertools.chain.from_iterable(self._starts))
+        self.store.prune({RESULTS: self._all_histories(), STARTS: starts, UNDER_WAY: self.keys}, most)
 
     def _all_histories(self) -> set[str]:
         return set(itertools.chain.from_iterable(self._histories.values()))

@@ -98,7 +98,7 @@ class Store:
     def note_study(self, name: str, scene: str, layout: tuple[str, str], tasks: Iterable[Mapping[str, object]]) -> None:
         """Writes the study that the file belongs to, and for people its tasks and the layout of its results."""
         columns = database.columns("tasks")
-        self.flush()
+        self._take(wait=True)
         with faults_told(self.path), self._transaction():
             self._database.execute("UPDATE study SET name=?, scene=?", [name, scene])
             self._database.execute("INSERT OR REPLACE INTO layouts VALUES (?, ?)", layout)
@@ -195,8 +195,7 @@ class Store:
 
     def remove_forgotten(self) -> None:
         """Removes what was forgotten from the disk, so that no later run finds it. Raises StorageError."""
-        self.flush()
-        self._waiting.update(dict.fromkeys(self._forgotten))
+        self._waiting.update(dict.fromkeys(self._forgotten.difference(self._waiting)))
         self.flush()
 
     def with_outcome(self, outcomes: Collection[str], *, other: bool = False) -> set[str]:
@@ -231,11 +230,10 @@ class Store:
         self.remove_forgotten()
 
     def shrink(self) -> None:
-        """Removes what was forgotten, and gives its room back to the disk. A full disk only keeps the file larger."""
-        with contextlib.suppress(StorageError):
-            self.remove_forgotten()
-            with faults_told(self.path), uninterrupted():
-                self._database.executescript("PRAGMA incremental_vacuum")
+        """Gives the room of what was removed back to the disk. A full disk only keeps the file larger."""
+        self._take(wait=True)
+        with contextlib.suppress(StorageError), faults_told(self.path), uninterrupted():
+            self._database.executescript("PRAGMA incremental_vacuum")
 
     def tick(self) -> None:
         """Called many times a second: hands over to the writer what waits, without delay after a pause.

@@ -309,6 +309,7 @@ def test_room_is_given_back_at_the_end(path: Path) -> None:
         store.flush()
         assert path.stat().st_size > 0.9 * random_numbers.nbytes
         store.forget(UNDER_WAY, key(1))
+        store.remove_forgotten()
         store.shrink()
     assert path.stat().st_size < 10**5
     with contextlib.closing(Store(path)) as store:
