@@ -19,8 +19,7 @@ from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.result import open_vetted
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
-from studyrunner.run import Interrupted, RunOptions, serve_study
-from studyrunner.scene.computed import InMemory
+from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -45,9 +44,9 @@ def run_study(
     """Run a study in this process, as the command `run-study` does, and open its result.
 
     What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
-    goes on where it was when it is called again, from here or by the command; what it needs for that is in the folder
-    `<output>.parts`. This process computes alone, one point after the other and with one thread of the linear algebra,
-    so that the numbers are those of the command to the last bit. For several processes give
+    goes on where it was when it is called again, from here or by the command; what it needs for that is in the file
+    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear
+    algebra, so that the numbers are those of the command to the last bit. For several processes give
     `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
 
     Parameters
@@ -65,7 +64,7 @@ def run_study(
     retry_failed
         Compute points that failed in an earlier run once more.
     prune
-        Remove what other studies have left in the folder, once this is finished.
+        Remove what other studies have left in this file, once this is finished.
     date
         `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
     progress
@@ -99,19 +98,15 @@ def run_study(
     target = _check_output(path, study, overwrite=overwrite)
     try:
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-        with threadpool_limits(1), ProgressDisplay() if progress else SilentProgress() as shown:
+        with (
+            threadpool_limits(1),
+            open_progress(target) as store,
+            ProgressDisplay() if progress else SilentProgress() as shown,
+        ):
             alone = Alone()
-            computed = InMemory()
-            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study, computed=computed))
-            serve_study(
-                alone,
-                study,
-                model,
-                target,
-                computed,
-                shown,
-                RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked),
-            )
+            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study, computed=store))
+            given = RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked)
+            serve_study(alone, study, model, target, store, shown, given)
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left

@@ -219,34 +219,26 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, RunOptions, serve_study
-    from studyrunner.scene.computed import InMemory
+    from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
     from studyrunner.scene.scene import build_study_scene
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
-    # Before anything is said: a wrong scene is bad input, which ends with one line.
-    computed = InMemory()
-    model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say, computed))
-    for line in compare_with_archived(study, model.value):
-        print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
+    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date)
     try:
-        with progress:
-            if ranks.size == 1 and (announced := job_size()) > 1:
-                progress.note(f"one process, although the job has room for {announced}: srun or mpiexec starts them")
-            summary = serve_study(
-                ranks,
-                study,
-                model,
-                target,
-                computed,
-                progress,
-                RunOptions(
-                    fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date
-                ),
-            )
+        with open_progress(target) as store:
+            # Before anything is said: a wrong scene is bad input, which ends with one line.
+            model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say, store))
+            for line in compare_with_archived(study, model.value):
+                print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
+            with progress:
+                if ranks.size == 1 and (announced := job_size()) > 1:
+                    progress.note(
+                        f"one process, although the job has room for {announced}: srun or mpiexec starts them"
+                    )
+                summary = serve_study(ranks, study, model, target, store, progress, given)
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
         kept = f"{done} are kept, {path} is the finished result that it was"

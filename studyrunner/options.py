@@ -33,7 +33,7 @@ exit status:
   130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
 
 A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
-is in the folder OUT.nc.parts; with it a study that is changed computes only what is new. It may be removed."""
+is in the file OUT.nc.progress; with it a study that is changed computes only what is new. It may be removed."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def parse_options(arguments: Sequence[str]) -> Options:
     parser.add_argument(
         "--prune",
         action="store_true",
-        help="remove what other studies have left in OUT.nc.parts, once this is finished",
+        help="remove what other studies have left in OUT.nc.progress, once this is finished",
     )
     parser.add_argument(
         "--date",

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from solver.clock import n_compiled
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.database import StoreInUseError
+from studyrunner.checkpoint.records import layout_of, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
@@ -25,8 +26,8 @@ from studyrunner.mpi.crashes import (
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
-from studyrunner.netcdf.existing_result import Target, note_study
-from studyrunner.netcdf.output import parts_folder, remove_leftovers
+from studyrunner.netcdf.existing_result import Label, Target
+from studyrunner.netcdf.output import crash_folder, older_folder, progress_file, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
@@ -38,19 +39,15 @@ from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending
-from studyrunner.system.folder_lock import StoreInUseError
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_progress import TaskProgress, fault_of
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
     from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.gather import Gathered
-    from studyrunner.scene.computed import Computed
 
 
 class Interrupted(KeyboardInterrupt):
@@ -67,12 +64,12 @@ class Job:
 
     friction_coefficient: of all pairs; None where each pair has its own.
     law: wear law.
-    folder: of the run; not every rank needs to see it.
+    crashes: folder of the notes on crashes; not every rank needs to see it.
     """
 
     friction_coefficient: float | None
     law: WearLaw
-    folder: Path
+    crashes: Path
 
 
 @dataclass(frozen=True)
@@ -101,9 +98,9 @@ class RunSummary:
 class RunOptions:
     """What a run does with earlier results, and the date in the file.
 
-    fresh: whether the run begins anew. Else the run continues what is in the folder.
-    retry_failed: whether failed points in the folder are computed again.
-    prune: whether results of other studies in the folder are removed at the end.
+    fresh: whether the run begins anew. Else the run continues what an earlier one has left.
+    retry_failed: whether failed points are computed again.
+    prune: whether results of other studies beside the result are removed at the end.
     date: date of creation, as `check_date` gives it; None for no date in the file.
     """
 
@@ -158,12 +155,33 @@ class _ResultWriter:
         return _summarise(self.plan, n_found, gathered, target.finished)
 
 
+@contextlib.contextmanager
+def open_progress(target: Target) -> Iterator[Store]:
+    """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file.
+
+    Raises
+    ------
+    UserError
+        Where another run uses the file.
+    StorageError
+        Where the file cannot be written.
+    """
+    path = progress_file(target.path)
+    try:
+        store = Store(path)
+    except StoreInUseError as error:
+        remedy = "another run is writing there: wait for its end, or give another result file with -o"
+        raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
+    with contextlib.closing(store):
+        yield store
+
+
 def serve_study(
     ranks: Ranks,
     study: Study,
     broadcast: Broadcast[ReducedModel],
     target: Target,
-    computed: Computed,
+    store: Store,
     progress: ProgressDisplay,
     options: RunOptions,
 ) -> RunSummary:
@@ -178,9 +196,9 @@ def serve_study(
     broadcast
         The reduced model of the scene, which every rank gets.
     target
-        The result file, as `check_result` gives it. The folder of an earlier run lies beside the file.
-    computed
-        Holds what takes long and is the same in each run, such as the natural frequencies of the scene.
+        The result file, as `check_result` gives it.
+    store
+        The open file of the progress, as `open_progress` gives it, with what an earlier run has left.
     progress
         What the user sees during the run.
     options
@@ -189,22 +207,23 @@ def serve_study(
     Raises
     ------
     UserError
-        Where another run uses the folder.
+        Where another run uses the file of the progress.
     StorageError
         Where something cannot be written.
     Interrupted
         Where the run is ended from outside; finished points have been written.
     """
-    store, completion, writer = _prepare(study, broadcast.value, target, computed, progress, options)
-    with contextlib.closing(store):
-        n_found = _begin(completion, writer.plan.n_points, options, progress)
+    completion, writer = _prepare(study, broadcast.value, target, store, progress, options)
+    crashes = crash_folder(target.path)
+    with _crash_notes(crashes):
+        n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
             broadcast.send()
-            job = Job(study.friction_coefficient, study.wear_law, store.folder)
+            job = Job(study.friction_coefficient, study.wear_law, crashes)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
             with _evaluator(broadcast.value, job, rank=0) as evaluate:
-                run_tasks(ranks, completion, evaluate, progress)
+                run_tasks(ranks, completion, crashes, evaluate, progress)
             progress.say("writing the result")
             summary = writer.write(completion, n_found, progress)
         except BaseException as error:
@@ -213,7 +232,7 @@ def serve_study(
             begin_ending()
             raise Interrupted(writer.write(completion, n_found, progress)) from None
         if summary.n_left == 0:
-            _tidy(completion, prune=options.prune)
+            _tidy(completion, crashes, prune=options.prune)
     return summary
 
 
@@ -221,11 +240,11 @@ def _prepare(
     study: Study,
     model: ReducedModel,
     target: Target,
-    computed: Computed,
+    store: Store,
     progress: ProgressDisplay,
     options: RunOptions,
-) -> tuple[Store, CompletionIndex, _ResultWriter]:
-    """The open folder of the run, the index of finished points, and the writer of the result.
+) -> tuple[CompletionIndex, _ResultWriter]:
+    """The index of finished points, and the writer of the result.
 
     Raises UserError where the scene lacks what the study asks for, before anything is computed.
     """
@@ -233,34 +252,54 @@ def _prepare(
     plan = build_tasks(study, facts.n_displacements)
     if "natural_frequency" in study.outputs.variables:
         progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model, computed)
+    of_scene = build_scene_variables(study, model, store)
     kept_scene = scene_to_keep(study, model)
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
-    store = _open_store(parts_folder(target.path), kind)
-    try:
-        note_study(target.path, study)
-        said = doubts_of_study(study)
-        for note in (*store.notes, *said):
-            progress.note(note)
-        remove_leftovers(target.path, alone=store.locked)
-        completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store)
-    except BaseException:
-        store.close()
-        raise
+    said = doubts_of_study(study)
+    for note in (*store.notes, *_older(target.path), *said):
+        progress.note(note)
+    for path in (target.path, progress_file(target.path)):
+        remove_leftovers(path, alone=store.locked)
+    completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store, kind)
+    label = Label.of(study)
+    store.note_study(label.name, label.model, layout_of(kind), completion.describe_tasks())
     writer = _ResultWriter(study, plan, facts, of_scene, kept_scene, target, software, options.date, said)
-    return store, completion, writer
+    return completion, writer
 
 
-def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, progress: ProgressDisplay) -> int:
+def _older(target: Path) -> list[str]:
+    """A sentence where a folder of an earlier version stands beside a result."""
+    folder = older_folder(target)
+    if not folder.is_dir():
+        return []
+    return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]
+
+
+@contextlib.contextmanager
+def _crash_notes(folder: Path) -> Iterator[None]:
+    """The folder of the notes on crashes, which goes with the run where it is empty."""
+    # a disk that is full is met by what is written next
+    with contextlib.suppress(OSError):
+        folder.mkdir(exist_ok=True)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+def _begin(
+    completion: CompletionIndex, folder: Path, n_points: int, options: RunOptions, progress: ProgressDisplay
+) -> int:
     """Applies the options to the results of earlier runs; returns the number of finished points."""
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
         # Before crashes are counted: a task that has ended two more processes has failed again.
         completion.forget_failed(COMPLETE)
-    for crash in take_crashes(completion, fresh=options.fresh):
+    for crash in take_crashes(completion, folder, fresh=options.fresh):
         if completion.is_left(crash.key):
             progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
     n_found = completion.n_points_finished
@@ -269,24 +308,26 @@ def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, prog
     return n_found
 
 
-def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
-    """Removes what a finished study no longer needs, and packs the rest."""
-    forget_crashes(completion.store.folder, None if prune else completion.keys - _tried_again(completion))
+def _tidy(completion: CompletionIndex, folder: Path, *, prune: bool) -> None:
+    """Removes what a finished study no longer needs. folder: of the notes on crashes."""
+    forget_crashes(folder, None if prune else completion.keys - _tried_again(completion, folder))
     completion.prune(0.0 if prune else MOST_OF_OTHERS)
-    # The result is written. What a signal keeps from being packed is packed by the next run.
+    # The result is written. The next run does what a signal interrupts.
     try:
-        completion.pack()
+        completion.store.shrink()
     except KeyboardInterrupt:
         begin_ending()
 
 
-def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Crash]:
+def take_crashes(completion: CompletionIndex, folder: Path, *, fresh: bool = False) -> list[Crash]:
     """Marks the points of tasks as failed that have ended two processes in earlier runs.
 
     Parameters
     ----------
     completion
-        The finished tasks in the folder of the run.
+        The finished tasks.
+    folder
+        Folder of the notes on crashes.
     fresh
         Whether earlier crashes of the tasks of this study do not count.
 
@@ -295,7 +336,7 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
     list of Crash
         New crashes of tasks that have crashed once.
     """
-    folder, own = completion.store.folder, completion.keys
+    own = completion.keys
     new = count_crashes(folder)
     if fresh:
         forget_crashes(folder, own)
@@ -308,18 +349,10 @@ def take_crashes(completion: CompletionIndex, *, fresh: bool = False) -> list[Cr
     return [crash for crash in new if crash.key in tally]
 
 
-def _tried_again(completion: CompletionIndex) -> set[str]:
+def _tried_again(completion: CompletionIndex, folder: Path) -> set[str]:
     """Tasks that had crashed too often, were tried again and have crashed once more."""
-    tally = {key for key, crashes in read_tally(completion.store.folder).items() if len(crashes) < MOST_DEATHS}
+    tally = {key for key, crashes in read_tally(folder).items() if len(crashes) < MOST_DEATHS}
     return tally & completion.tasks_with(Outcome.CRASHED) if tally else set()
-
-
-def _open_store(folder: Path, kind: np.dtype[np.void]) -> Store:
-    try:
-        return Store(folder, kind)
-    except StoreInUseError as error:
-        remedy = "another run is writing there: wait for its end, or give another result file with -o"
-        raise UserError(str(folder), "in use", Verbatim(f"by {error}"), remedy) from None
 
 
 def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: bool) -> RunSummary:
@@ -369,12 +402,14 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
             raise_ending()
             yield from failed_results(task, n_given, error)
 
-    return note_tasks(evaluate, job.folder, rank)
+    return note_tasks(evaluate, job.crashes, rank)
 
 
-def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, progress: ProgressDisplay) -> None:
-    """Rank 0: has the remaining tasks done and their results saved."""
-    tally = read_tally(completion.store.folder)
+def run_tasks(
+    ranks: Ranks, completion: CompletionIndex, folder: Path, evaluate: Evaluate, progress: ProgressDisplay
+) -> None:
+    """Rank 0: has the remaining tasks done and their results saved. folder: of the notes on crashes."""
+    tally = read_tally(folder)
     tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
@@ -398,7 +433,7 @@ def run_tasks(ranks: Ranks, completion: CompletionIndex, evaluate: Evaluate, pro
     def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
         had = f", which had {count(len(lost), 'task')}" if lost else ""
         progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in count_crashes(completion.store.folder, rank)}
+        crashes = {crash.key: crash for crash in count_crashes(folder, rank)}
         return tasks.take_back(lost, crashes)
 
     known: int | None = n_compiled()

@@ -1,1 +1,1 @@
-"""The folder of a run, OUT.nc.parts. Finished results are saved at once, so that a later run can continue."""
+"""The progress of a study, OUT.nc.progress: one SQLite file. A later run continues from what is in the file."""

@@ -1,16 +1,18 @@
-"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the folder of a run."""
+"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.records import pack
-from studyrunner.checkpoint.segment_index import Place
+from studyrunner.checkpoint.database import RESULTS, STARTS, UNDER_WAY
+from studyrunner.checkpoint.records import empty_record, pack_record, record_of, unpack_records, values_in
 from studyrunner.checkpoint.store import Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
@@ -21,14 +23,16 @@ MOST_OF_OTHERS = 2.0**30
 
 
 class CompletionIndex:
-    """Finished wear histories and start states of a plan, in a folder that may contain results of earlier runs.
+    """Finished wear histories and start states of a plan, in a file that may contain results of earlier runs.
 
     The results of a task do not depend on earlier results: a continued run ends with the same numbers.
+    kind: data type of a record, as `record_type` gives it.
     """
 
-    def __init__(self, plan: TaskPlan, identities: Identities, store: Store) -> None:
+    def __init__(self, plan: TaskPlan, identities: Identities, store: Store, kind: np.dtype[np.void]) -> None:
         self.plan = plan
         self.store = store
+        self.kind = kind
         self._starts = [identities.of_starts(branch) for branch in plan.branches]
         self._branches = [identities.of_branch(branch) for branch in plan.branches]
         self._histories: dict[int, tuple[str, ...]] = {}
@@ -56,13 +60,22 @@ class CompletionIndex:
             if key in (self.key(branch), self.key(march))
         )
 
-    def places(self, march: MarchTask) -> tuple[Place | None, ...]:
-        """Places of the histories of a task in the folder; None for unfinished histories."""
-        return tuple(self.store.histories.get(key) for key in self._histories[march.number])
-
     def is_finished(self, march: MarchTask) -> bool:
         """Whether all histories of a task are on the disk."""
-        return all(key in self.store.histories for key in self._histories[march.number])
+        known = self.store.on_disk(RESULTS)
+        return all(key in known for key in self._histories[march.number])
+
+    def read_histories(self, keys: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
+        """Records (n,) of the histories with these hashes, and whether each exists; else the record is empty.
+
+        Raises StorageError where the disk fails.
+        """
+        values = [values_in(self.store.read(RESULTS, key), self.kind) for key in keys]
+        there = np.array([value is not None for value in values], np.bool_)
+        records = np.repeat(empty_record(self.kind), len(keys))
+        if there.any():
+            records[there] = unpack_records(np.stack([value for value in values if value is not None]), self.kind)
+        return records, there
 
     @property
     def n_points_finished(self) -> int:
@@ -79,7 +92,7 @@ class CompletionIndex:
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             needed = self._needed(branch)
             known = frozenset(
-                place for place, key in enumerate(keys) if place not in needed or self.store.has_start(key)
+                place for place, key in enumerate(keys) if place not in needed or self.store.has(STARTS, key)
             )
             if len(known) < len(keys):
                 key = self.key(branch)
@@ -89,11 +102,8 @@ class CompletionIndex:
     def known_starts(self, branch: BranchTask) -> list[StartResult]:
         """Known start states of a branch from which a history is still to be computed."""
         keys, needed = self._starts[branch.number], self._needed(branch)
-        return [
-            unpack_start(place, self.store.read_start(key))
-            for place, key in enumerate(keys)
-            if place in needed and self.store.has_start(key)
-        ]
+        found = ((place, self.store.read(STARTS, key)) for place, key in enumerate(keys) if place in needed)
+        return [unpack_start(place, start) for place, start in found if start is not None]
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """Unfinished tasks of wear histories from one start state, each with its progress."""
@@ -110,48 +120,55 @@ class CompletionIndex:
         resume = self.store.read_progress(self.key(task))
         if isinstance(task, MarchTask):
             return replace(task, resume=resume)
-        given = {place for place, key in enumerate(self._starts[task.number]) if self.store.has_start(key)}
+        given = {place for place, key in enumerate(self._starts[task.number]) if self.store.has(STARTS, key)}
         return replace(task, resume=resume, known=task.known | given)
 
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
         """Adds a start state."""
-        self.store.add_start(self._starts[branch.number][result.position], result.pack())
+        shown = {**_case(branch, result.position), "unknowns": result.n_unknowns, "moves": result.moves}
+        self.store.put(STARTS, self._starts[branch.number][result.position], result.pack(), shown)
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """Adds a history."""
-        key = self._histories[march.number][result.place]
+        key, record = self._histories[march.number][result.place], record_of(self.kind, result)
         ended = result.place == march.n_results - 1 and result.progress is None
-        self.store.add_history(key, pack(self.store.kind, key, result), self.key(march) if ended else "")
+        finished = self.key(march) if ended else ""
+        shown = {**self._shown(march, result.place), **_totals(record)}
+        self.store.put(RESULTS, key, pack_record(record), shown, finished)
         if result.progress is not None:
-            self.store.keep_progress(self.key(march), result.progress)
+            self.keep(march, result.progress)
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """Adds the progress of a task."""
         if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
-        self.store.keep_progress(self.key(task), progress)
+        self.store.keep_progress(self.key(task), progress, {"kind": _kind(task), **self._shown(task)})
+
+    def describe_tasks(self) -> Iterator[dict[str, object]]:
+        """All tasks, for people who read the file."""
+        tasks: list[BranchTask | MarchTask] = [*self.plan.branches, *itertools.chain.from_iterable(self.plan.marches)]
+        for task in tasks:
+            points = len(task.points) if isinstance(task, MarchTask) else None
+            yield {"key": self.key(task), "kind": _kind(task), "points": points, **self._shown(task)}
 
     def forget_failed(self, complete: Collection[int]) -> None:
         """Marks failed points as not computed. complete: outcomes of points that did not fail."""
-        failed = self.store.select(lambda records: ~np.isin(records["outcome"], list(complete)))
+        failed = self.store.with_outcome({Outcome(number).meaning for number in complete}, other=True)
         for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
-            without_state = {
-                place
-                for place, key in enumerate(keys)
-                if self.store.has_start(key) and unpack_start(place, self.store.read_start(key)).failed
-            }
+            starts = ((place, self.store.read(STARTS, key)) for place, key in enumerate(keys))
+            without_state = {place for place, start in starts if start and unpack_start(place, start).failed}
             for place in without_state:
-                self.store.forget_start(keys[place])
+                self.store.forget(STARTS, keys[place])
             if without_state:
-                self.store.forget_progress(self.key(branch))
+                self.store.forget(UNDER_WAY, self.key(branch))
             for march in line:
                 for key in self._histories[march.number]:
                     if key in failed or march.position in without_state:
-                        self.store.forget_history(key)
+                        self.store.forget(RESULTS, key)
 
     def tasks_with(self, outcome: int) -> set[str]:
         """Hashes of the wear histories with a point of this outcome, and of their branches."""
-        found = self.store.select(lambda records: records["outcome"] == outcome)
+        found = self.store.with_outcome({Outcome(outcome).meaning})
         return {
             key
             for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
@@ -183,12 +200,12 @@ class CompletionIndex:
             lost: set[int] = set()
             if self.key(branch) == key and position in branch.order:
                 behind = branch.order[branch.order.index(position) :]
-                lost = {place for place in behind if not self.store.has_start(starts[place])}
+                lost = {place for place in behind if not self.store.has(STARTS, starts[place])}
             for march in line:
                 if self.key(march) != key and march.position not in lost:
                     continue
-                for place, known in enumerate(self.places(march)):
-                    if known is None:
+                for place, history in enumerate(self._histories[march.number]):
+                    if history not in self.store.on_disk(RESULTS):
                         n_points += len(march.histories[place].points)
                         self.add_history(march, failed_result(march, place, outcome, message))
         self.store.flush()
@@ -197,27 +214,24 @@ class CompletionIndex:
     def forget_all(self) -> None:
         """Marks all points of this study as not computed. Results of other studies stay."""
         for key in self._all_histories():
-            self.store.forget_history(key)
+            self.store.forget(RESULTS, key)
         for key in itertools.chain.from_iterable(self._starts):
-            self.store.forget_start(key)
+            self.store.forget(STARTS, key)
         for key in self.keys:
-            self.store.forget_progress(key)
+            self.store.forget(UNDER_WAY, key)
         self.store.remove_forgotten()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
-        """Removes results of other studies until they take at most so many bytes.
+        """Removes what a finished study does not need, and results of others until they take at most so many bytes.
 
         With 0 bytes only results of this study stay.
         """
-        self.store.prune(self._all_histories(), set(itertools.chain.from_iterable(self._starts)), self.keys, most)
-
-    def pack(self) -> None:
-        """Packs the folder of a finished study; the last call before the folder is closed."""
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             # nothing is left to be followed; that of a march which was given up for its time is what it goes on from
-            if all(self.store.has_start(key) for key in keys):
-                self.store.forget_progress(self.key(branch))
-        self.store.pack()
+            if all(self.store.has(STARTS, key) for key in keys):
+                self.store.forget(UNDER_WAY, self.key(branch))
+        starts = set(itertools.chain.from_iterable(self._starts))
+        self.store.prune({RESULTS: self._all_histories(), STARTS: starts, UNDER_WAY: self.keys}, most)
 
     def _all_histories(self) -> set[str]:
         return set(itertools.chain.from_iterable(self._histories.values()))
@@ -226,3 +240,32 @@ class CompletionIndex:
         """Indices of the frequencies of a branch from which a history is still to be computed."""
         line = self.plan.marches[branch.number]
         return frozenset(march.position for march in line if not self.is_finished(march))
+
+    def _shown(self, task: BranchTask | MarchTask, place: int = 0) -> dict[str, object]:
+        """Columns of the file that describe a task, or a history of the task."""
+        if isinstance(task, BranchTask):
+            position = next(iter(task.order_left), task.order[-1])
+            return _case(task, position)
+        branch, history = self.plan.branches[task.branch], task.histories[place]
+        own = {"scheme": task.scheme, "wear_coefficient": history.wear_coefficient, "step": history.step}
+        return {**_case(branch, task.position), **own}
+
+
+def _kind(task: BranchTask | MarchTask) -> str:
+    return "sweep" if isinstance(task, BranchTask) else "integration"
+
+
+def _case(branch: BranchTask, position: int) -> dict[str, object]:
+    """Columns of the file that describe a start state."""
+    frequency = branch.frequencies[position]
+    return {"sweep": branch.sweep, "excitation_amplitude": branch.excitation_amplitude, "frequency": frequency}
+
+
+def _totals(record: NDArray[np.void]) -> dict[str, object]:
+    """Columns of the file that describe a result."""
+    shown: dict[str, object] = {name: record[name][0].item() for name in ("last_cycle", "error_estimate", "run_time")}
+    if "worn_volume" in (record.dtype.names or ()):
+        known = record["worn_volume"][0][np.isfinite(record["worn_volume"][0])]
+        shown["worn_volume"] = known[-1].item() if len(known) else None
+    outcome = Outcome(record["outcome"][0].item()).meaning
+    return {**shown, "outcome": outcome, "message": str(record["message"][0]) or None}

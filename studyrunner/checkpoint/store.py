@@ -1,156 +1,241 @@
-"""The folder of a study: finished results are saved a moment later, and a later run continues from them.
+"""What a study has computed so far, in one file beside the result: written within a second or so, read by a later run.
 
-The folder stands beside the result file. Rank 0 writes all files, as other ranks may not see the folder. A thread
-writes; results that arrive meanwhile go into the next files together, so that a slow disk gets fewer and larger files.
-Files of about one size are merged during the run. File names differ from those of any other run: on a file system
-without locks two runs in one folder do not damage each other's files.
+Rank 0 alone uses the file. A thread writes, as a transaction waits for the disk; what arrives meanwhile goes into the
+next transaction. The connection is used by one thread at a time: who reads waits until the writer has ended.
 """
 
 from __future__ import annotations
 
-import math
+import contextlib
+import os
 import secrets
+import socket
+import sqlite3
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from solver.packing import Packed
-from studyrunner.checkpoint.folder_contents import read_folder
-from studyrunner.checkpoint.packed_files import PACKED
-from studyrunner.checkpoint.part_files import load_records, read_entry
-from studyrunner.checkpoint.part_writer import PROGRESS, RECORDS, STARTS, Batch, Job, Merge, PartWriter, Written
-from studyrunner.checkpoint.segment_index import PartFile, Place, SegmentIndex
+from studyrunner.checkpoint import database
+from studyrunner.checkpoint.contents import LARGEST, compress, decompress
+from studyrunner.checkpoint.database import COMPUTED, TABLES, UNDER_WAY, DamagedError, faults_told
 from studyrunner.checkpoint.writer import Writer
-from studyrunner.system.files import NotPlainError, sync_folder
-from studyrunner.system.folder_lock import FolderLock
+from studyrunner.system.endings import uninterrupted
+from studyrunner.system.files import NotPlainError, has_locks
 from studyrunner.user_error import StorageError
 
-SECONDS_A_FILE = 0.25
-"""Longest time, s, that a result waits for others that go into the same file."""
-
-SECONDS_A_PROGRESS = 1.0
-"""Longest time, s, that the progress of a task waits for the progress of other tasks."""
+SECONDS_A_TRANSACTION = 1.0
+"""Longest time, s, that a result or progress waits for others that go into the same transaction."""
 
 MOST_BYTES_WAITING = 32e6
 """Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
 
-_BYTES_A_FILE = 8e6
-_SECONDS_TO_MORE_ROOM = 60.0
-_LOCK = "lock"
+_BYTES_A_TRANSACTION = 8e6
+_LEVELS = {UNDER_WAY: 1, COMPUTED: 1}  # compressed fast: what is replaced after seconds, and what is large
+_LEVEL = 6
+
+Name = tuple[str, str]
+"""Table and key of an entry."""
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A new entry. shown: columns that a person can read."""
+
+    packed: Packed
+    shown: Mapping[str, object]
+
+
+Batch = dict[Name, _Entry | None]
+"""Entries that are written in one transaction; None for one that is removed."""
 
 
 class Store:
-    """The locked folder of a run. Raises StoreInUseError and StorageError.
+    """The open file of a run. Raises database.StoreInUseError and StorageError.
 
-    kind: data type of a record; the field `KEY` is the hash of the history.
-    notes: lines for the user on what was found in the folder.
+    path: of the file; a run on a file system without locks has a file of its own beside this one.
+    locked: whether no other run uses the file.
+    notes: lines for the user on what was found.
     """
 
-    def __init__(self, folder: Path, kind: np.dtype[np.void]) -> None:
-        self.folder = folder
-        self.kind = kind
+    def __init__(self, path: Path) -> None:
+        self.path = path
         self.notes: list[str] = []
-        self._waiting, self._handed_over = Batch(), Batch()
-        self._obsolete: list[Path] = []
-        self._merges: list[Merge] = []
-        self._next_merge = self._written = -math.inf
-        try:
-            if not folder.is_dir():
-                folder.mkdir(exist_ok=True)
-                sync_folder(folder.parent)
-            self._lock = FolderLock(folder / _LOCK)
-        except NotPlainError as error:
-            raise StorageError(folder / _LOCK, error, "remove it or give another result file with -o") from error
-        except OSError as error:
-            raise StorageError(folder, error) from error
-        try:
-            self._part_writer = PartWriter(folder, secrets.token_hex(6))
-            found = read_folder(self._part_writer, kind, alone=self._lock.holds)
-        except OSError as error:
-            self._lock.close()
-            raise StorageError(folder, error) from error
-        self._indexes, self._others, self._number = found.indexes, found.others, found.last_number
-        self._records, self._starts, self._progress = (self._indexes[sort] for sort in (RECORDS, STARTS, PROGRESS))
-        self._obsolete += found.left_over
-        self.notes += [f"{folder.name}: {name} is damaged, what it held is computed again" for name in found.damaged]
-        if not self._lock.holds:
-            self.notes.append(
-                f"{folder.name}: there are no locks on this file system, so nothing keeps a second run out: give each"
-                " run a result file of its own with -o"
+        self._waiting: Batch = {}
+        self._handed_over: Batch = {}
+        self._n_bytes = 0.0  # that wait
+        self._forgotten: set[Name] = set()
+        self._used: set[str] = set()
+        self._written = 0.0
+        with faults_told(path):
+            self.locked = has_locks(path)
+            if not self.locked:
+                self.path = path.with_name(f"{path.name}-{secrets.token_hex(6)}")
+                self.notes.append(
+                    f"{path.name}: there are no locks on this file system: this run writes {self.path.name} and uses"
+                    " what other files of this name contain; give each run a result file of its own with -o"
+                )
+            self._is_new = not self.path.exists()
+            self._database, damage = database.open_locked(self.path, lock=self.locked)
+            try:
+                self.notes += [damage] if damage else []
+                self._file = self.path.stat().st_ino
+                self._keys = self._read_keys()
+                run = f"process {os.getpid()} on {socket.gethostname()}"
+                with self._transaction():
+                    if self._database.execute("UPDATE study SET run=?", [run]).rowcount != 1:
+                        self._database.execute("DELETE FROM study")
+                        self._database.execute("INSERT INTO study (run) VALUES (?)", [run])
+                for other in (*database.others(path), *(() if self.locked or not path.exists() else (path,))):
+                    if other != self.path:
+                        self._take_over(other)
+            except BaseException:
+                database.close(self._database, self.path)
+                raise
+        self._writer = Writer(self._write)
+
+    def note_study(self, name: str, scene: str, layout: tuple[str, str], tasks: Iterable[Mapping[str, object]]) -> None:
+        """Writes the study that the file belongs to, and for people its tasks and the layout of its results."""
+        columns = database.columns("tasks")
+        self._take(wait=True)
+        with faults_told(self.path), self._transaction():
+            self._database.execute("UPDATE study SET name=?, scene=?", [name, scene])
+            self._database.execute("INSERT OR REPLACE INTO layouts VALUES (?, ?)", layout)
+            self._database.execute("DELETE FROM tasks")
+            self._database.executemany(
+                f"INSERT OR REPLACE INTO tasks VALUES ({', '.join('?' * len(columns))})",
+                ([task.get(column) for column in columns] for task in tasks),
             )
-        self._writer = Writer(self._part_writer.write)
 
-    @property
-    def locked(self) -> bool:
-        """Whether no other run uses the folder."""
-        return self._lock.holds
+    def put(self, table: str, key: str, packed: Packed, shown: Mapping[str, object], finished: str = "") -> None:
+        """Adds an entry, in place of an earlier one.
 
-    @property
-    def histories(self) -> dict[str, Place]:
-        """Number of the file and row, for each hash of a history on the disk."""
-        return self._records.places
+        Parameters
+        ----------
+        table, key
+            Name of the entry.
+        packed, shown
+            Its contents, and columns that a person can read.
+        finished
+            Key of a task whose progress is no longer needed with this entry.
+        """
+        if packed.n_bytes > LARGEST:
+            raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
+        self._waiting[table, key] = _Entry(packed, shown)
+        if finished:
+            self._waiting[UNDER_WAY, finished] = None
+        self._n_bytes += packed.n_bytes
+        if self._n_bytes > _BYTES_A_TRANSACTION:
+            self._take(wait=self._n_bytes > MOST_BYTES_WAITING)
+            if not self._writer.busy:
+                self._begin()
 
-    def path(self, number: int) -> Path:
-        """Path of a file of records."""
-        return self._records.files[number].path
+    def has(self, table: str, key: str) -> bool:
+        """Whether there is an entry, on the disk or on its way."""
+        for batch in (self._waiting, self._handed_over):
+            if (table, key) in batch:
+                return batch[table, key] is not None
+        return key in self._keys[table]
 
-    @property
-    def numbers(self) -> list[int]:
-        """Numbers of all files of records."""
-        return sorted(self._records.files)
+    def on_disk(self, table: str) -> Collection[str]:
+        """Keys of all entries on the disk."""
+        return self._keys[table]
 
-    def add_history(self, key: str, record: NDArray[np.void], task: str = "") -> None:
-        """Adds a record (1,). task: hash of the task whose progress is no longer needed with this history."""
-        self._waiting.records[key] = record
-        if task:
-            self._waiting.progress.pop(task, None)
-            self._waiting.finished.add(task)
-        self._count(self.kind.itemsize)
+    def read(self, table: str, key: str) -> Packed | None:
+        """Contents of an entry; None where there is none, or a damaged one. Raises StorageError."""
+        for batch in (self._waiting, self._handed_over):
+            if (table, key) in batch:
+                entry = batch[table, key]
+                return None if entry is None else entry.packed
+        if key not in self._keys[table]:
+            return None
+        self._take(wait=True)
+        query = f"SELECT size, checksum, content FROM {table} WHERE key=?"
+        try:
+            with faults_told(self.path):
+                size, sum_, content = self._database.execute(query, [key]).fetchone() or (0, 0, None)
+            if isinstance(size, int) and isinstance(content, bytes) and database.is_whole(key, sum_, content):
+                return decompress(size, content)
+        except ValueError:
+            pass
+        self.forget(table, key)
+        return None
 
-    def add_start(self, key: str, start: Packed) -> None:
-        """Adds a start state."""
-        self._waiting.starts[key] = start
-        self._count(start.n_bytes)
-
-    def has_start(self, key: str) -> bool:
-        """Whether a start state is in the folder."""
-        return key in self._starts.places or any(key in batch.starts for batch in self._unwritten())
-
-    def read_start(self, key: str) -> Packed:
-        """A start state in the folder."""
-        for batch in self._unwritten():
-            if key in batch.starts:
-                return batch.starts[key]
-        return self._read(self._starts, key)
-
-    def keep_progress(self, key: str, progress: Packed) -> None:
-        """Adds the progress of a task, in place of an earlier one."""
-        self._waiting.progress[key] = progress
-        self._waiting.finished.discard(key)
-        self._count(progress.n_bytes)
+    def keep_progress(self, key: str, progress: Packed, shown: Mapping[str, object] | None = None) -> None:
+        """Adds the progress of a task, in place of an earlier one; more than `LARGEST` bytes are left out."""
+        if progress.n_bytes <= LARGEST:
+            self.put(UNDER_WAY, key, progress, shown or {})
 
     def read_progress(self, key: str) -> Packed | None:
         """Progress of a task; None where there is none."""
-        for batch in self._unwritten():
-            if key in batch.progress:
-                return batch.progress[key]
-        if key not in self._progress.places:
-            return None
-        try:
-            return self._read(self._progress, key)
-        except StorageError:
-            # Damaged progress costs only time: the task begins anew.
-            self.forget_progress(key)
-            return None
+        return self.read(UNDER_WAY, key)
 
-    def forget_progress(self, key: str) -> None:
-        """Removes the progress of a task that is finished, or has to be done again."""
-        for batch in self._unwritten():
-            batch.progress.pop(key, None)
-        self._progress.forget(key)
+    def keep_computed(self, key: str, value: Packed) -> None:
+        """Keeps what is computed once for a study; more than `LARGEST` bytes are left out. key: hash of its inputs."""
+        self._used.add(key)
+        if value.n_bytes <= LARGEST:
+            self.put(COMPUTED, key, value, {})
+            self.tick()
+
+    def read_computed(self, key: str) -> Packed | None:
+        """What `keep_computed` has kept, in this run or an earlier one; None where there is nothing."""
+        self._used.add(key)
+        return self.read(COMPUTED, key)
+
+    def forget(self, table: str, key: str) -> None:
+        """Makes an entry invalid in this run. A new entry replaces it, `remove_forgotten` removes it.
+
+        Raises StorageError.
+        """
+        self._take(wait=True)
+        self._waiting.pop((table, key), None)
+        if key in self._keys[table]:
+            self._keys[table].discard(key)
+            self._forgotten.add((table, key))
+
+    def remove_forgotten(self) -> None:
+        """Removes what was forgotten from the disk, so that no later run finds it. Raises StorageError."""
+        self._waiting.update(dict.fromkeys(self._forgotten.difference(self._waiting)))
+        self.flush()
+
+    def with_outcome(self, outcomes: Collection[str], *, other: bool = False) -> set[str]:
+        """Keys of the results with one of these outcomes, or with any other one."""
+        self.flush()
+        with faults_told(self.path):
+            rows = self._database.execute("SELECT key, outcome FROM results").fetchall()
+        keys = self._keys[database.RESULTS]
+        return {key for key, outcome in rows if key in keys and (outcome in outcomes) != other}
+
+    def prune(self, used: Mapping[str, Collection[str]], most: float) -> None:
+        """Removes the oldest entries without a name in `used` until these have at most `most` bytes together.
+
+        used: keys by table. What was kept or read by `read_computed` in this run is used as well.
+        """
+        self.flush()
+        named = {table: frozenset(used.get(table, ())) for table in TABLES}
+        named[COMPUTED] |= self._used
+        idle: list[tuple[str, int, int, Name]] = []
+        with faults_told(self.path):
+            for table in TABLES:
+                rows = self._database.execute(f"SELECT key, written, rowid, length(content) FROM {table}")
+                idle += [
+                    (str(when), row, size, (table, key)) for key, when, row, size in rows if key not in named[table]
+                ]
+        too_much = sum(size for _, _, size, _ in idle) - most
+        for _, _, n_bytes, (table, key) in sorted(idle):
+            if too_much <= 0.0:
+                break
+            too_much -= n_bytes
+            self.forget(table, key)
+        self.remove_forgotten()
+
+    def shrink(self) -> None:
+        """Gives the room of what was removed back to the disk. A full disk only keeps the file larger."""
+        self._take(wait=True)
+        with contextlib.suppress(StorageError), faults_told(self.path), uninterrupted():
+            self._database.executescript("PRAGMA incremental_vacuum")
 
     def tick(self) -> None:
         """Called many times a second: hands over to the writer what waits, without delay after a pause.
@@ -158,172 +243,123 @@ class Store:
         Raises
         ------
         StorageError
-            Where an earlier job could not be written.
+            Where an earlier transaction has failed.
         """
         self._take()
-        if self._waiting.empty or self._writer.busy:
-            return
-        small = not (self._waiting.records or self._waiting.starts)
-        if time.monotonic() > self._written + (SECONDS_A_PROGRESS if small else SECONDS_A_FILE):
-            self._write()
+        late = time.monotonic() > self._written + SECONDS_A_TRANSACTION
+        if self._waiting and late and not self._writer.busy:
+            self._begin()
 
     def flush(self) -> None:
         """Waits until everything is on the disk. Raises StorageError."""
         self._take(wait=True)
-        while not self._waiting.empty:
-            self._write()
+        while self._waiting:
+            self._begin()
             self._take(wait=True)
-
-    def read(self, number: int) -> NDArray[np.void]:
-        """Records of a file; they stay on the disk until they are used."""
-        path = self.path(number)
-        try:
-            return load_records(path)
-        except (OSError, ValueError) as error:
-            raise StorageError(path, error) from error
-
-    def select(self, chosen: Callable[[NDArray[np.void]], NDArray[np.bool_]]) -> set[str]:
-        """Hashes of the histories that `chosen` selects; `chosen` gets all records of a file at once."""
-        found: set[str] = set()
-        for number, file in self._records.files.items():
-            for row in np.flatnonzero(chosen(self.read(number))).tolist():
-                if self.histories.get(file.keys[row]) == (number, row):
-                    found.add(file.keys[row])
-        return found
-
-    def forget_history(self, key: str) -> None:
-        """Marks a history as not computed; a new record replaces the old one."""
-        self._records.forget(key)
-
-    def forget_start(self, key: str) -> None:
-        """Marks a start state as not computed."""
-        for batch in self._unwritten():
-            batch.starts.pop(key, None)
-        self._starts.forget(key)
-
-    def remove_forgotten(self) -> None:
-        """Removes everything that was forgotten from the disk, so that no later run finds it."""
-        self.flush()
-        for sort, index in self._indexes.items():
-            self._obsolete += [file.path for file in index.take_dead()]
-            for file in index.with_dead_entries():
-                self._merges.append(Merge(sort, self._next_number(), [(file, index.live_rows(file))]))
-        for _ in range(2):  # what takes their place comes first
-            self._write()
-            self._take(wait=True)
-
-    def prune(self, histories: Collection[str], starts: Collection[str], tasks: Collection[str], most: float) -> None:
-        """Removes the oldest files without named entries until such files have at most `most` bytes together.
-
-        With 0 bytes only named entries stay.
-        """
-        used = ((self._records, histories), (self._starts, starts), (self._progress, tasks))
-        idle: list[tuple[SegmentIndex | None, PartFile]] = [(None, file) for file in self._others if file.ours]
-        for index, keys in used:
-            numbers = {index.places[key][0] for key in keys if key in index.places}
-            idle += [(index, file) for number, file in index.files.items() if file.ours and number not in numbers]
-        too_much = sum(file.n_bytes for _, file in idle) - most
-        for holder, file in sorted(idle, key=lambda entry: entry[1].number):
-            if too_much <= 0.0:
-                break
-            too_much -= file.n_bytes
-            self._obsolete.append(file.path)
-            if holder is None:
-                self._others.remove(file)
-            else:
-                holder.drop(file)
-        if most == 0.0:
-            for index, keys in used:
-                for key in set(index.places).difference(keys):
-                    index.forget(key)
-            self.remove_forgotten()
-
-    def pack(self) -> None:
-        """Packs all files, where no other run uses the folder; the last call before `close`."""
-        self.remove_forgotten()
-        if not self.locked:
-            return
-        packed = [(sort, file) for sort, index in self._indexes.items() for file in index.files.values()]
-        of_others = [(RECORDS, file) for file in self._others if not file.path.name.endswith(PACKED)]
-        for sort, file in (*packed, *of_others):
-            self._part_writer.pack(sort, file)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and unlocks the folder."""
+        """Writes what waits, as far as there is room, and closes the file. A new file without entries is removed."""
         try:
-            self.flush()
-            if self._obsolete:
-                self._write()
-                self._take(wait=True)
-        except StorageError:
-            # said before, or there is nothing that waits for an answer
-            pass
+            # an error was said before, or there is nothing that waits for an answer
+            with contextlib.suppress(StorageError):
+                self.flush()
         finally:
             self._writer.close()
-            self._lock.close()
+            with contextlib.suppress(sqlite3.Error):
+                database.close(self._database, self.path)
+            if self._is_new and not any((*self._keys.values(), self._waiting, self._handed_over)):
+                # nothing was computed, as the scene or the disk is at fault
+                with contextlib.suppress(OSError):
+                    self.path.unlink()
 
-    def _unwritten(self) -> Iterator[Batch]:
-        """Batches that are not, or may not be, on the disk yet, latest first."""
-        yield self._waiting
-        yield self._handed_over
-
-    def _count(self, n_bytes: float) -> None:
-        self._waiting.n_bytes += n_bytes
-        if self._waiting.n_bytes > _BYTES_A_FILE:
-            self._take(wait=self._waiting.n_bytes > MOST_BYTES_WAITING)
-            if not self._writer.busy:
-                self._write()
-
-    def _write(self) -> None:
+    def _begin(self) -> None:
         """Makes everything that waits a job of the idle writer."""
-        # numbered before the batch: what comes now is later than what stands in a merged file
-        merges = self._merges or self._due_merges()
-        job = Job(self._next_number(), self._waiting, merges, self._obsolete)
-        self._handed_over = job.batch
-        self._writer.begin(job)
-        self._waiting, self._merges, self._obsolete = Batch(), [], []
-        self._written = time.monotonic()
+        with uninterrupted():
+            self._handed_over, self._waiting, self._n_bytes = self._waiting, {}, 0.0
+            self._writer.begin(self._handed_over)
+            self._written = time.monotonic()
 
     def _take(self, *, wait: bool = False) -> None:
         self._writer.take(self._accept, self._refuse, wait=wait)
 
-    def _accept(self, job: Job, written: Written) -> None:
+    def _accept(self, batch: Batch, _: None) -> None:
         """Notes what is on the disk now."""
-        for sort, file in written.new.items():
-            self._indexes[sort].put(file)
-        for merge, file in written.merged:
-            self._indexes[merge.sort].put_merged(file, merge.sources)
-        if len(written.merged) < len(job.merges):
-            self._next_merge = time.monotonic() + _SECONDS_TO_MORE_ROOM
-        for key in job.batch.finished:
-            self._progress.forget(key)
-        for index in self._indexes.values():
-            self._obsolete += [file.path for file in index.take_dead()]
-        self._handed_over = Batch()
+        self._forgotten.difference_update(batch)
+        for (table, key), entry in batch.items():
+            if entry is None:
+                self._keys[table].discard(key)
+            else:
+                self._keys[table].add(key)
+        self._handed_over = {}
 
-    def _refuse(self, job: Job) -> None:
+    def _refuse(self, batch: Batch) -> None:
         """Puts a failed batch back to those that wait."""
-        self._waiting, self._handed_over = self._waiting.behind(job.batch), Batch()
-        self._obsolete += job.remove
+        self._waiting, self._handed_over = batch | self._waiting, {}
 
-    def _due_merges(self) -> list[Merge]:
-        if time.monotonic() < self._next_merge:
-            return []
-        due = ((sort, index, index.to_merge()) for sort, index in self._indexes.items())
-        return [
-            Merge(sort, self._next_number(), [(file, index.live_rows(file)) for file in found])
-            for sort, index, found in due
-            if found
-        ]
+    def _write(self, batch: Batch) -> None:
+        """The job of the writer: one transaction with all of a batch, or nothing of it. Raises StorageError."""
+        now = datetime.now(UTC).isoformat(" ", "seconds")[:19]
+        with faults_told(self.path):
+            rows = [(*name, None if entry is None else _row(name, entry, now)) for name, entry in batch.items()]
+            if self.path.stat().st_ino != self._file:
+                raise FileNotFoundError(None, "another file has taken its place")
+            with self._transaction():
+                for table, key, row in rows:
+                    if row is None:
+                        self._database.execute(f"DELETE FROM {table} WHERE key=?", [key])
+                    else:
+                        self._insert(table, row)
 
-    def _next_number(self) -> int:
-        self._number += 1
-        return self._number
+    def _insert(self, table: str, row: Mapping[str, object]) -> None:
+        places = ", ".join("?" * len(row))
+        self._database.execute(
+            f"INSERT OR REPLACE INTO {table} ({', '.join(row)}) VALUES ({places})", list(row.values())
+        )
 
-    def _read(self, index: SegmentIndex, key: str) -> Packed:
-        number, row = index.places[key]
-        path = index.files[number].path
+    @contextlib.contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._database.execute("BEGIN IMMEDIATE")
         try:
-            return read_entry(path, row)
-        except (OSError, ValueError) as error:
-            raise StorageError(path, error) from error
+            yield
+            self._database.execute("COMMIT")
+        except BaseException:
+            if self._database.in_transaction:
+                self._database.execute("ROLLBACK")
+            raise
+
+    def _read_keys(self) -> dict[str, set[str]]:
+        """Keys of all entries. Damaged ones, which only a fault of the disk leaves, are to be removed."""
+        keys: dict[str, set[str]] = {table: set() for table in TABLES}
+        for table in TABLES:
+            for key, sum_, content in self._database.execute(f"SELECT key, checksum, content FROM {table}"):
+                if database.is_whole(key, sum_, content):
+                    keys[table].add(key)
+                else:
+                    self._forgotten.add((table, key))
+        if self._forgotten:
+            number = len(self._forgotten)
+            self.notes.append(f"{self.path.name}: {number} damaged entries, which are computed again")
+        return keys
+
+    def _take_over(self, other: Path) -> None:
+        """Copies what another run has finished, on a file system without locks. Its file is left as it is."""
+        try:
+            with database.reading(other) as source, self._transaction():
+                database.check(source, create=False)
+                for table in TABLES:
+                    columns = database.columns(table)
+                    for values in source.execute(f"SELECT {', '.join(columns)} FROM {table}"):
+                        row = dict(zip(columns, values, strict=True))
+                        key = row["key"]
+                        if database.is_whole(key, row["checksum"], row["content"]) and key not in self._keys[table]:
+                            self._insert(table, row)
+                            self._keys[table].add(key)
+        except (DamagedError, NotPlainError, FileNotFoundError):
+            self.notes.append(f"{other.name} is not used: it is damaged, or another run writes it now")
+
+
+def _row(name: Name, entry: _Entry, now: str) -> dict[str, object]:
+    table, key = name
+    size, content = compress(entry.packed, _LEVELS.get(table, _LEVEL))
+    own = {"key": key, "written": now, "size": size, "checksum": database.checksum(key, content)}
+    return {**entry.shown, **own, "content": content}

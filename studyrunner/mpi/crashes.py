@@ -1,7 +1,8 @@
 """Traces of a crash: which task ended a process, and where the process was.
 
-Every rank that sees the folder of the run has a file there. The first line is the hash of the task. Python's fault
-handler writes the position in the code behind it. A process that is killed from outside leaves no such text.
+Every rank that sees the folder of these notes beside the result has a file there: plain files, as only these can be
+written while a process crashes. The first line is the hash of the task. Python's fault handler writes the position in
+the code behind it. A process that is killed from outside leaves no such text.
 
 The signal of a crash may also come from outside or from a faulty machine, so that one crash says nothing about the
 task. Therefore the text is kept under the hash of the task, and the crashes of each task are counted.

@@ -1,1 +1,1 @@
-"""The result file: written from the folder of a run, with attributes on its origin and with its scene."""
+"""The result file: written from the progress of a run, with attributes on its origin and with its scene."""

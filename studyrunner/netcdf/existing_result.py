@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.sandboxed_read import check_scene_readable, is_hdf5
 from studies.scene_error import SceneError
-from studyrunner.netcdf.output import parts_folder
+from studyrunner.checkpoint.database import read_study
+from studyrunner.netcdf.output import progress_file
 from studyrunner.netcdf.provenance import POINTS_LEFT
 from studyrunner.study.study_of_result import SCENE_GROUP
 from studyrunner.study.toml_text import read_toml
-from studyrunner.system.files import NotPlainError, create, new_partial, open_plain
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
-
-_NOTE = "study.json"
-_LARGEST_NOTE = 2**16
 
 
 @dataclass(frozen=True)
@@ -74,11 +70,11 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     Raises
     ------
     UserError
-        Where the file is no result of run-study, or the file or the folder beside it belongs to another study.
+        Where the file is no result of run-study, or the file or its progress belongs to another study.
     """
     standing, finished = _read_result(option, path)
     own = Label.of(study)
-    for what, found in ((path, standing), (parts_folder(path), _read_note(path))):
+    for what, found in ((path, standing), (progress_file(path), _read_note(path))):
         if found is not None and found != own and not overwrite:
             remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
             raise UserError("command line", option, str(path), remedy)
@@ -100,31 +96,10 @@ def check_scene_file(option: str, path: Path) -> None:
     raise UserError("command line", option, str(path), "give another name: this is no scene file, and is left as it is")
 
 
-def note_study(target: Path, study: Study) -> None:
-    """Writes the identity of a study into the folder beside the result file."""
-    label = Label.of(study)
-    if _read_note(target) == label:
-        return
-    note = parts_folder(target) / _NOTE
-    partial = new_partial(note)
-    # a disk that is full is met by what is written next
-    with contextlib.suppress(OSError):
-        try:
-            with create(partial) as file:
-                file.write(json.dumps(asdict(label)).encode())
-            os.replace(partial, note)
-        finally:
-            partial.unlink(missing_ok=True)
-
-
 def _read_note(target: Path) -> Label | None:
-    """The identity in a folder; None where there is none, as in folders of earlier versions."""
-    try:
-        with open_plain(parts_folder(target) / _NOTE, _LARGEST_NOTE) as file:
-            found = json.loads(file.read())
-        return Label(str(found["name"]), str(found["model"]))
-    except (OSError, NotPlainError, ValueError, TypeError, KeyError, RecursionError):
-        return None
+    """The identity in the file beside a result; None where there is none."""
+    found = read_study(progress_file(target))
+    return None if found is None else Label(*found)
 
 
 def _read_result(option: str, path: Path) -> tuple[Label | None, bool]:

@@ -1,6 +1,6 @@
 """Writes the records of wear histories to one NetCDF file, under a temporary name that is changed at the end.
 
-The file is written in slabs from the files of a run. Only one slab is in memory, whatever the number of points.
+The file is written in slabs from the file of a run. Only one slab is in memory, whatever the number of points.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
-from studyrunner.checkpoint.records import empty_record, variable_sizes
-from studyrunner.checkpoint.store import Store
+from studyrunner.checkpoint.records import variable_sizes
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
@@ -40,7 +38,12 @@ _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in 
 _BYTES_OF_CACHE = 2**16
 _ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
 
+_KEY_TYPE = "S32"
+
 Region = tuple[int | slice, ...]
+
+Keys = NDArray[np.bytes_]
+"""Hashes of the histories of points, in the order of the result file; empty for points that are not computed."""
 
 
 @dataclass(frozen=True)
@@ -57,28 +60,6 @@ class Gathered:
     certificates: str
     findings: tuple[str, ...]
     doubts: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Index:
-    """Places of the records of all points, in the order of the result file.
-
-    file, row (n_points,): number of a file of the run, -1 for points that are not computed, and row in the file.
-    key (n_points,): hash of the record.
-    """
-
-    file: NDArray[np.int32]
-    row: NDArray[np.int32]
-    key: NDArray[np.bytes_]
-
-
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """A record: row in the file, hash, and points that have this history."""
-
-    row: int
-    key: str
-    points: tuple[tuple[int, ...], ...]
 
 
 def gather(
@@ -115,9 +96,9 @@ def gather(
     Raises
     ------
     StorageError
-        Where the file cannot be written, or a file of the run cannot be read.
+        Where the file cannot be written, or the file of the run cannot be read.
     """
-    index, gathered = _read_through(study, facts, completion)
+    keys, gathered = _read_through(study, facts, completion)
     left = gathered.outcomes[Outcome.NOT_COMPUTED]
     if left and keep_finished:
         return gathered
@@ -129,8 +110,8 @@ def gather(
             file.setncatts(origin or {})
             if gathered.doubts:
                 file.setncattr("plausibility", "\n".join(gathered.doubts))
-            _write_values(file, study, facts, completion.store, index)
-            _write_scene(file, study, completion.store, of_scene)
+            _write_values(file, study, facts, completion, keys)
+            _write_scene(file, study, completion.kind.itemsize, of_scene)
             _write_coordinates(file, study, facts)
             if scene is not None:
                 write_scene_group(file, scene)
@@ -152,65 +133,38 @@ def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
         raise find_fault(path) or OSError(None, f"the NetCDF library cannot write it ({error})") from error
 
 
-def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[_Index, Gathered]:
-    """Reads every file once, piece by piece: places and outcomes of all points, and the table.
-
-    Points are left out whose record has another hash, as another run may have changed the file.
-    """
+def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> tuple[Keys, Gathered]:
+    """Reads every record once, some at a time: hashes and outcomes of all points, and the table."""
     shape = tuple(len(values) for values in study.dimensions.values())
-    n_points = math.prod(shape)
-    index = _Index(np.full(n_points, -1, np.int32), np.zeros(n_points, np.int32), np.zeros(n_points, KEY_TYPE))
-    found: dict[int, list[_Entry]] = {}
-    for march in itertools.chain.from_iterable(completion.plan.marches):
-        keys, places = completion.histories(march), completion.places(march)
-        for key, scaled, place in zip(keys, march.histories, places, strict=True):
-            if place is not None:
-                found.setdefault(place[0], []).append(_Entry(place[1], key, scaled.points))
+    keys = np.zeros(math.prod(shape), _KEY_TYPE)
+    histories = [
+        (key, scaled.points)
+        for march in itertools.chain.from_iterable(completion.plan.marches)
+        for key, scaled in zip(completion.histories(march), march.histories, strict=True)
+    ]
     table, findings = CertificateTable(study, facts), Findings(study, facts)
     outcomes: Counter[int] = Counter()
-    changed: list[str] = []
-    at_once = _records_at_once(completion.store)
-    for number, entries in found.items():
-        entries.sort(key=lambda entry: entry.row)
-        for first in range(0, len(entries), at_once):
-            there, records = _read_entries(completion.store, number, entries[first : first + at_once])
-            if len(there) < len(entries[first : first + at_once]):
-                changed.append(completion.store.path(number).name)
-            for outcome, entry in zip(records["outcome"].tolist(), there, strict=True):
-                outcomes[outcome] += len(entry.points)
-                at = np.ravel_multi_index(np.transpose(entry.points), shape)
-                index.file[at], index.row[at], index.key[at] = number, entry.row, entry.key.encode()
-            for collected in (table, findings):
-                collected.add([entry.points for entry in there], records)
-    outcomes[Outcome.NOT_COMPUTED] += int(np.count_nonzero(index.file < 0))
-    lost = [
-        f"{name} in {completion.store.folder.name} does not hold any more what this run has written there:"
-        " its points are not computed, the same command goes on"
-        for name in dict.fromkeys(changed)
-    ]
-    return index, Gathered(outcomes, table.format(), (*lost, *findings.format(outcomes)), table.doubts())
+    at_once = _records_at_once(completion.kind.itemsize)
+    for first in range(0, len(histories), at_once):
+        some = histories[first : first + at_once]
+        records, there = completion.read_histories([key for key, _ in some])
+        records, found = records[there], list(itertools.compress(some, there.tolist()))
+        for outcome, (key, points) in zip(records["outcome"].tolist(), found, strict=True):
+            outcomes[outcome] += len(points)
+            keys[np.ravel_multi_index(np.transpose(points), shape)] = key.encode()
+        for collected in (table, findings):
+            collected.add([points for _, points in found], records)
+    outcomes[Outcome.NOT_COMPUTED] += int(np.count_nonzero(keys == b""))
+    return keys, Gathered(outcomes, table.format(), tuple(findings.format(outcomes)), table.doubts())
 
 
-def _records_at_once(store: Store) -> int:
-    return max(1, int(_BYTES_AT_ONCE // store.kind.itemsize))
+def _records_at_once(bytes_a_record: int) -> int:
+    return max(1, int(_BYTES_AT_ONCE // bytes_a_record))
 
 
-def _read_entries(store: Store, number: int, entries: Sequence[_Entry]) -> tuple[Sequence[_Entry], NDArray[np.void]]:
-    """Entries that exist in a file, and their records. Raises StorageError where the disk fails."""
-    try:
-        kept = store.read(number)
-        if len(kept) <= entries[-1].row or kept.dtype != store.kind:
-            return [], np.zeros(0, store.kind)
-        records = np.array(kept[[entry.row for entry in entries]])
-    except StorageError as error:
-        if isinstance(error.__cause__, ValueError | FileNotFoundError):
-            return [], np.zeros(0, store.kind)
-        raise
-    same = records[KEY] == np.array([entry.key for entry in entries], KEY_TYPE)
-    return [entry for entry, right in zip(entries, same.tolist(), strict=True) if right], records[same]
-
-
-def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store: Store, index: _Index) -> None:
+def _write_values(
+    file: netCDF4.Dataset, study: Study, facts: SceneFacts, completion: CompletionIndex, keys: Keys
+) -> None:
     shape = tuple(len(values) for values in study.dimensions.values())
     sizes = variable_sizes(study, facts)
     asked = [name for name in ASKED if name in study.outputs.variables]
@@ -218,7 +172,7 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
     variables |= COUNTS if study.to_the_end else {}
     for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
         file.createDimension(name, size)
-    slab = _slab_shape(shape, store.kind.itemsize)
+    slab = _slab_shape(shape, completion.kind.itemsize)
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         if entry.is_text:
@@ -232,7 +186,7 @@ def _write_values(file: netCDF4.Dataset, study: Study, facts: SceneFacts, store:
     if not any("contact" in entry.dimensions for entry in variables.values()):
         file.setncattr("coordinates", _ON_CONTACT)
     for region, first, last in _slabs(shape, slab):
-        _write_slab(file, region, variables, study.outputs.loops, _read_slab(store, index, first, last))
+        _write_slab(file, region, variables, study.outputs.loops, _read_slab(completion, keys[first:last]))
 
 
 def _write_slab(
@@ -297,32 +251,19 @@ def _slabs(shape: Sequence[int], slab: Sequence[int]) -> Iterator[tuple[Region, 
         first = last
 
 
-def _read_slab(store: Store, index: _Index, first: int, last: int) -> NDArray[np.void]:
-    """Records of consecutive points of the file."""
-    files, rows, keys = index.file[first:last], index.row[first:last], index.key[first:last]
-    missing = empty_record(store.kind)
-    missing["outcome"] = Outcome.NOT_COMPUTED
-    records = np.repeat(missing, last - first)
-    order = np.argsort(files, kind="stable")
-    bounds = np.flatnonzero(np.diff(files[order], prepend=-2, append=-2))
-    for begin, end in itertools.pairwise(bounds):
-        places = order[begin:end]
-        number = int(files[places[0]])
-        if number >= 0:
-            for part in np.array_split(places, math.ceil(len(places) / _records_at_once(store))):
-                # from the file anew: what was used of it once does not stay in memory
-                records[part] = store.read(number)[rows[part]]
-            if (records[KEY][places] != keys[places]).any():
-                # between the two times that it was read
-                raise StorageError(
-                    store.path(number), ValueError("another run has changed it"), "give the command again"
-                )
-    return records
+def _read_slab(completion: CompletionIndex, keys: Keys) -> NDArray[np.void]:
+    """Records of consecutive points of the file, by their hashes. Raises StorageError where one has gone meanwhile."""
+    different, places = np.unique(keys, return_inverse=True)
+    records, there = completion.read_histories([key.decode() for key in different.tolist()])
+    if not (there | (different == b"")).all():
+        raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
+    records["outcome"][~there] = Outcome.NOT_COMPUTED
+    return records[places]
 
 
-def _write_scene(file: netCDF4.Dataset, study: Study, store: Store, of_scene: Sequence[SceneVariable]) -> None:
+def _write_scene(file: netCDF4.Dataset, study: Study, bytes_a_point: int, of_scene: Sequence[SceneVariable]) -> None:
     shape = tuple(len(values) for values in study.dimensions.values())
-    slab = _slab_shape(shape, store.kind.itemsize)
+    slab = _slab_shape(shape, bytes_a_point)
     for scene in of_scene:
         dimensions = (scene.name,) if scene.coordinate else scene.entry.dimensions
         for dimension, size in zip(dimensions, scene.values.shape[-len(dimensions) :], strict=True):

@@ -40,9 +40,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
         str(target).encode(sys.getfilesystemencoding())
         remedy = _obstacle(option, path, target, inputs)
         if not remedy:
-            parts = parts_folder(target)
-            for trial in (target, parts / target.name) if parts.is_dir() else (target,):
-                try_to_create(trial)
+            try_to_create(target)
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror}"
     except ValueError:
@@ -70,8 +68,9 @@ def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> 
             return "give a file that may be written: this one is write-protected"
         if any(source.exists() and target.samefile(source) for source in inputs):
             return f"give another file with {option}: this one is read by the run"
-    if os.path.lexists(parts_folder(target)) and not parts_folder(target).is_dir():
-        return f"give another name: {parts_folder(target).name}, which the run needs, is a file"
+    progress = progress_file(target)
+    if os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()):
+        return f"give another name: {progress.name}, which the run needs, is no plain file"
     return ""
 
 
@@ -110,6 +109,16 @@ def remove_leftovers(path: Path, *, alone: bool) -> None:
                 found.unlink()
 
 
-def parts_folder(path: Path) -> Path:
-    """Folder of the finished results of the result file `path`."""
+def progress_file(path: Path) -> Path:
+    """File of what is computed so far of the result file `path`."""
+    return path.with_name(f"{path.name}.progress")
+
+
+def crash_folder(path: Path) -> Path:
+    """Folder of the notes on crashes beside the result file `path`; empty folders are removed at the end of a run."""
+    return path.with_name(f"{path.name}.crashes")
+
+
+def older_folder(path: Path) -> Path:
+    """Folder of what version 0.4.0 or before has computed of the result file `path`."""
     return path.with_name(f"{path.name}.parts")

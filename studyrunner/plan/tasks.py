@@ -52,7 +52,7 @@ class BranchTask:
     known: indices of the frequencies whose results are not needed, as an earlier run has left them or all histories
         that start from them.
     resume: progress of an earlier run; None to begin with the first frequency.
-    key: hash of the branch in the folder of the run.
+    key: hash of the branch in the file of the run.
     """
 
     number: int
@@ -119,7 +119,7 @@ class MarchTask:
     n_unknowns, moves: of the start state, see StartResult; planned values until the start state is there.
     start: start state; None until the branch has reached it.
     resume: progress of an earlier run; None to begin with the start state.
-    key: hash of the task in the folder of the run.
+    key: hash of the task in the file of the run.
     """
 
     number: int

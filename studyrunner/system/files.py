@@ -8,6 +8,7 @@ By hand: `tempfile` and `os.replace` are used, but neither of them refuses links
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import secrets
 import stat
@@ -88,6 +89,21 @@ def replacing(path: Path) -> Iterator[Path]:
         sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def has_locks(path: Path) -> bool:
+    """Whether files beside `path` can be locked: not on each file system. Raises OSError where the disk is at fault."""
+    trial = new_partial(path)
+    with create(trial) as file:
+        try:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno == errno.EIO:
+                raise
+            return False
+        finally:
+            trial.unlink()
+    return True
 
 
 def find_fault(path: Path) -> OSError | None:

@@ -6,6 +6,7 @@ import contextlib
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -211,3 +212,12 @@ def processes_may_share() -> bool:
         return subprocess.run([sys.executable, "-c", opening], capture_output=True, check=False).returncode == 0
     finally:
         os.close(descriptor)
+
+
+def count_rows(table: str, result: Path = Path("out.nc")) -> int:
+    """Number of rows of a table in the progress of a result, also of a run that is at work."""
+    address = f"file:{result}.progress?mode=ro&immutable=1"
+    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
+        (number,) = database.execute(f"SELECT count(*) FROM {table}").fetchone()
+        return int(number)
+    return 0

@@ -42,8 +42,8 @@ from studyrunner.system import progress
 from tests.mpi.losses import DONE
 from tests.studyrunner.fakes import changed, fake_branch, fake_evaluate
 
-BULK = np.zeros(0 if "FAKE_NOTHING" in os.environ else 100_000)
-"""Goes with every start state: larger than what MPI sends off at once."""
+BULK = np.random.default_rng(0).random(0 if "FAKE_NOTHING" in os.environ else 100_000)
+"""Goes with every start state: larger than what MPI sends off at once, and not smaller when it is compressed."""
 
 PATIENCE = 200.0
 """Seconds: less than the tests have."""

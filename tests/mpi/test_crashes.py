@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, Running, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, Running, count_rows, results, run_to_end
 
 STUDY = [
     FAKED,
@@ -102,12 +102,12 @@ def test_what_crashes_twice_after_it_was_tried_again_has_failed_again(whole: xr.
 
 def is_at_a_task(folder: Path, n_ranks: int) -> bool:
     """Whether the last rank has been given one."""
-    notes = [path for path in folder.glob("*.parts/*.crash") if path.name == f"rank-{max(0, n_ranks - 1)}.crash"]
-    return any(path.stat().st_size > 0 for path in notes) and any(folder.glob("*.parts/*.starts"))
+    notes = [path for path in folder.glob("*.crashes/*.crash") if path.name == f"rank-{max(0, n_ranks - 1)}.crash"]
+    return any(path.stat().st_size > 0 for path in notes) and count_rows("start_states", folder / "out.nc") > 0
 
 
 def left_of_crashes(folder: Path) -> list[Path]:
-    return [*folder.glob("*.parts/*.crash"), *folder.glob("*.parts/*.died")]
+    return list(folder.glob("*.crashes"))
 
 
 def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
@@ -125,11 +125,11 @@ def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
 def test_a_rank_that_is_killed_has_not_crashed(tmp_path: Path) -> None:
     def kill(running: Running) -> None:
         # both compute: each has the file that it would write a crash into
-        assert running.reaches(lambda: len(list(tmp_path.glob("*.parts/*.crash"))) == 2), running.said
+        assert running.reaches(lambda: len(list(tmp_path.glob("*.crashes/*.crash"))) == 2), running.said
         os.kill(running.ranks()[1], signal.SIGKILL)
 
     assert run_to_end(2, STUDY, tmp_path, {"FAKE_SECONDS": "100"}, kill).status == 9
-    assert len(list(tmp_path.glob("*.parts/*.crash"))) == 2
+    assert len(list(tmp_path.glob("*.crashes/*.crash"))) == 2
     assert run_to_end(2, STUDY, tmp_path).status == 0
     assert np.all(results(tmp_path / "out.nc").outcome == 0)
     assert left_of_crashes(tmp_path) == []

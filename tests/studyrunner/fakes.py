@@ -131,22 +131,23 @@ def without_values(result: MarchResult, outcome: int) -> MarchResult:
 
 
 def open_completion(
-    study: Study, plan: TaskPlan, folder: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
+    study: Study, plan: TaskPlan, path: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
 ) -> CompletionIndex:
-    """What is in the folder of a study; its store is to be closed."""
+    """What is in the file of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), Store(folder, kind))
+    identities = Identities(study, facts.digest, hash_of_kind(kind.descr))
+    completion = CompletionIndex(plan, identities, Store(path), kind)
     if fresh:
         completion.forget_all()
     return completion
 
 
 def fake_completion(
-    study: Study, plan: TaskPlan, results: Iterable[MarchResult], folder: Path, facts: SceneFacts = FACTS
+    study: Study, plan: TaskPlan, results: Iterable[MarchResult], path: Path, facts: SceneFacts = FACTS
 ) -> CompletionIndex:
-    """The folder of a run that had these results and no others, some in a file."""
+    """The file of a run that had these results and no others, some in a transaction."""
     marches = march_of_points(plan)
-    completion = open_completion(study, plan, folder, facts, fresh=True)
+    completion = open_completion(study, plan, path, facts, fresh=True)
     for place, result in enumerate(results):
         completion.add_history(marches[result.points], result)
         if place % 3 == 0:

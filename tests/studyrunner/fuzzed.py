@@ -83,7 +83,7 @@ def write_whole_files(folder: Path) -> None:
     Path(study).write_text(STUDY, encoding="utf-8")
     small = ("axes.frequency=150", "slow_time.cycles=0", "axes.harmonics=3", "outputs.loops=[]")
     assert main([study, "-o", result, *(part for text in small for part in ("--set", text))]) == 0
-    shutil.rmtree(f"{result}.parts")
+    Path(f"{result}.progress").unlink()
     write_result(folder / "drawn")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.checkpoint.records import pack, record_type
+from studyrunner.checkpoint.records import record_of, record_type
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import Index
 from studyrunner.plan.tasks import build_tasks
@@ -38,5 +38,5 @@ def batches(study: Study, results: Sequence[MarchResult], size: int = 3, facts: 
     found = []
     for first in range(0, len(results), size):
         some = results[first : first + size]
-        found.append(([result.points for result in some], np.concatenate([pack(kind, "", one) for one in some])))
+        found.append(([result.points for result in some], np.concatenate([record_of(kind, one) for one in some])))
     return found

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from studyrunner.checkpoint.records import pack, record_type
+from studyrunner.checkpoint.records import record_of, record_type
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study import Study
@@ -48,7 +48,7 @@ def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
     table = CertificateTable(study, FACTS)
     for some in (results[:1], results[1:6], results[6:]):
         kind = record_type(study, FACTS)
-        records = np.concatenate([np.empty(0, kind), *(pack(kind, "", result) for result in some)])
+        records = np.concatenate([np.empty(0, kind), *(record_of(kind, result) for result in some)])
         table.add([result.points for result in some], records)
     return table.format()
 

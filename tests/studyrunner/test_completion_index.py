@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from solver.outcome import COMPLETE
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
+from studyrunner.checkpoint.database import RESULTS, STARTS
 from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
@@ -62,7 +64,7 @@ def compute(completion: CompletionIndex, n_tasks: int = 1000, failing: frozenset
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    return tmp_path / "out.nc.parts"
+    return tmp_path / "out.nc.progress"
 
 
 @pytest.fixture
@@ -168,9 +170,7 @@ def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
         assert completion.take_as_failed(completion.key(march), None, 12, "Segmentation fault") == 0
         assert completion.take_as_failed("0" * 32, None, 12, "of another study") == 0
         assert completion.n_points_finished == n_before + 1
-        (place,) = completion.places(march)
-        assert place is not None
-        record = completion.store.read(place[0])[place[1]]
+        (record,), _ = completion.read_histories(completion.histories(march))
         assert (record["outcome"], record["message"]) == (12, "Segmentation fault")
         assert np.isnan(record["worn_volume"]).all()
     with completion_of(folder) as completion:
@@ -187,10 +187,11 @@ def test_of_a_march_that_crashed_later_histories_alone_are_lost(folder: Path) ->
         assert march.n_results == 2
         completion.add_history(march, fake_march(march))
         completion.store.flush()
-        kept = completion.places(march)[0]
-        assert kept is not None
+        kept = completion.read_histories(completion.histories(march))
+        assert kept[1].tolist() == [True, False]
         assert completion.take_as_failed(march.key, None, 12, "") == 1
-        assert completion.places(march)[0] == kept
+        found = completion.read_histories(completion.histories(march))
+        assert (found[0][0].tobytes(), found[1].tolist()) == (kept[0][0].tobytes(), [True, True])
         assert completion.is_finished(march)
 
 
@@ -212,9 +213,9 @@ def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished
     with completion_of(finished) as completion:
         branch = completion.plan.branches[0]
         for place in range(3):
-            completion.store.forget_start(completion._starts[0][place])
+            completion.store.forget(STARTS, completion._starts[0][place])
         (march,) = [m for m in completion.plan.marches_from(0, 1) if m.wear_coefficient == 1e-11]
-        completion.store.forget_history(completion._histories[march.number][0])
+        completion.store.forget(RESULTS, completion._histories[march.number][0])
         (left,) = completion.branches_left()
         assert left == replace(branch, known=frozenset({0, 2}))
         assert left.n_results == 1
@@ -252,8 +253,7 @@ def test_what_another_study_has_left_stays_up_to_a_size(most: float, expected: t
         assert compute(completion) == expected
 
 
-def test_what_stands_in_one_file_with_another_study_goes_alone(finished: Path) -> None:
-    """A study and a larger one share files once these are put together."""
+def test_a_study_that_is_part_of_a_larger_one_keeps_its_part(finished: Path) -> None:
     with completion_of(finished, "axes.wear_coefficient=[1e-11]") as completion:
         assert completion.n_points_finished == 6
         completion.prune(0.0)
@@ -272,3 +272,26 @@ def test_a_study_that_starts_over_leaves_those_of_others(finished: Path) -> None
         assert not any(branch.known for branch in completion.branches_left())
     with completion_of(finished, other) as completion:
         assert completion.n_points_finished == 6
+
+
+def test_a_person_can_read_the_file(finished: Path) -> None:
+    with completion_of(finished) as completion:
+        completion.store.note_study("a joint", "sdof_slider", ("hash", "layout"), completion.describe_tasks())
+        march = completion.plan.marches[1][2]
+        completion.keep(march, Packed("march", ()))
+        completion.keep(completion.plan.branches[1], Packed("branch", ()))
+    queries = {
+        "SELECT kind, count(*), sum(points) FROM tasks GROUP BY kind": {("integration", 12, 12), ("sweep", 2, None)},
+        "SELECT DISTINCT sweep, frequency FROM start_states WHERE unknowns > 0 AND frequency < 120": {
+            *(("up", 100.0), ("up", 110.0), ("down", 100.0), ("down", 110.0))
+        },
+        "SELECT kind, sweep, frequency, scheme FROM under_way": {
+            *(("integration", "down", 110.0, "implicit"), ("sweep", "down", 120.0, None))
+        },
+        "SELECT DISTINCT outcome, scheme, last_cycle, message FROM results": {("converged", "implicit", 20000.0, None)},
+        "SELECT count(*) FROM results WHERE worn_volume > 0 AND wear_coefficient = 1e-11": {(6,)},
+        "SELECT name, scene FROM study": {("a joint", "sdof_slider")},
+    }
+    with contextlib.closing(sqlite3.connect(finished)) as database:
+        for query, expected in queries.items():
+            assert set(database.execute(query)) == expected

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -56,15 +55,15 @@ def killed(solver: Solver) -> None:
     Path("out.nc").unlink()
 
 
-def without_folder(_: Solver) -> None:
+def without_progress(_: Solver) -> None:
     assert main(SMALL) == 0
-    shutil.rmtree("out.nc.parts")
+    Path("out.nc.progress").unlink()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("leave", "other"),
-    [(finished, OTHER), (finished, RENAMED), (unfinished, OTHER), (killed, RENAMED), (without_folder, OTHER)],
+    [(finished, OTHER), (finished, RENAMED), (unfinished, OTHER), (killed, RENAMED), (without_progress, OTHER)],
 )
 def test_what_is_left_of_another_study_stays(
     leave: Callable[[Solver], None],
@@ -153,13 +152,25 @@ def test_a_scene_replaces_scenes_only(capsys: pytest.CaptureFixture[str]) -> Non
     assert Path("out.nc").read_bytes() == before
 
 
-def test_a_note_that_is_damaged_says_nothing(solver: Solver) -> None:
+def test_progress_that_is_damaged_belongs_to_no_study(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
     killed(solver)
     solver.begin_again()
-    for content in (b"", b"[1]", b"\xff", b"[" * 10**5):
-        Path("out.nc.parts/study.json").write_bytes(content)
-        assert main(OTHER) == 0
-        Path("out.nc").unlink()
+    Path("out.nc.progress").write_bytes(b"x" * 5000)
+    assert main(OTHER) == 0
+    assert "out.nc.progress is no file of a run: it is kept as out.nc.progress.damaged" in capsys.readouterr().err
+
+
+def test_a_folder_of_an_older_version_is_named_and_left_alone(
+    solver: Solver, capsys: pytest.CaptureFixture[str]
+) -> None:
+    older = Path("out.nc.parts")
+    older.mkdir()
+    (older / "00000001.npy").write_bytes(b"of version 0.4.0")
+    assert main(SMALL) == 0
+    said = "out.nc.parts is of version 0.4.0 or before: it is neither used nor changed, and may be removed"
+    assert capsys.readouterr().err.count(said) == 1
+    assert (older / "00000001.npy").read_bytes() == b"of version 0.4.0"
+    assert solver.n_results == 6
 
 
 def test_a_result_is_not_what_the_command_prints_into(tmp_path: Path) -> None:
@@ -176,4 +187,4 @@ def test_a_result_is_not_what_the_command_prints_into(tmp_path: Path) -> None:
         )
     assert ended.returncode == 2
     assert "give the name of an ordinary file" in ended.stderr
-    assert run.parts_folder(tmp_path / "out.nc").exists() is False
+    assert run.progress_file(tmp_path / "out.nc").exists() is False

@@ -20,6 +20,8 @@ SHIM = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,29 +33,37 @@ static int wanted(const char *variable) {
     return text ? atoi(text) : 0;
 }
 
-/* a result on its way, but for its first kilobyte, which may be a trial */
-static int is_result(int file) {
+/* a result on its way, but for its first kilobyte, which may be a trial, or the progress after some writes */
+static int fails(int file) {
     char link[64], path[4096];
     snprintf(link, sizeof link, "/proc/self/fd/%d", file);
     ssize_t length = readlink(link, path, sizeof path - 1);
     if (length < 0) return 0;
     path[length] = 0;
-    return strstr(path, "/.out.nc.") && lseek(file, 0, SEEK_END) > 0;
+    if (wanted("SHIM_WRITE") && strstr(path, "/.out.nc.") && lseek(file, 0, SEEK_END) > 0) return wanted("SHIM_WRITE");
+    if (!strstr(path, "out.nc.progress")) return 0;
+    static int n_writes = 0;
+    return ++n_writes > 25 || strstr(path, ".partial") ? wanted("SHIM_PROGRESS") : 0;
 }
 
-int flock(int file, int operation) {
-    if (!wanted("SHIM_FLOCK")) {
-        int (*own)(int, int) = dlsym(RTLD_NEXT, "flock");
-        return own(file, operation);
-    }
-    errno = wanted("SHIM_FLOCK");
-    return -1;
+#define LOCKING(name) \
+int name(int file, int command, ...) { \
+    int (*own)(int, int, void *) = dlsym(RTLD_NEXT, #name); \
+    va_list arguments; \
+    va_start(arguments, command); \
+    void *argument = va_arg(arguments, void *); \
+    va_end(arguments); \
+    if (wanted("SHIM_LOCK") && command == F_SETLK) { errno = wanted("SHIM_LOCK"); return -1; } \
+    return own(file, command, argument); \
 }
+LOCKING(fcntl)
+LOCKING(fcntl64)
 
 #define FAILING(name) \
 ssize_t name(int file, const void *data, size_t count, off_t place) { \
     ssize_t (*own)(int, const void *, size_t, off_t) = dlsym(RTLD_NEXT, #name); \
-    if (wanted("SHIM_WRITE") && is_result(file)) { errno = wanted("SHIM_WRITE"); return -1; } \
+    int fault = fails(file); \
+    if (fault) { errno = fault; return -1; } \
     return own(file, data, count, place); \
 }
 FAILING(pwrite)
@@ -61,7 +71,8 @@ FAILING(pwrite64)
 
 ssize_t write(int file, const void *data, size_t count) {
     ssize_t (*own)(int, const void *, size_t) = dlsym(RTLD_NEXT, "write");
-    if (wanted("SHIM_WRITE") && count > 4096 && is_result(file)) { errno = wanted("SHIM_WRITE"); return -1; }
+    int fault = count > 4096 ? fails(file) : 0;
+    if (fault) { errno = fault; return -1; }
     return own(file, data, count);
 }
 """
@@ -98,7 +109,7 @@ def run_with(shim: Path, folder: Path, **failing: int) -> subprocess.CompletedPr
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
 def test_a_run_works_where_there_are_no_locks(number: int, shim: Path, tmp_path: Path) -> None:
     for _ in range(2):  # the second one reads what the first one has written
-        ended = run_with(shim, tmp_path, flock=number)
+        ended = run_with(shim, tmp_path, lock=number)
         assert ended.returncode == 0, ended.stderr
         assert ended.stderr.count("there are no locks on this file system") == 1
     with xr.open_dataset(tmp_path / "out.nc") as result:
@@ -107,7 +118,7 @@ def test_a_run_works_where_there_are_no_locks(number: int, shim: Path, tmp_path:
 
 @pytest.mark.slow
 def test_a_fault_of_the_disk_is_not_a_missing_lock(shim: Path, tmp_path: Path) -> None:
-    ended = run_with(shim, tmp_path, flock=errno.EIO)
+    ended = run_with(shim, tmp_path, lock=errno.EIO)
     assert ended.returncode == 1
     assert "Input/output error: see whether the disk, or the way to it, is at fault" in ended.stderr
 
@@ -126,8 +137,21 @@ def test_what_the_system_says_of_a_result_is_said(number: int, words: str, shim:
     (line,) = [line for line in ended.stderr.splitlines() if line.startswith("run-study: ")]
     assert words in line
     assert "Traceback" not in ended.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["out.nc.parts"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out.nc.progress"]
     assert run_with(shim, tmp_path).returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC, errno.EDQUOT])
+def test_what_the_system_says_of_the_progress_is_said(number: int, shim: Path, tmp_path: Path) -> None:
+    ended = run_with(shim, tmp_path, progress=number)
+    assert ended.returncode == 1
+    (line,) = [line for line in ended.stderr.splitlines() if line.startswith("run-study: ")]
+    assert f"out.nc.progress: {os.strerror(number)}: " in line
+    assert "Traceback" not in ended.stderr
+    ended = run_with(shim, tmp_path)
+    assert ended.returncode == 0
+    assert "damaged" not in ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from solver.outcome import Outcome
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.gather import Gathered
-from studyrunner.netcdf.output import parts_folder
+from studyrunner.netcdf.output import progress_file
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study_file import read_study
@@ -56,7 +56,7 @@ def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gather
     """The file of a run of the study with these results."""
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
-    completion = fake_completion(study, plan, results, parts_folder(path))
+    completion = fake_completion(study, plan, results, progress_file(path))
     with contextlib.closing(completion.store):
         return gather.gather(study, FACTS, completion, path)
 
@@ -333,7 +333,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
-    assert sorted(tmp_path.iterdir()) == [path, parts_folder(path)]
+    assert sorted(tmp_path.iterdir()) == [path, progress_file(path)]
 
 
 def test_the_examples_of_readme_and_pages_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -343,7 +343,9 @@ def test_the_examples_of_readme_and_pages_run(tmp_path: Path, monkeypatch: pytes
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    completion = fake_completion(study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "parts")
+    completion = fake_completion(
+        study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "out.nc.progress"
+    )
     with contextlib.closing(completion.store):
         gather.gather(study, FACTS, completion, tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import sqlite3
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
+from tests.mpi.launching import count_rows
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 from tests.studyrunner.fakes import fake_branch
 
@@ -76,7 +78,7 @@ def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.Captur
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 2, 3, 6, 9])
-@pytest.mark.parametrize("where", ["flush", "_write", "add_history"])
+@pytest.mark.parametrize("where", ["flush", "_begin", "put"])
 def test_an_interrupt_anywhere_in_the_main_thread(
     where: str, at: int, solver: Solver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,12 +215,12 @@ def test_a_second_run_of_the_same_study_is_refused(
             second.append(main(TWO_WAYS))
 
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-    monkeypatch.setattr("studyrunner.system.folder_lock._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.checkpoint.database._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(TWO_WAYS) == 0
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
-    assert "out.nc.parts: in use = by process" in line
+    assert "out.nc.progress: in use = by process" in line
     assert "another run is writing there: wait for its end, or give another result file with -o" in line
 
 
@@ -242,12 +244,12 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert len(marches) == 8
     assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(load(), expected)
-    assert not list(Path("out.nc.parts").glob("*.progress*"))
+    assert count_rows("under_way") == 0
 
 
 @pytest.mark.slow
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files of start states may be damaged while the progress of their branch is not."""
+    """Start states may be damaged while the progress of their branch is not."""
     expected = whole(solver)
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     own, ended = solver.evaluate, False
@@ -268,9 +270,9 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
 
     monkeypatch.setattr(solver, "evaluate", resuming)
     assert main(TWO_WAYS) == 130
-    assert list(Path("out.nc.parts").glob("*.progress"))
-    for path in Path("out.nc.parts").glob("*.starts"):
-        path.unlink()
+    assert count_rows("under_way") > 0
+    with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
+        database.execute("DELETE FROM start_states")
     assert main(TWO_WAYS) == 0
     xr.testing.assert_identical(load(), expected)
 
@@ -336,4 +338,4 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     assert [resume is not None for resume in begun] == [False, True]
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(load(), load("whole.nc"))
-    assert list(Path("out.nc.parts").glob("*.progress*")) == []
+    assert count_rows("under_way") == 0

@@ -67,7 +67,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
         Path("study").write_text(STUDY, encoding="utf-8")
         assert main(["study"]) == 0
-        shutil.rmtree("s.nc.parts")
+        Path("s.nc.progress").unlink()
     return folder
 
 

@@ -142,4 +142,4 @@ def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Pat
     assert main(APART) == 0
     left = {path.name for path in folder.iterdir()}
     foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
-    assert left == {"out.nc", "out.nc.parts", *foreign}
+    assert left == {"out.nc", "out.nc.progress", *foreign}

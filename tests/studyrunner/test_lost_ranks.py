@@ -23,7 +23,7 @@ OVERRIDES = ("axes.frequency={start=1, stop=2, num=5}", "axes.step=[100, 200]", 
 @pytest.fixture
 def completion(tmp_path: Path) -> Iterator[CompletionIndex]:
     study = read_study("sdof_slider", OVERRIDES)
-    completion = open_completion(study, build_tasks(study, 2), tmp_path / "parts")
+    completion = open_completion(study, build_tasks(study, 2), tmp_path / "out.nc.progress")
     yield completion
     completion.store.close()
 
@@ -95,7 +95,7 @@ def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion:
     assert again == first
     finish(progress, [again, *others])
     assert_finished(progress, completion)
-    assert len(completion.store.select(lambda records: records["outcome"] == Outcome.CRASHED)) == crashed.n_results
+    assert len(completion.store.with_outcome({Outcome.CRASHED.meaning})) == crashed.n_results
 
 
 def test_a_branch_that_crashed_twice_ends_there(completion: CompletionIndex) -> None:

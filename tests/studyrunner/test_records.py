@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from studyrunner.checkpoint.part_files import KEY
-from studyrunner.checkpoint.records import empty_record, pack, record_type
+from studyrunner.checkpoint.records import empty_record, pack_record, record_of, record_type, unpack_records, values_in
 from studyrunner.plan.results import failed_result
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study_file import read_study
@@ -31,8 +32,11 @@ def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
     ]
     kind = record_type(study, FACTS)
     for task, result in pairs:
-        (record,) = pack(kind, "f" * 32, result)
-        assert record[KEY] == b"f" * 32
+        (record,) = records = record_of(kind, result)
+        values = values_in(pack_record(records), kind)
+        assert values is not None
+        found = unpack_records(np.stack([values, values]), kind)
+        assert found.tobytes() == 2 * records.tobytes()
         assert result.values.keys() == {*KEPT, *task.variables}
         for name in result.values:
             np.testing.assert_equal(record[name], result.values[name])
@@ -44,10 +48,21 @@ def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None
     task = build_tasks(study, FACTS.n_displacements).marches[0][0]
     failed = failed_result(task, 1, 11, "what went wrong")
     assert (failed.points, failed.place) == (task.histories[1].points, 1)
-    (record,) = pack(kind, "0" * 32, failed)
+    (record,) = record_of(kind, failed)
     assert (record["outcome"], record["message"]) == (11, "what went wrong")
     (nothing,) = empty_record(kind)
     for found in (record, nothing):
-        for name in set(kind.names or ()) - {KEY, "outcome", "message"}:
+        for name in set(kind.names or ()) - {"outcome", "message"}:
             there = found[name]
             assert np.all(np.isnan(there) if there.dtype.kind == "f" else there == 0), name
+
+
+def test_a_record_of_another_study_is_none_of_this() -> None:
+    study, other = (read_study("sdof_slider", (*OVERRIDES, f"slow_time.outputs={n}")) for n in (3, 4))
+    kind = record_type(study, FACTS)
+    packed = pack_record(empty_record(kind))
+    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (np.zeros(kind.itemsize),))]
+    for odd in (pack_record(empty_record(record_type(other, FACTS))), replace(packed, text=""), *wrong):
+        assert values_in(odd, kind) is None
+    assert values_in(None, kind) is None
+    assert values_in(packed, kind) is not None

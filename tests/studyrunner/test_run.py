@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -115,13 +114,13 @@ def test_unexpected_failure_keeps_the_old_file(
     use_fake(monkeypatch, lambda _, result: result)
     assert main(SMALL) == 0
     earlier = (folder / "out.nc").read_bytes()
-    shutil.rmtree(folder / "out.nc.parts")
+    (folder / "out.nc.progress").unlink()
     with monkeypatch.context() as broken:
         broken.setattr(run.TaskProgress, "take", fail)
         assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_bytes() == earlier
-    assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.parts"]
+    assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.progress"]
     assert main(SMALL) == 0
 
 

@@ -14,7 +14,7 @@ from studies.scene_answers import NaturalFrequencies
 from studies.scenes import dovetail_sector, scene_mesh
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
-from studyrunner.netcdf.output import parts_folder
+from studyrunner.netcdf.output import progress_file
 from studyrunner.plan.tasks import build_tasks
 from studyrunner.scene import variables as scene_variables
 from studyrunner.scene.scene import build_study_scene
@@ -43,7 +43,7 @@ def test_the_file_is_the_one_of_the_plain_twin(
     of_scene += build_scene_variables(mesh, build_study_scene(mesh))
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
-    completion = fake_completion(study, plan, results, parts_folder(tmp_path / "out.nc"))
+    completion = fake_completion(study, plan, results, progress_file(tmp_path / "out.nc"))
     with contextlib.closing(completion.store):
         gathered = gather.gather(study, FACTS, completion, tmp_path / "out.nc", of_scene)
     twin_set = build_dataset(study, FACTS, results, gathered.certificates, of_scene)

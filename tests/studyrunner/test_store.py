@@ -1,13 +1,19 @@
-"""The folder of a study: whole files or none, what is damaged or of others, and the lock."""
+"""The file of a study: what was reported as written is there later; damage, other runs, and files that nobody vouches
+for.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import os
-import re
+import random
+import shutil
+import sqlite3
 import subprocess
 import sys
 import threading
 import time
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,99 +21,144 @@ import numpy as np
 import pytest
 
 from solver.packing import Packed
-from studyrunner.checkpoint import folder_contents, part_writer
+from studyrunner.checkpoint import contents, database
 from studyrunner.checkpoint import store as store_module
-from studyrunner.checkpoint.part_files import KEY, KEY_TYPE
-from studyrunner.checkpoint.segment_index import FILES_A_MERGE
-from studyrunner.checkpoint.store import SECONDS_A_FILE, SECONDS_A_PROGRESS, Store
-from studyrunner.mpi.crashes import count_crashes, forget_crashes, read_tally
-from studyrunner.system import folder_lock
-from studyrunner.system.folder_lock import StoreInUseError
+from studyrunner.checkpoint.database import COMPUTED, RESULTS, STARTS, TABLES, UNDER_WAY, StoreInUseError
+from studyrunner.checkpoint.store import SECONDS_A_TRANSACTION, Store
 from studyrunner.user_error import StorageError
-
-KIND = np.dtype([(KEY, KEY_TYPE, ()), ("outcome", "int8", ()), ("values", "float64", (5,))])
-OTHER_KIND = np.dtype([(KEY, KEY_TYPE, ()), ("outcome", "int8", ()), ("values", "float64", (6,))])
-RECORDS, STARTS, PROGRESS = "*.npy", "*.starts", "*.progress"
 
 
 def key(number: int) -> str:
     return f"{number:032x}"
 
 
-def record(number: int, kind: np.dtype[np.void] = KIND) -> np.ndarray:
-    found = np.zeros(1, kind)
-    found[KEY], found["outcome"], found["values"] = key(number).encode(), number % 3, number / 7.0
-    return found
-
-
 def kept(number: int) -> Packed:
     return Packed(f"é state {number}", (np.arange(3.0) + number, np.full((2, 2), number * 1j)))
 
 
-def fill(folder: Path, numbers: range = range(4), kind: np.dtype[np.void] = KIND) -> None:
-    """A run that finishes some histories and start states and then ends."""
-    store = Store(folder, kind)
-    for number in numbers:
-        store.add_history(key(number), record(number, kind))
-        store.add_start(key(number), kept(number))
-    store.flush()
-    store.close()
+def put(store: Store, table: str, number: int, finished: str = "") -> None:
+    store.put(table, key(number), kept(number), {}, finished)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return tmp_path / "out.nc.parts"
+def fill(path: Path, numbers: range = range(4), tables: tuple[str, ...] = TABLES) -> None:
+    """A run that computes some entries and ends."""
+    with contextlib.closing(Store(path)) as store:
+        for number in numbers:
+            for table in tables:
+                put(store, table, number)
+            store.flush()
 
 
-@pytest.fixture
-def opened(folder: Path) -> Iterator[Store]:
-    store = Store(folder, KIND)
-    yield store
-    store.close()
+def entries_of(store: Store) -> dict[tuple[str, str], Packed | None]:
+    return {(table, key): store.read(table, key) for table in TABLES for key in sorted(store.on_disk(table))}
 
 
-def records_of(store: Store) -> dict[str, bytes]:
-    return {key: store.read(number)[row].tobytes() for key, (number, row) in store.histories.items()}
-
-
-def names(folder: Path) -> list[str]:
-    """What a folder holds, each file without the part of its name that tells whose it is."""
-    return sorted(re.sub("-[0-9a-f]{12}", "", path.name) for path in folder.iterdir())
-
-
-def settle(store: Store) -> None:
-    """What was handed over is written, and what it stands for removed."""
-    store.flush()
-    store.close()
-
-
-def assert_same(found: Packed, expected: Packed) -> None:
+def assert_same(found: Packed | None, expected: Packed) -> None:
+    assert found is not None
     assert found.text == expected.text
     for one, other in zip(found.arrays, expected.arrays, strict=True):
         np.testing.assert_array_equal(one, other, strict=True)
 
 
-def test_what_is_read_is_what_was_added_now_and_in_a_later_run(folder: Path) -> None:
-    store = Store(folder, KIND)
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "out.nc.progress"
+
+
+@pytest.fixture
+def opened(path: Path) -> Iterator[Store]:
+    with contextlib.closing(Store(path)) as store:
+        yield store
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database, "_SECONDS_TO_DIE", 0.2)
+
+
+def test_what_is_read_is_what_was_added_now_and_in_a_later_run(path: Path) -> None:
+    store = Store(path)
     for number in range(7):
-        store.add_history(key(number), record(number))
-        store.add_start(key(number), kept(number))
+        for table in TABLES:
+            put(store, table, number)
+            assert_same(store.read(table, key(number)), kept(number))
         if number % 3 == 1:
             store.flush()
     store.flush()
-    store.flush()
-    expected = {key(number): record(number).tobytes() for number in range(7)}
     for _ in range(2):
-        assert records_of(store) == expected
-        for number in range(7):
-            assert_same(store.read_start(key(number)), kept(number))
+        found = entries_of(store)
+        assert len(found) == 7 * len(TABLES)
+        for (_, name), packed in found.items():
+            assert_same(packed, kept(int(name, 16)))
+        assert store.read(RESULTS, key(8)) is None
         store.close()
-        store = Store(folder, KIND)
-    # a later run does not write over what an earlier one has left
-    store.add_history(key(7), record(7))
-    store.flush()
-    assert records_of(store) == expected | {key(7): record(7).tobytes()}
+        assert list(path.parent.iterdir()) == [path]
+        store = Store(path)
+        assert store.notes == []
     store.close()
+
+
+ARRAYS = [
+    np.zeros(0),
+    np.zeros((3, 0, 2)),
+    np.array(-0.0),
+    np.array(7, "int8"),
+    np.array([np.nan, -np.nan, np.inf, -0.0, 5e-324]),
+    np.arange(24.0).reshape(2, 3, 4).transpose(2, 0, 1),
+    np.arange(6.0)[::2] * 1j,
+    np.array([True, False]),
+    np.array(["é", "", "long text"]),
+    np.array([b"a", b""]),
+    np.arange(5, dtype=">f8"),
+    np.arange(5, dtype="float32"),
+]
+
+
+@pytest.mark.parametrize("array", ARRAYS, ids=lambda array: f"{array.dtype}{array.shape}")
+def test_arrays_are_kept_to_the_last_bit(array: np.ndarray) -> None:
+    found = contents.decompress(*contents.compress(Packed('{"text": "\udce9"}', (array, array)), 6))
+    assert found.text == '{"text": "\udce9"}'
+    for one in found.arrays:
+        assert (one.dtype, one.shape, one.tobytes()) == (array.dtype, array.shape, array.tobytes())
+        assert one.flags.writeable
+
+
+def test_objects_are_not_kept() -> None:
+    with pytest.raises(TypeError, match="arrays of object are not kept"):
+        contents.compress(Packed("", (np.array([{}], dtype=object),)), 1)
+
+
+def raw(head: bytes, body: bytes = b"", length: int | None = None) -> tuple[int, bytes]:
+    content = (len(head) if length is None else length).to_bytes(8, "little") + head + body
+    return len(content), zlib.compress(content)
+
+
+HOSTILE = {
+    "a bomb": (1000, zlib.compress(bytes(10**7))),
+    "a size beyond all": (10**12, zlib.compress(bytes(10**3))),
+    "no size": (0, b""),
+    "no zlib": (10, b"x" * 10),
+    "half of it": (raw(b'["", []]')[0], raw(b'["", []]')[1][:-6]),
+    "no JSON": raw(b"[["),
+    "nested JSON": raw(b"[" * 10**5),
+    "no layout": raw(b'["", 7]'),
+    "no text": raw(b"[7, []]"),
+    "a long head": raw(b'["", []]', length=2**63),
+    "objects": raw(b'["", [["|O", [1]]]]', bytes(8)),
+    "a structure": raw(b'["", [["f8,f8", [1]]]]', bytes(16)),
+    "no type": raw(b'["", [["spam", [1]]]]', bytes(8)),
+    "too many numbers": raw(b'["", [["<f8", [100000000000]]]]', bytes(8)),
+    "negative numbers": raw(b'["", [["<f8", [-1]]]]', bytes(8)),
+    "no whole numbers": raw(b'["", [["<f8", [1.0]]]]', bytes(8)),
+    "more than it says": raw(b'["", [["<f8", [1]]]]', bytes(9)),
+    "too many dimensions": raw(b'["", [["<f8", [' + b"1," * 99 + b"1]]]]", bytes(8)),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_contents_that_no_run_has_written_are_refused(case: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011 - numpy and json have sentences of their own
+        contents.decompress(*HOSTILE[case])
 
 
 def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_others(
@@ -115,485 +166,443 @@ def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_othe
 ) -> None:
     now = 1000.0
     monkeypatch.setattr(store_module.time, "monotonic", lambda: now)
-    for number, (seconds, n_files) in enumerate([(0.0, 1), (0.5, 1), (0.6, 2)]):
-        opened.add_history(key(number), record(number))
-        now += seconds * SECONDS_A_FILE
+    for number, (seconds, n_written) in enumerate([(0.0, 1), (0.5, 1), (0.6, 3)]):
+        put(opened, RESULTS, number)
+        now += seconds * SECONDS_A_TRANSACTION
         opened.tick()
         opened._take(wait=True)
-        assert len(opened.numbers) == n_files
-    assert [len(opened.read(number)) for number in opened.numbers] == [1, 2]
-
-
-def test_the_progress_of_many_tasks_goes_into_one_file(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 1000.0
-    monkeypatch.setattr(store_module.time, "monotonic", lambda: now)
-    opened.keep_progress(key(0), kept(0))
-    for number in range(1, 100):
-        opened.keep_progress(key(number), kept(number))
-        opened.tick()
-        opened._take(wait=True)
-        now += SECONDS_A_PROGRESS / 50.0
-    assert len(list(opened.folder.glob(PROGRESS))) == 2
-    for number in range(100):
-        found = opened.read_progress(key(number))
-        assert found is not None
-        assert_same(found, kept(number))
+        assert len(opened.on_disk(RESULTS)) == n_written
 
 
 def test_nobody_waits_for_a_slow_disk_unless_it_is_far_behind(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    synced = threading.Event()
-    monkeypatch.setattr(part_writer.files, "sync", lambda _: synced.wait(60.0))
-    monkeypatch.setattr(store_module, "MOST_BYTES_WAITING", 20 * KIND.itemsize)
-    opened.add_history(key(0), record(0))
+    synced, own = threading.Event(), store_module.compress
+
+    def slow(packed: Packed, level: int) -> tuple[int, bytes]:
+        synced.wait(60.0)
+        return own(packed, level)
+
+    monkeypatch.setattr(store_module, "compress", slow)
+    monkeypatch.setattr(store_module, "MOST_BYTES_WAITING", 40 * kept(0).n_bytes)
+    put(opened, RESULTS, 0)
     opened.tick()
-    began = time.monotonic()
     for number in range(1, 20):
-        opened.add_history(key(number), record(number))
-        opened.add_start(key(number), kept(number))
-        opened._waiting.n_bytes -= kept(number).n_bytes
+        put(opened, RESULTS, number)
+        put(opened, STARTS, number)
         opened.tick()
         # what is on its way is there for who asks
-        assert opened.has_start(key(number))
-        assert_same(opened.read_start(key(number)), kept(number))
-    assert time.monotonic() - began < 5.0
-    assert opened.histories == {}
+        assert opened.has(STARTS, key(number))
+        assert_same(opened.read(STARTS, key(number)), kept(number))
+    assert not opened.on_disk(RESULTS)
     threading.Timer(0.2, synced.set).start()
-    monkeypatch.setattr(store_module, "_BYTES_A_FILE", 0.0)
-    opened.add_history(key(20), record(20))
-    opened.add_history(key(21), record(21))
+    monkeypatch.setattr(store_module, "_BYTES_A_TRANSACTION", 0.0)
+    for number in range(20, 24):
+        put(opened, RESULTS, number)
     assert synced.is_set()
     opened.flush()
-    assert len(opened.histories) == 22
+    assert len(opened.on_disk(RESULTS)) == 24
 
 
-def test_little_is_kept_in_memory(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "_BYTES_A_FILE", 2.5 * KIND.itemsize)
-    for number in range(10):
-        opened.add_history(key(number), record(number))
-        opened._take(wait=True)
-        assert len(opened.numbers) == (number + 1) // 3
+def test_a_transaction_is_there_as_a_whole_or_not_at_all(path: Path) -> None:
+    """On a disk without room for all of it."""
+    fill(path, range(2))
+    with contextlib.closing(Store(path)) as store:
+        before = entries_of(store)
+        (n_pages,) = store._database.execute("PRAGMA page_count").fetchone()
+        store._database.execute(f"PRAGMA max_page_count={n_pages + 1}").fetchall()
+        put(store, RESULTS, 7)
+        store.put(STARTS, key(7), Packed("", (np.random.default_rng(0).random(10_000),)), {})
+        for _ in range(2):
+            with pytest.raises(StorageError, match=r"No space left on device: make room there"):
+                store.flush()
+            assert entries_of(store).keys() == before.keys()
+        # what could not be written waits until there is room
+        assert store.has(STARTS, key(7))
+        store._database.execute("PRAGMA max_page_count=100000").fetchall()
+        store.flush()
+    with contextlib.closing(Store(path)) as store:
+        assert entries_of(store).keys() == before.keys() | {(RESULTS, key(7)), (STARTS, key(7))}
 
 
-def test_a_file_appears_whole_or_not_at_all(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened.add_history(key(0), record(0))
-
-    def fail(*_: object) -> None:
-        assert list(opened.folder.glob(RECORDS)) == []
-        raise OSError(28, "No space left on device")
-
-    for name in ("replace", "sync", "sync_folder"):
-        with monkeypatch.context() as full:
-            module = part_writer.os if name == "replace" else part_writer.files
-            if name == "sync_folder":
-                full.setattr(module, name, lambda *_: os.close(-1))
-            else:
-                full.setattr(module, name, fail)
-            said = r"No space left on device: make room there|Bad file descriptor: mend that"
-            with pytest.raises(StorageError, match=said):
-                opened.flush()
-        assert opened.numbers == []
-        assert names(opened.folder) == ["lock"]
-    opened.flush()
-    assert records_of(opened) == {key(0): record(0).tobytes()}
+def test_progress_is_replaced_and_goes_with_the_end_of_its_task(path: Path) -> None:
+    with contextlib.closing(Store(path)) as store:
+        assert store.read_progress(key(9)) is None
+        store.keep_progress(key(9), kept(1))
+        store.flush()
+        store.keep_progress(key(9), kept(2))
+        assert_same(store.read_progress(key(9)), kept(2))
+    with contextlib.closing(Store(path)) as store:
+        assert_same(store.read_progress(key(9)), kept(2))
+        store.keep_progress(key(9), kept(3))
+        put(store, RESULTS, 0, finished=key(9))
+        assert store.read_progress(key(9)) is None
+    with contextlib.closing(Store(path)) as store:
+        assert store.read_progress(key(9)) is None
+        assert_same(store.read(RESULTS, key(0)), kept(0))
 
 
-def test_start_states_are_there_before_what_came_after_them(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise progress of a branch, or a history, would stand there without the states before."""
-    written: list[str] = []
-    replace = part_writer.os.replace
-
-    def note(source: Path, target: Path) -> None:
-        written.append(target.suffix)
-        replace(source, target)
-
-    monkeypatch.setattr(part_writer.os, "replace", note)
-    opened.add_history(key(0), record(0))
-    opened.add_start(key(1), kept(1))
-    opened.keep_progress(key(2), kept(2))
-    opened.flush()
-    assert written == [".starts", ".npy", ".progress"]
+def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_for_it(path: Path) -> None:
+    with contextlib.closing(Store(path)) as store:
+        assert store.read_computed("natural frequencies") is None
+        store.keep_computed("natural frequencies", kept(1))
+        store.keep_computed("scene", kept(2))
+        store.prune({}, 0.0)
+    with contextlib.closing(Store(path)) as store:
+        assert_same(store.read_computed("natural frequencies"), kept(1))
+        store.prune({}, 0.0)
+    with contextlib.closing(Store(path)) as store:
+        assert store.on_disk(COMPUTED) == {"natural frequencies"}
 
 
-def test_progress_is_replaced_and_goes_with_the_end_of_its_task(folder: Path) -> None:
-    store = Store(folder, KIND)
-    assert store.read_progress(key(9)) is None
-    store.keep_progress(key(9), kept(1))
+def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
+    opened: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store_module, "LARGEST", 10)
+    opened.keep_computed("scene", kept(1))
+    opened.keep_progress(key(1), kept(1))
+    assert (opened.read_computed("scene"), opened.read_progress(key(1))) == (None, None)
+    with pytest.raises(StorageError, match="bytes in one entry: use a smaller model"):
+        put(opened, RESULTS, 1)
+
+
+def test_what_is_forgotten_is_replaced_by_what_comes(path: Path) -> None:
+    fill(path)
+    with contextlib.closing(Store(path)) as store:
+        store.forget(RESULTS, key(1))
+        store.forget(STARTS, key(2))
+        assert not store.has(RESULTS, key(1))
+        assert store.read(RESULTS, key(1)) is None
+        store.put(RESULTS, key(1), kept(77), {})
+        store.flush()
+    with contextlib.closing(Store(path)) as store:
+        assert_same(store.read(RESULTS, key(1)), kept(77))
+        # nothing took its place, and it was not to be removed
+        assert_same(store.read(STARTS, key(2)), kept(2))
+        store.forget(STARTS, key(2))
+        store.remove_forgotten()
+    with contextlib.closing(Store(path)) as store:
+        assert not store.has(STARTS, key(2))
+
+
+def test_pruning_keeps_what_is_named(path: Path) -> None:
+    fill(path, range(6))
+    with contextlib.closing(Store(path)) as store:
+        store.prune({RESULTS: {key(0), key(3)}, STARTS: {key(5), key(99)}}, 0.0)
+    with contextlib.closing(Store(path)) as store:
+        assert entries_of(store).keys() == {(RESULTS, key(0)), (RESULTS, key(3)), (STARTS, key(5))}
+
+
+def test_of_what_is_not_named_the_latest_stays(path: Path) -> None:
+    for number in range(6):
+        fill(path, range(number, number + 1), (RESULTS,))
+    with contextlib.closing(Store(path)) as store:
+        (size,) = store._database.execute("SELECT max(length(content)) FROM results").fetchone()
+        store.prune({RESULTS: {key(1)}}, 2.5 * size)
+    with contextlib.closing(Store(path)) as store:
+        assert store.on_disk(RESULTS) == {key(1), key(4), key(5)}
+
+
+def test_room_is_given_back_at_the_end(path: Path) -> None:
+    with contextlib.closing(Store(path)) as store:
+        put(store, RESULTS, 1)
+        random_numbers = np.random.default_rng(0).random(10**5)
+        store.keep_progress(key(1), Packed("", (random_numbers,)))
+        store.flush()
+        assert path.stat().st_size > 0.9 * random_numbers.nbytes
+        store.forget(UNDER_WAY, key(1))
+        store.remove_forgotten()
+        store.shrink()
+    assert path.stat().st_size < 10**5
+    with contextlib.closing(Store(path)) as store:
+        assert entries_of(store).keys() == {(RESULTS, key(1))}
+
+
+def test_a_transaction_survives_a_loss_of_power(opened: Store) -> None:
+    """By the settings for which SQLite promises this, on a file system that does what it is told."""
+    query = opened._database.execute
+    settings = {name: query(f"PRAGMA {name}").fetchone()[0] for name in ("synchronous", "journal_mode", "locking_mode")}
+    assert settings == {"synchronous": 2, "journal_mode": "delete", "locking_mode": "exclusive"}
+
+
+WRITER = """
+import itertools, sys
+from pathlib import Path
+import numpy as np
+from solver.packing import Packed
+from studyrunner.checkpoint.store import Store
+store = Store(Path(sys.argv[1]))
+for number in itertools.count(int(sys.argv[2])):
+    for table in ("results", "start_states"):
+        store.put(table, f"{number:032x}", Packed("", (np.full(20_000, float(number)),)), {})
+    store.keep_progress("a" * 32, Packed("", (np.random.default_rng(number).random(1000 * (number % 50)),)))
     store.flush()
-    store.keep_progress(key(9), kept(2))
-    store.close()
-    assert len(list(folder.glob(PROGRESS))) == 1
-    store = Store(folder, KIND)
-    found = store.read_progress(key(9))
-    assert found is not None
-    assert_same(found, kept(2))
-    store.add_history(key(0), record(0), task=key(9))
-    assert store.read_progress(key(9)) is not None
-    store.flush()
-    assert store.read_progress(key(9)) is None
-    store.close()
-    assert list(folder.glob(PROGRESS)) == []
-
-
-def test_progress_that_waits_goes_with_the_end_of_its_task(folder: Path) -> None:
-    store = Store(folder, KIND)
-    store.keep_progress(key(9), kept(1))
-    store.add_history(key(0), record(0), task=key(9))
-    settle(store)
-    assert names(folder) == ["00000001.npy", "lock"]
-
-
-@pytest.mark.parametrize("pattern", [RECORDS, STARTS])
-@pytest.mark.parametrize("damage", ["empty", "truncated", "a bit", "the last bit", "other content", "longer"])
-def test_what_is_damaged_is_forgotten_with_a_line_and_nothing_else(pattern: str, damage: str, folder: Path) -> None:
-    fill(folder, range(4))
-    fill(folder, range(4, 6))
-    path = min(folder.glob(pattern))
-    content = path.read_bytes()
-    # in the middle of the data of the first entry, which no description of it shows
-    flipped, last = bytearray(content), bytearray(content)
-    place = content.index(np.full(5, 3 / 7.0).tobytes() if pattern == RECORDS else np.arange(3.0).tobytes())
-    flipped[place] ^= 1
-    last[-1] ^= 1
-    path.write_bytes(
-        {
-            "empty": b"",
-            "truncated": content[:-7],
-            "a bit": bytes(flipped),
-            "the last bit": bytes(last),
-            "other content": b"x" * 1000,
-            "longer": content + content,
-        }[damage]
-    )
-    store = Store(folder, KIND)
-    assert store.notes == [f"out.nc.parts: {path.name} is damaged, what it held is computed again"]
-    of_records = pattern == RECORDS
-    assert set(store.histories) == {key(number) for number in (range(4, 6) if of_records else range(6))}
-    there = [number for number in range(6) if store.has_start(key(number))]
-    assert there == list(range(6) if of_records else range(4, 6))
-    assert not path.exists()
-    for number in there:
-        assert_same(store.read_start(key(number)), kept(number))
-    store.add_history(key(8), record(8))
-    store.flush()
-    assert records_of(store)[key(8)] == record(8).tobytes()
-    store.close()
+    print(number, flush=True)
+"""
 
 
 @pytest.mark.slow
-def test_any_bit_of_a_file_matters(folder: Path) -> None:
-    """Of all bits of each sort of file: none makes anything but what was there before, or nothing."""
-    store = Store(folder, KIND)
-    store.add_history(key(1), record(1))
-    store.add_start(key(1), kept(1))
-    store.keep_progress(key(1), kept(2))
-    settle(store)
-    for pattern in (RECORDS, STARTS, PROGRESS):
-        (path,) = folder.glob(pattern)
-        content = path.read_bytes()
-        for bit in range(0, 8 * len(content), 37):
-            flipped = bytearray(content)
-            flipped[bit // 8] ^= 1 << bit % 8
-            path.write_bytes(flipped)
-            store = Store(folder, KIND)
-            assert len(store.notes) == 1
-            store.close()
-            assert not path.exists()
-        path.write_bytes(content)
-    store = Store(folder, KIND)
-    assert (store.notes, len(store.histories)) == ([], 1)
-    store.close()
+def test_nothing_that_was_reported_as_written_is_lost_to_kills(path: Path) -> None:
+    chance, first = random.Random(0), 0
+    for _ in range(12):
+        with subprocess.Popen([sys.executable, "-c", WRITER, str(path), str(first)], stdout=subprocess.PIPE) as run:
+            assert run.stdout is not None
+            assert run.stdout.readline()
+            time.sleep(chance.uniform(0.0, 0.3))
+            run.kill()
+            written = first + len(run.stdout.read().split())
+        with contextlib.closing(Store(path)) as store:
+            assert store.notes == []
+            assert len(store.on_disk(RESULTS)) > written
+            assert store.on_disk(RESULTS) == store.on_disk(STARTS)
+            for (table, name), packed in entries_of(store).items():
+                assert packed is not None
+                assert table == UNDER_WAY or (packed.arrays[0] == int(name, 16)).all()
+            first = len(store.on_disk(RESULTS))
 
 
+# what is damaged
+
+
+def change_bytes(path: Path, place: int, content: bytes) -> None:
+    with path.open("rb+") as file:
+        file.seek(place)
+        file.write(content)
+
+
+def change_tables(path: Path, *commands: str) -> None:
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as changed:
+        for command in commands:
+            changed.execute(command).fetchall()
+
+
+DAMAGES = {
+    "cut off": lambda path: os.truncate(path, path.stat().st_size // 2),
+    "a page": lambda path: change_bytes(path, 4096, os.urandom(4096)),
+    "all pages": lambda path: change_bytes(path, 4096, bytes(path.stat().st_size - 4096)),
+    "other content": lambda path: path.write_bytes(b"x" * 1000),
+    "another file": lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(1000)),
+    "its tables": lambda path: change_tables(path, "DROP TABLE tasks"),
+    "another table": lambda path: change_tables(path, "CREATE TABLE spam (egg)"),
+    "another column": lambda path: change_tables(path, "ALTER TABLE results ADD COLUMN spam"),
+    "a view": lambda path: change_tables(path, "CREATE VIEW spam AS SELECT load_extension('egg')"),
+    "a trigger": lambda path: change_tables(
+        path, "CREATE TRIGGER spam AFTER DELETE ON tasks BEGIN DELETE FROM results; END"
+    ),
+    "an index": lambda path: change_tables(path, "CREATE INDEX spam ON results (length(content))"),
+    "a write-ahead log": lambda path: change_tables(path, "PRAGMA journal_mode=WAL"),
+    "another version": lambda path: change_tables(path, "PRAGMA user_version=99"),
+    "another program": lambda path: change_tables(path, "PRAGMA application_id=99"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_kept_aside_and_the_study_begins_anew(damage: str, path: Path) -> None:
+    for aside in ("out.nc.progress.damaged", "out.nc.progress.damaged-2"):
+        fill(path)
+        DAMAGES[damage](path)
+        before = path.read_bytes()
+        with contextlib.closing(Store(path)) as store:
+            (note,) = store.notes
+            assert note.startswith("out.nc.progress ")
+            assert note.endswith(f": it is kept as {aside}, and the study begins anew")
+            assert entries_of(store) == {}
+            put(store, RESULTS, 8)
+            assert path.with_name(aside).read_bytes() == before
+        with contextlib.closing(Store(path)) as store:
+            assert store.notes == []
+            assert store.on_disk(RESULTS) == {key(8)}
+        path.unlink()
+
+
+def test_a_damaged_entry_is_forgotten_with_a_line_and_nothing_else(path: Path) -> None:
+    fill(path)
+    change_tables(
+        path,
+        f"UPDATE results SET content=x'00' WHERE key='{key(1)}'",
+        f"UPDATE results SET checksum='spam' WHERE key='{key(2)}'",
+        f"UPDATE start_states SET content=(SELECT content FROM start_states WHERE key='{key(0)}') WHERE key='{key(3)}'",
+        f"UPDATE computed SET content='text' WHERE key='{key(3)}'",
+    )
+    with contextlib.closing(Store(path)) as store:
+        assert store.notes == ["out.nc.progress: 4 damaged entries, which are computed again"]
+        assert len(entries_of(store)) == 4 * len(TABLES) - 4
+        assert store.on_disk(RESULTS) == {key(0), key(3)}
+        put(store, RESULTS, 1)
+        store.remove_forgotten()
+    with contextlib.closing(Store(path)) as store:
+        assert store.notes == []
+        assert len(entries_of(store)) == 4 * len(TABLES) - 3
+
+
+def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
+    fill(path)
+    change_tables(path, "UPDATE results SET size=900000000", "UPDATE start_states SET size=NULL")
+    with contextlib.closing(Store(path)) as store:
+        assert (store.read(RESULTS, key(1)), store.read(STARTS, key(1))) == (None, None)
+        assert not store.has(RESULTS, key(1))
+
+
+@pytest.mark.slow
+def test_any_bit_of_a_file_matters(path: Path) -> None:
+    """None makes anything but what was there before, or nothing; none ends in a traceback."""
+    fill(path, range(2))
+    content, expected = path.read_bytes(), {}
+    with contextlib.closing(Store(path)) as store:
+        expected = entries_of(store)
+    chance = random.Random(1)
+    for _ in range(400):
+        bit = chance.randrange(8 * len(content))
+        flipped = bytearray(content)
+        flipped[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(flipped)
+        with contextlib.closing(Store(path)) as store:
+            for name, packed in entries_of(store).items():
+                if packed is not None:
+                    assert_same(packed, expected[name])
+                    assert packed.text == expected[name].text
+            put(store, RESULTS, 8)
+        for aside in path.parent.glob("*.damaged*"):
+            aside.unlink()
+
+
+# files that nobody vouches for
+
+
+@pytest.mark.parametrize("suffix", ["", "-journal"])
 @pytest.mark.parametrize("what", ["fifo", "folder", "endless", "link", "link to nowhere"])
-@pytest.mark.parametrize("suffix", [".npy", ".starts", ".progress", ".crash", ".died"])
-def test_only_plain_files_are_opened(what: str, suffix: str, folder: Path, tmp_path: Path) -> None:
-    fill(folder)
-    own = min(folder.glob(RECORDS))
-    names = {".crash": "rank-0.crash", ".died": f"{'0' * 32}.1.died"}
-    odd = folder / names.get(suffix, f"00000007{suffix}")
+def test_only_plain_files_are_opened(what: str, suffix: str, path: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    fill(precious)
+    before = precious.read_bytes()
+    odd = path.with_name(path.name + suffix)
     if what == "fifo":
         os.mkfifo(odd)
     elif what == "folder":
         odd.mkdir()
     else:
-        odd.symlink_to({"endless": Path("/dev/zero"), "link": own, "link to nowhere": tmp_path / "none"}[what])
-    store = Store(folder, KIND)
-    assert odd.is_symlink() or odd.exists()
-    crashes, tally = count_crashes(folder), read_tally(folder)
-    store.add_history(key(8), record(8))
-    settle(store)
-    assert (crashes, tally) == ((), {})
-    assert len(store.histories) == 5
+        odd.symlink_to({"endless": Path("/dev/zero"), "link": precious, "link to nowhere": tmp_path / "none"}[what])
+    with pytest.raises(StorageError, match=r"is no plain file: remove it or give another result file with -o"):
+        Store(path)
     assert not (tmp_path / "none").exists()
-    if suffix not in names:
-        assert [f"{odd.name} is damaged" in note for note in store.notes] == [True]
+    assert precious.read_bytes() == before
 
 
-@pytest.mark.parametrize("key", ["../precious", "f" * 32 + "/..", "F" * 32, "0" * 31])
-def test_what_a_crash_says_of_its_task_leads_nowhere_else(key: str, folder: Path) -> None:
-    folder.mkdir()
-    (folder / "rank-3.crash").write_text(crash_text(key))
-    before = sorted(folder.parent.rglob("*"))
-    assert count_crashes(folder) == ()
-    assert sorted(folder.parent.rglob("*")) == [path for path in before if path.suffix != ".crash"]
-
-
-def test_crashes_are_counted_once_each(folder: Path) -> None:
-    folder.mkdir()
-    for number in (1, 2):
-        (folder / "rank-3.crash").write_text(crash_text("a" * 32))
-        assert [crash.key for crash in count_crashes(folder, rank=3)] == ["a" * 32]
-        assert count_crashes(folder) == count_crashes(folder, rank=3) == ()
-        assert {key: len(crashes) for key, crashes in read_tally(folder).items()} == {"a" * 32: number}
-    forget_crashes(folder, {"b" * 32})
-    assert len(read_tally(folder)) == 1
-    forget_crashes(folder, None)
-    assert list(folder.iterdir()) == []
-
-
-def crash_text(key: str) -> str:
-    return f'{key}\nFatal Python error: Aborted\n  File "x.py", line 1 in f\n  File "crashes.py", line 2 in noted\n'
-
-
-def test_a_link_in_place_of_the_lock_is_not_written_through(folder: Path, tmp_path: Path) -> None:
+def test_a_journal_that_names_another_file_does_not_remove_it(path: Path, tmp_path: Path) -> None:
+    """SQLite removes the journal of several files when the last one of these was restored."""
+    fill(path)
     precious = tmp_path / "precious.txt"
     precious.write_text("of value")
-    folder.mkdir()
-    (folder / "lock").symlink_to(precious)
-    with pytest.raises(StorageError, match=r"lock: lock is no plain file: remove it or give another result file"):
-        Store(folder, KIND)
+    name = str(precious).encode()
+    begin = bytes.fromhex("d9d505f920a163d7") + bytes(4) + bytes(4) + (8).to_bytes(4, "big") + (512).to_bytes(4, "big")
+    begin = (begin + (4096).to_bytes(4, "big")).ljust(512, b"\0")
+    end = len(name).to_bytes(4, "big") + (sum(name) & 0xFFFFFFFF).to_bytes(4, "big") + bytes.fromhex("d9d505f920a163d7")
+    journal = path.with_name(f"{path.name}-journal")
+    journal.write_bytes(begin + bytes(4) + name + end)
+    with contextlib.closing(Store(path)) as store:
+        (note,) = store.notes
+    assert "has a journal that is none of a run: it is kept as out.nc.progress.damaged" in note
     assert precious.read_text() == "of value"
 
 
-def test_nothing_is_written_through_a_link(opened: Store, tmp_path: Path) -> None:
-    """Whoever knows the name of the next file: one that is there already is not opened."""
-    precious = tmp_path / "precious.txt"
-    precious.write_text("of value")
-    run = opened._writer._do.__self__.run  # type: ignore[attr-defined]
-    (opened.folder / f"00000001-{run}.npy.partial").symlink_to(precious)
-    opened.add_history(key(0), record(0))
-    with pytest.raises(StorageError, match="File exists"):
-        opened.flush()
-    assert precious.read_text() == "of value"
+# faults of the disk
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no zip file", b"x" * 99])
-def test_damaged_progress_is_forgotten(content: bytes, folder: Path) -> None:
-    fill(folder)
-    (folder / "00000009.progress").write_bytes(content)
-    store = Store(folder, KIND)
-    assert store.read_progress(key(1)) is None
-    assert list(folder.glob(PROGRESS)) == []
-    assert len(store.histories) == 4
-    store.close()
-
-
-def test_files_with_pickles_are_not_read(folder: Path) -> None:
-    folder.mkdir()
-    np.save(folder / "00000000.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    np.save(folder / "00000001.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    os.replace(folder / "00000001.npy", folder / "00000001.starts")
-    store = Store(folder, KIND)
-    assert store.histories == {}
-    assert not store.has_start("a")
-    store.close()
-
-
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (sqlite3.SQLITE_IOERR_READ, "Input/output error: see whether the disk"),
+        (sqlite3.SQLITE_FULL, "No space left on device: make room there"),
+        (sqlite3.SQLITE_READONLY, "Permission denied: see that it may be written"),
+    ],
+)
 def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    code: int, said: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fill(folder)
+    fill(path)
 
-    def fail(*_: object) -> None:
-        raise OSError(5, "Input/output error")
+    def fail(*_: object, **__: object) -> None:
+        error = sqlite3.OperationalError("disk I/O error")
+        error.sqlite_errorcode = code
+        raise error
 
     with monkeypatch.context() as broken:
-        broken.setattr(folder_contents, "load_record_keys", fail)
-        with pytest.raises(StorageError, match="Input/output error"):
-            Store(folder, KIND)
-    store = Store(folder, KIND)
-    assert len(store.histories) == 4
-    store.close()
+        broken.setattr(database, "check", fail)
+        with pytest.raises(StorageError, match=said):
+            Store(path)
+    with contextlib.closing(Store(path)) as store:
+        assert (len(entries_of(store)), store.notes) == (4 * len(TABLES), [])
 
 
-def test_records_of_another_kind_are_not_these_but_are_kept_until_there_is_no_room_for_them(folder: Path) -> None:
-    fill(folder, range(3), OTHER_KIND)
-    fill(folder, range(3, 5))
-    store = Store(folder, KIND)
-    assert set(store.histories) == {key(3), key(4)}
-    store.prune(set(store.histories), (), (), 1e9)
-    store.close()
-    store = Store(folder, OTHER_KIND)
-    assert set(store.histories) == {key(0), key(1), key(2)}
-    store.prune(set(store.histories), (), (), 0.0)
-    store.close()
-    assert names(folder) == ["00000001.npy", "lock"]
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_file_that_was_removed_meanwhile_is_told(replaced: bool, opened: Store, path: Path) -> None:
+    put(opened, RESULTS, 1)
+    opened.flush()
+    path.unlink()
+    if replaced:
+        path.write_bytes(b"of somebody else")
+    put(opened, RESULTS, 2)
+    with pytest.raises(StorageError, match=r"another file has taken its place|No such file"):
+        opened.flush()
+    assert not opened.on_disk(RESULTS) >= {key(2)}
 
 
-FOREIGN = ("notes.txt", "2024.npy", "00000007.npz", "mine.progress.npz", "x.partial", "rank-0.txt", "lost.starts")
-
-
-def test_pruning_keeps_what_is_named_and_files_of_others(folder: Path) -> None:
-    for first in (0, 2, 4):
-        fill(folder, range(first, first + 2))
-    store = Store(folder, KIND)
-    store.keep_progress(key(7), kept(7))
-    store.flush()
-    for name in FOREIGN:
-        (folder / name).touch()
-    store.prune({key(0), key(1), key(3)}, {key(5), key(99)}, (), 0.0)
-    store.close()
-    left = Store(folder, KIND)
-    assert set(left.histories) == {key(0), key(1), key(3)}
-    assert [number for number in range(8) if left.has_start(key(number))] == [5]
-    assert left.read_progress(key(7)) is None
-    left.close()
-    assert len(names(folder)) == len(FOREIGN) + len(["lock", "0 and 1", "3", "start 5"])
-
-
-def test_of_what_is_not_named_the_latest_stays(folder: Path) -> None:
-    for number in range(6):
-        fill(folder, range(number, number + 1))
-    store = Store(folder, KIND)
-    sizes = {path.name: path.stat().st_size for path in folder.iterdir()}
-    pair = sum(sizes[path.name] for path in (min(folder.glob(RECORDS)), min(folder.glob(STARTS))))
-    store.prune({key(1)}, {key(1)}, (), 2.5 * pair)
-    store.close()
-    left = Store(folder, KIND)
-    assert set(left.histories) == {key(number) for number in (1, 4, 5)}
-    left.close()
-
-
-def test_files_that_were_not_finished_are_removed(folder: Path) -> None:
-    fill(folder)
-    before = names(folder)
-    partial = ("00000001.npy.partial", "00000001-0123456789ab.starts.partial", "00000003.progress.partial")
-    for name in partial:
-        (folder / name).write_bytes(b"half of")
-    # of the version before this one
-    (folder / f"{key(0)}.progress.npz").write_bytes(b"PK")
-    store = Store(folder, KIND)
-    store.close()
-    assert names(folder) == before
-    assert len(store.histories) == 4
-
-
-@pytest.mark.slow
-def test_files_are_put_together_while_more_come(folder: Path) -> None:
-    """As many as there may be of each size are all that there are, and the last of several records counts."""
-    store = Store(folder, KIND)
-    n_records, most, expected = 600, 0, {}
-    for number in range(n_records):
-        store.add_history(key(number), record(number))
-        expected[key(number)] = record(number).tobytes()
-        store.add_start(key(number), kept(number))
-        store.keep_progress(key(1000 + number % 30), kept(number))
-        if number % 7 == 0:
-            again = record(number)
-            again["values"] = -number
-            store.add_history(key(number // 2), again)
-            again[KEY] = key(number // 2).encode()
-            store.add_history(key(number // 2), again)
-            expected[key(number // 2)] = again.tobytes()
-        store.flush()
-        most = max(most, len(names(folder)))
-    for _ in range(2):
-        assert records_of(store) == expected
-        for number in range(n_records):
-            assert_same(store.read_start(key(number)), kept(number))
-        for number in range(30):
-            found = store.read_progress(key(1000 + number))
-            assert found is not None
-            assert_same(found, kept(n_records - 30 + number))
-        store.close()
-        store = Store(folder, KIND)
-        assert store.notes == []
-    store.close()
-    n_sizes = 5  # from less than 1 kB to less than 10 MB
-    assert most < 3 * n_sizes * FILES_A_MERGE
-    assert len(names(folder)) < 60
-
-
-def test_a_disk_without_room_for_larger_files_keeps_the_small_ones(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = Store(folder, KIND)
-
-    def fail(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as full:
-        full.setattr(part_writer, "merge_records", fail)
-        for number in range(30):
-            store.add_history(key(number), record(number))
-            store.flush()
-    assert len(records_of(store)) == 30
-    assert len(list(folder.glob(RECORDS))) == 30
-    monkeypatch.setattr(store_module, "_SECONDS_TO_MORE_ROOM", 0.0)
-    store._next_merge = 0.0
-    store.add_history(key(30), record(30))
-    settle(store)
-    assert len(records_of(store)) == 31
-    assert len(list(folder.glob(RECORDS))) < 30
-
-
-def test_what_is_forgotten_is_replaced_by_what_comes(folder: Path) -> None:
-    fill(folder)
-    store = Store(folder, KIND)
-    assert store.select(lambda records: records["outcome"] != 0) == {key(1), key(2)}
-    store.forget_history(key(1))
-    store.forget_start(key(1))
-    assert not store.has_start(key(1))
-    new = record(1)
-    new["outcome"] = 0
-    store.add_history(key(1), new)
-    store.add_start(key(1), kept(77))
-    store.flush()
-    for _ in range(2):
-        assert records_of(store)[key(1)] == new.tobytes()
-        assert_same(store.read_start(key(1)), kept(77))
-        assert store.select(lambda records: records["outcome"] != 0) == {key(2)}
-        store.close()
-        store = Store(folder, KIND)
-    store.close()
-
-
-def test_two_runs_are_kept_apart(folder: Path, opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(folder_lock, "_SECONDS_TO_DIE", 0.1)
-    with pytest.raises(StoreInUseError, match=r"process \d+ on "):
-        Store(folder, KIND)
-    opened.close()
-    Store(folder, KIND).close()
-
+# several runs
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-import numpy as np
 from studyrunner.checkpoint.store import Store
-store = Store(Path(sys.argv[1]), np.dtype([("key", "S32")]))
+store = Store(Path(sys.argv[1]))
 print("locked", flush=True)
 time.sleep(float(sys.argv[2]))
 """
 
 
-def test_the_lock_of_a_dead_run_is_open(folder: Path) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDER, str(folder), "60"], stdout=subprocess.PIPE, text=True
-    ) as holder:
+@contextlib.contextmanager
+def another_run(path: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-c", HOLDER, str(path), str(seconds)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == "locked\n"
+        yield holder
         holder.kill()
-    assert "process" in (folder / "lock").read_text(encoding="utf-8")
-    Store(folder, KIND).close()
 
 
-def test_a_run_waits_for_the_end_of_one_that_is_just_dying(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # on a busy machine it may take longer to die
-    monkeypatch.setattr(folder_lock, "_SECONDS_TO_DIE", 6.0 * folder_lock._SECONDS_TO_DIE)
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDER, str(folder), "0.5"], stdout=subprocess.PIPE, text=True
-    ) as holder:
-        assert holder.stdout is not None
-        assert holder.stdout.readline() == "locked\n"
-        Store(folder, KIND).close()
+def test_two_runs_are_kept_apart(path: Path) -> None:
+    fill(path)
+    with another_run(path, 60.0) as holder:
+        for _ in range(2):
+            with pytest.raises(StoreInUseError, match=rf"process {holder.pid} on \S+$"):
+                Store(path)
+            assert database.read_study(path) is None  # it has not said so, and nobody waits for its lock
+    Store(path).close()
+
+
+def test_two_runs_of_one_process_are_kept_apart(path: Path, opened: Store) -> None:
+    with pytest.raises(StoreInUseError, match=rf"process {os.getpid()} on "):
+        Store(path)
+    # the lock of the first one holds
+    with pytest.raises(AssertionError), another_run(path, 0.0):
+        pass
+    put(opened, RESULTS, 1)
+    opened.flush()
+
+
+def test_a_run_waits_for_the_end_of_one_that_is_just_dying(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database, "_SECONDS_TO_DIE", 30.0)
+    with another_run(path, 0.5):
+        Store(path).close()
+
+
+def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store) -> None:
+    assert database.read_study(path) is None
+    opened.note_study(
+        "joint", "sdof_slider", ("hash", "layout"), [{"key": key(1), "kind": "sweep", "frequency": 100.0}]
+    )
+    assert database.read_study(path) == ("joint", "sdof_slider")
+    assert database.read_study(path.with_name("none")) is None
+    opened.note_study("joint", "two_masses", ("hash", "layout"), [])
+    opened.close()
+    assert database.read_study(path) == ("joint", "two_masses")
+    assert shutil.which("sqlite3") is None or b"two_masses" in subprocess.check_output(
+        ["sqlite3", str(path), "SELECT * FROM study"]
+    )

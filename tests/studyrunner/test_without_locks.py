@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import errno
-import itertools
-import os
-import time
-from collections.abc import Callable
+import contextlib
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.packed_files import unpack_records
+from studyrunner.checkpoint import store as store_module
+from studyrunner.checkpoint.completion_index import CompletionIndex
+from studyrunner.checkpoint.database import RESULTS, TABLES
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
-from studyrunner.system import folder_lock
+from studyrunner.netcdf import gather
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study import Study
 from tests.studyrunner.faked_runs import Solver, Task
-from tests.studyrunner.test_store import KIND, assert_same, kept, key, names, record, records_of
+from tests.studyrunner.test_store import assert_same, entries_of, fill, kept, key, put
 
 SMALL = [
     "sdof_slider",
@@ -34,69 +33,63 @@ VARIANT = [*SMALL, "--set", "axes.excitation_amplitude=11"]
 
 def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on file systems that know none."""
-
-    def fail(*_: object) -> None:
-        raise OSError(errno.ENOSYS, "Function not implemented")
-
-    monkeypatch.setattr(folder_lock.fcntl, "flock", fail)
-
-
-def locks_of_two_hosts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where each host knows its own only."""
-    monkeypatch.setattr(folder_lock.fcntl, "flock", lambda *_: None)
+    monkeypatch.setattr(store_module, "has_locks", lambda _: False)
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return tmp_path / "out.nc.progress"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("locks", [no_locks, locks_of_two_hosts])
-def test_two_stores_in_a_folder_share_no_file(
-    locks: Callable[[pytest.MonkeyPatch], None], folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    locks(monkeypatch)
-    stores = [Store(folder / "out.nc.parts", KIND) for _ in range(2)]
-    for number in range(60):
-        for place, store in enumerate(stores):
-            store.add_history(key(100 * place + number), record(100 * place + number))
-            store.add_start(key(100 * place + number), kept(100 * place + number))
-            store.keep_progress(key(place), kept(number + place))
-            store.flush()
-    for place, store in enumerate(stores):
-        numbers = range(100 * place, 100 * place + 60)
-        assert records_of(store) == {key(number): record(number).tobytes() for number in numbers}
-        for number in numbers:
-            assert_same(store.read_start(key(number)), kept(number))
-        found = store.read_progress(key(place))
-        assert found is not None
-        assert_same(found, kept(59 + place))
-        store.close()
-    assert len(set(names(folder / "out.nc.parts"))) <= len(list((folder / "out.nc.parts").iterdir()))
-    store = Store(folder / "out.nc.parts", KIND)
-    assert len(store.histories) == 120
-    store.close()
-
-
-def test_what_another_run_may_be_at_is_left_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_run_has_a_file_of_its_own_and_takes_what_is_finished(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(path, range(2))
     no_locks(monkeypatch)
-    first = Store(folder / "parts", KIND)
-    first.add_history(key(0), record(0))
-    first.flush()
-    (folder / "parts" / "00000009-0123456789ab.npy.partial").write_bytes(b"half of")
-    (folder / "parts" / "00000009-0123456789ab.starts").write_bytes(b"damaged")
-    before = names(folder / "parts")
-    second = Store(folder / "parts", KIND)
-    assert any("there are no locks on this file system" in note for note in second.notes)
-    second.forget_history(key(0))
-    second.remove_forgotten()
-    second.prune((), (), (), 0.0)
-    second.close()
-    assert names(folder / "parts") == before
-    assert records_of(first) == {key(0): record(0).tobytes()}
-    first.close()
+    first, second = Store(path), Store(path)
+    assert len({path, first.path, second.path}) == 3
+    assert entries_of(first).keys() == entries_of(second).keys()
+    for number in range(10, 40):
+        for place, store in enumerate((first, second)):
+            put(store, RESULTS, 100 * place + number)
+            store.keep_progress(key(9), kept(number + place))
+            store.flush()
+    third = Store(path)
+    assert third.on_disk(RESULTS) == {key(number) for number in (0, 1, *range(10, 40), *range(110, 140))}
+    for (table, name), packed in entries_of(third).items():
+        if table == RESULTS:
+            assert_same(packed, kept(int(name, 16)))
+    assert_same(first.read_progress(key(9)), kept(39))
+    assert_same(second.read_progress(key(9)), kept(40))
+    for store in (first, second, third):
+        store.close()
+
+
+def test_what_another_run_may_be_at_is_left_alone(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    no_locks(monkeypatch)
+    with contextlib.closing(Store(path)) as first:
+        put(first, RESULTS, 0)
+        first.flush()
+        damaged = path.with_name(f"{path.name}-0123456789ab")
+        damaged.write_bytes(first.path.read_bytes()[:9000])
+        before = {found: found.read_bytes() for found in (damaged, first.path)}
+        with contextlib.closing(Store(path)) as second:
+            no_lock, said = second.notes
+            assert "there are no locks on this file system" in no_lock
+            assert said == f"{damaged.name} is not used: it is damaged, or another run writes it now"
+            second.forget(RESULTS, key(0))
+            second.prune({}, 0.0)
+            assert entries_of(second) == {}
+        assert {found: found.read_bytes() for found in before} == before
+
+
+def test_where_there_are_locks_later_nothing_is_lost(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patched:
+        no_locks(patched)
+        fill(path)
+    assert not path.exists()
+    with contextlib.closing(Store(path)) as store:
+        assert store.path == path
+        assert len(entries_of(store)) == 4 * len(TABLES)
 
 
 def test_a_run_says_once_that_there_are_no_locks(
@@ -107,17 +100,14 @@ def test_a_run_says_once_that_there_are_no_locks(
     assert main(SMALL) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "locks" in line]
     assert len(lines) == 1
-    assert lines[0].endswith("so nothing keeps a second run out: give each run a result file of its own with -o")
+    assert lines[0].endswith("give each run a result file of its own with -o")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("locks", [no_locks, locks_of_two_hosts])
 @pytest.mark.parametrize("at", [1, 2, 4, 6])
-def test_two_studies_with_one_result_file_do_not_mix(
-    locks: Callable[[pytest.MonkeyPatch], None], at: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_studies_with_one_result_file_do_not_mix(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second one runs from its start to its end while the first one is at work."""
-    locks(monkeypatch)
+    no_locks(monkeypatch)
     solver = Solver(monkeypatch)
     expected = {}
     for name, command in (("first.nc", SMALL), ("second.nc", VARIANT)):
@@ -143,49 +133,25 @@ def test_two_studies_with_one_result_file_do_not_mix(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", ["another record", "missing", "shorter", "another kind"])
-def test_a_record_that_is_not_the_one_asked_for_is_no_result(
-    change: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A file that changes between the time that it was written and the end of the run."""
+@pytest.mark.parametrize("change", ["UPDATE results SET content=x'00'", "DELETE FROM results"])
+def test_a_result_that_goes_during_the_run_is_no_result(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by a fault of the disk."""
     Solver(monkeypatch)
-    assert main(SMALL) == 0
-    with xr.open_dataset("out.nc") as result:
-        expected = result.load().drop_vars("run_time")
-    # the file of a study of the same shape, with other histories
-    assert main([*VARIANT, "-o", "other.nc"]) == 0
-    Path("out.nc").unlink()
-    own_read, changed = Store.read, itertools.count()
+    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    own = gather._read_through
 
-    def read(store: Store, number: int) -> np.ndarray:
-        path = store.path(number)
-        if next(changed) == 0:
-            if change == "another record":
-                other = max(Path("other.nc.parts").glob("*.npy.z"), key=lambda file: file.stat().st_size)
-                n_bytes = path.stat().st_size
-                with path.open("wb") as file:
-                    unpack_records(file, other)
-                assert path.stat().st_size >= n_bytes
-            elif change == "missing":
-                path.unlink()
-            elif change == "shorter":
-                os.truncate(path, 1000)
-            else:
-                np.save(path.with_suffix(".other"), np.zeros(100))
-                path.with_suffix(".other.npy").replace(path)
-        return own_read(store, number)
+    def read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> object:
+        with completion.store._transaction():
+            completion.store._database.execute(f"{change} WHERE frequency = 110")
+        return own(study, facts, completion)
 
     with monkeypatch.context() as disturbed:
-        disturbed.setattr(Store, "read", read)
+        disturbed.setattr(gather, "_read_through", read_through)
         assert main(SMALL) == 3
-    said = capsys.readouterr().out
-    assert "does not hold any more what this run has written there: its points are not computed" in said
-    with xr.open_dataset("out.nc") as result:
-        found = result.load().drop_vars("run_time")
-    there = found.outcome != Outcome.NOT_COMPUTED
-    assert not bool(there.all())
-    xr.testing.assert_equal(found.worn_volume.where(there), expected.worn_volume.where(there))
-    time.sleep(0.01)
+    with xr.open_dataset("out.nc") as result, xr.open_dataset("whole.nc") as whole:
+        there = result.outcome != Outcome.NOT_COMPUTED
+        assert int(there.sum()) == there.size // 2
+        xr.testing.assert_equal(result.worn_volume.where(there), whole.worn_volume.where(there))
     assert main(SMALL) == 0
-    with xr.open_dataset("out.nc") as result:
-        xr.testing.assert_identical(result.load().drop_vars("run_time"), expected)
+    with xr.open_dataset("out.nc") as result, xr.open_dataset("whole.nc") as whole:
+        xr.testing.assert_identical(result.load().drop_vars("run_time"), whole.load().drop_vars("run_time"))
