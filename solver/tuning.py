@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from importlib import import_module
 
 TUNABLE = {
-    "NEWTON": ("newton", ("iterations", "forcing", "exact_directions")),
+    "NEWTON": ("newton", ("iterations", "forcing", "most_directions")),
     "CONTINUATION": ("continuation", ("arc_iterations", "load_steps", "transient_effort", "longest_transient")),
     "ACCURACY": (
         "accuracy",

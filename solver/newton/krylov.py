@@ -199,7 +199,7 @@ def ritz_values(
         )
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)
-        look = enough is not None and k >= NEWTON.sign_products and k % NEWTON.sign_check == 0
+        look = enough is not None and k % NEWTON.sign_products == 0
         if not (lost or look or k == size):
             continue
         found, vectors = np.linalg.eig(projected[:k, :k])

@@ -19,10 +19,9 @@ class NewtonOptions:
     full_steps: int = 6
     """Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states. With
     three the dovetail gets another static state at a friction coefficient of 1000."""
-    shortest_step: float = 1.0 / 128.0
-    """Shortest step as a fraction of the full step: seven halvings."""
-    divergence: float = 1e6
-    """Ratio of the residual to the lowest one so far, above which the iteration returns to the best point at once."""
+    shortest_step: float = 1.0 / 64.0
+    """Shortest step as a fraction of the full step: six halvings. With seven a random scene takes 5 % more iterations,
+    19 others an equal number."""
 
     # GMRES and Arnoldi's method
     forcing: float = 1e-3
@@ -41,37 +40,33 @@ class NewtonOptions:
     round_off: float = 1e-11
     """Fraction of a vector, or of a slipping pair: less is no new direction. Double precision has 2e-16."""
     sign_products: int = 16
-    """Fewest products of Arnoldi's method for the sign of a determinant."""
-    sign_check: int = 4
-    """Products between two computations of the eigenvalues."""
-    certain_real_part: float = 0.15
-    """Real part above which an eigenvalue is certainly positive; 1 for an exact factorisation."""
+    """Products of Arnoldi's method between two computations of the eigenvalues. With four in place of 16, 23 cases (12
+    random scenes, sliders, small joints) take equal iterations."""
     settled: float = 0.1
-    """Residual over modulus of an eigenvalue below which its sign is known."""
+    """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
+    certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
 
-    # which factorisation
-    dense_unknowns: int = 250
-    """Unknowns up to which a dense factorisation of each Jacobian costs less than iterations with a kept one."""
     products: int = 80
-    """Most products of a GMRES cycle with a factorisation that is not exact, and of Arnoldi's method for the sign of a
-    determinant. GMRES finds resonances one by one. At 160 pairs, eigenvalues at 0.01 converge with 32."""
-    exact_products: int = 12
-    """Most products with a kept factorisation of an earlier Jacobian that was exact; a new one takes as long."""
+    """Most products of a GMRES cycle, and of Arnoldi's method for a determinant or for Floquet multipliers. GMRES finds
+    resonances one by one. At 160 pairs, eigenvalues at 0.01 converge with 32."""
     restarts: int = 6
     """Most cycles of GMRES with a new factorisation that is not exact. Most cycles that converge with products in
     single precision only: a joint that slips as a whole moves far under small forces."""
 
-    # slip space
-    small_joint_displacements: int = 40
-    """Relative displacements up to which a joint is small: impacts couple most harmonics and directions."""
+    # times for the choice of the factorisation (`cost`), measured on one core at 3 GHz with OpenBLAS
+    flop_rate: float = 2.5e10
+    """1/s: operations of a factorisation or a product of matrices. 22e9 to 27e9 for 900 to 2200 unknowns."""
+    vector_rate: float = 3.5e9
+    """1/s: operations of a product of a matrix and a vector. 3.5e9 to 3.8e9 for 1500 to 2600 unknowns."""
+    call_time: float = 1e-5
+    """s: a call of NumPy, whatever the size. A product with a small Jacobian takes 0.1 ms, a sample of a march 0.05."""
+    usual_products: int = 8
+    """Products of a solve with a kept factorisation: 7.6 in the default study."""
     most_directions: int = 2500
-    """Most directions of an exact factorisation of a small joint, for which no other preconditioner is good, and of any
-    joint where the sign of the determinant is not certain otherwise. Takes 0.5 s."""
-    exact_directions: int = 600
-    """Most directions of an exact factorisation: 48 pairs with five harmonics near a resonance have as many."""
-    partial_directions: int = 1000
-    """Number of the largest directions, factorised where neither the whole space nor the march applies: for more than
-    some 20 masses on sliders. Takes 50 ms."""
+    """Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
+    otherwise, and for sliding masses, to which the march does not apply."""
+
+    # slip space
     neutral_shift: float = 1e-8
     """Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
     arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign."""
