@@ -18,6 +18,9 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 
+# step of a finite difference in natural lengths: a round-off of 1e-16 gives the difference an error of 1e-9
+_DIFFERENCE = 1e-7
+
 
 @dataclass(frozen=True)
 class ArcResult:
@@ -157,7 +160,7 @@ class _Arc:
 
         A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
-        step = CONTINUATION.parameter_difference
+        step = _DIFFERENCE
         ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 
@@ -190,7 +193,7 @@ class _Arc:
             norm = evaluation.scaled_residual()
             if norm <= tolerance:
                 return PathPoint(parameter, evaluation, self.history)
-            if not np.isfinite(norm):
+            if not np.isfinite(norm) or np.linalg.norm(unknown - base) > CONTINUATION.arc_wander * length:
                 return None
             if slope is None:
                 slope = self.slope(parameter, evaluation)

@@ -1,4 +1,4 @@
-"""Predicted times of the ways to solve a Jacobian, from counts alone, so that the choice is equal on all machines.
+"""Predicted costs of the ways to solve a Jacobian, from counts alone, so that the choice is equal on all machines.
 
 With n unknowns in n_rel rows, m = 2H + 1 harmonics and k directions of slip and separation:
 
@@ -6,31 +6,29 @@ With n unknowns in n_rel rows, m = 2H + 1 harmonics and k directions of slip and
 - slip space (`slip_preconditioner`): orthonormal bases of the pairs, matrix of the k directions, its factorisation;
 - march (`period_preconditioner`): one small system at each sample, and the d directions in which the harmonics differ.
 
-A kept factorisation takes some products for each solve. The predictions were within a factor of 1.6 of the times of
-16 joints (1 to 48 pairs, 1 to 100 harmonics, 90 to 3300 directions) where these are above 1 ms.
+A kept factorisation takes some products for each solve. Costs are in operations of a factorisation.
+`python -m tests.benchmarks.solve_costs` compares costs with times: within a factor of 2.5 for times above 1 ms.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from bisect import bisect_right
 
 from solver.contact.coulomb import STICK
 from solver.harmonic_balance.dlft import Linearisation
-from solver.model import FloatArray
 from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import fewest_samples, resonances
 
 
 def is_dense_cheapest(n: int, n_rel: int) -> bool:
     """Whether a dense solve takes no longer than a solve with a kept factorisation."""
-    flops = n**3 / 1.5 + 4.0 * n**2 * n_rel
-    return flops / NEWTON.flop_rate + 16.0 * n**2 / NEWTON.vector_rate <= NEWTON.usual_products * _product_time(0)
+    return dense_cost(n, n_rel) <= NEWTON.usual_products * product_cost(0)
 
 
 def worthwhile_products(n_pairs: int, m: int, k: int) -> int:
     """Products that take as long as a new factorisation of k directions."""
-    new = float(_slip_time(n_pairs, m, np.array(float(k))))
-    return int(np.clip(new / _product_time(k), NEWTON.usual_products, NEWTON.products))
+    worth = int(slip_cost(n_pairs, m, k) / product_cost(k))
+    return min(max(worth, NEWTON.usual_products), NEWTON.products)
 
 
 def worthwhile_directions(tangent: Linearisation) -> int:
@@ -38,33 +36,36 @@ def worthwhile_directions(tangent: Linearisation) -> int:
     joint, most = tangent.joint, NEWTON.most_directions
     if joint.penalty.inertial.any():
         return most
-    pairs = tangent.active()
-    m = joint.basis.synthesis.shape[0]
-    exact = _slip_time(pairs.size, m, np.arange(most + 1.0))
-    n = 3 * pairs.size * m
-    if n <= most and exact[n] <= _march_time(tangent, 0):
-        return n
-    return int(np.count_nonzero(exact <= _march_time(tangent, len(resonances(joint)[0])))) - 1
+    n_pairs, m = tangent.active().size, joint.basis.synthesis.shape[0]
+    n = 3 * n_pairs * m
+    # the directions in which the harmonics differ are only computed where they matter
+    if n <= most and slip_cost(n_pairs, m, n) <= march_cost(tangent, 0):
+        return int(n)
+    march = march_cost(tangent, len(resonances(joint)[0]))
+    return bisect_right(range(most + 1), march, key=lambda k: slip_cost(n_pairs, m, k)) - 1
 
 
-def _product_time(size: int) -> float:
-    """Time, s, of a product with the Jacobian and a solve with a factorisation of `size` directions."""
-    return 10.0 * NEWTON.call_time + 2.0 * size**2 / NEWTON.vector_rate
+def dense_cost(n: int, n_rel: int) -> float:
+    """Cost of the matrix and its factorisation."""
+    return n**3 / 1.5 + 4.0 * n**2 * n_rel + 16.0 * n**2 * NEWTON.vector_cost
 
 
-def _slip_time(n_pairs: int, m: int, k: FloatArray) -> FloatArray:
-    """Times, s, of exact factorisations in k directions (...,)."""
-    flops = k**3 / 1.5 + 6.0 * m * k**2 + 4.0 * n_pairs * (3 * m) ** 3
-    return np.asarray(flops / NEWTON.flop_rate + 3.0 * n_pairs * NEWTON.call_time)
+def product_cost(size: int) -> float:
+    """Cost of a product with the Jacobian and a solve with a factorisation of `size` directions."""
+    return 10.0 * NEWTON.call_cost + 2.0 * size**2 * NEWTON.vector_cost
 
 
-def _march_time(tangent: Linearisation, d: int) -> float:
-    """Time, s, of the march with d directions in which the harmonics differ, and of a solve with the march."""
+def slip_cost(n_pairs: int, m: int, k: int) -> float:
+    """Cost of an exact factorisation in k directions."""
+    return k**3 / 1.5 + 6.0 * m * k**2 + n_pairs * (4.0 * (3 * m) ** 3 + 3.0 * NEWTON.call_cost)
+
+
+def march_cost(tangent: Linearisation, d: int) -> float:
+    """Cost of the march with d directions in which the harmonics differ, and of a solve with the march."""
     joint, pairs = tangent.joint, tangent.active()
     n_samples, n = fewest_samples(joint.basis), joint.component_index.size * joint.basis.synthesis.shape[0]
     # rows of the system of a sample: two for a pair that slips, up to three for an open one
-    rows = 2.0 * float((tangent.at.status_t[pairs] != STICK).sum()) / joint.basis.n_samples
-    solve = 10.0 * NEWTON.call_time
-    solve += (4.0 * n_samples * rows * (rows + 2.0 * pairs.size) + 4.0 * d * n) / NEWTON.vector_rate
-    build = n_samples * (5.0 * NEWTON.call_time + 2.0 * rows**3 / NEWTON.flop_rate) + 2.0 * d**2 * n / NEWTON.flop_rate
-    return build + (d + NEWTON.usual_products) * solve
+    rows = 2.0 * int((tangent.at.status_t[pairs] != STICK).sum()) / joint.basis.n_samples
+    march = 10.0 * NEWTON.call_cost + 4.0 * n_samples * rows * (rows + 2.0 * pairs.size) * NEWTON.vector_cost
+    build = n_samples * (5.0 * NEWTON.call_cost + 2.0 * rows**3) + d * march + 2.0 * d**2 * n
+    return float(build + NEWTON.usual_products * (march + 4.0 * d * n * NEWTON.vector_cost))

@@ -250,6 +250,6 @@ def rotate_column(column: FloatArray, rotations: FloatArray, k: int) -> bool:
 
 
 def _stagnates(norms: list[float]) -> bool:
-    """Whether the residual norm has hardly decreased over the last products."""
+    """Whether the residual norm has not been halved over the last products."""
     products = NEWTON.stagnation_products
-    return len(norms) > products and norms[-1] > NEWTON.stagnation_ratio * norms[-1 - products]
+    return len(norms) > products and norms[-1] > 0.5 * norms[-1 - products]
