@@ -75,6 +75,10 @@ class ContinuationOptions:
     take thousands."""
     longest_transient: float = 1e9
     """Periods: longest step. It is practically infinite: the step is the harmonic balance itself."""
+    transient_cut: float = 0.35
+    """Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
+    times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
+    does not settle within the budget."""
     relaxed_change: float = 0.02
     """Change over a step below which a periodic state is sought."""
     runaway: float = 1e3

@@ -200,7 +200,7 @@ def relax_to_periodic(
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
         if not result.converged or (change > 2.0 * CONTINUATION.smooth_change and length > 1.0):
-            length *= 0.5
+            length *= CONTINUATION.transient_cut
             if length < CONTINUATION.shortest_fraction:
                 break
             continue

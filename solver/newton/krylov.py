@@ -69,7 +69,7 @@ def solve_gmres(
     right: FloatArray,
     rtol: float,
     restart: int,
-    cycles: int,
+    cycles: float = np.inf,
     exact: Product | None = None,
     recycled: Recycled | None = None,
 ) -> tuple[FloatArray, bool]:
@@ -83,8 +83,10 @@ def solve_gmres(
         Right-hand side.
     rtol : float
         Wanted relative residual.
-    restart, cycles : int
-        Most products of one cycle, and most cycles. A cycle that converges with inexact products only does not count.
+    restart : int
+        Most products of one cycle.
+    cycles : float
+        Most cycles; by default until stagnation. A cycle that converges with inexact products only does not count.
     exact : callable, optional
         The exact operator, `product` by default; applied once in a cycle.
     recycled : Recycled, optional
@@ -101,8 +103,8 @@ def solve_gmres(
     size = float(np.linalg.norm(right))
     norms = [size]
     restart = min(restart, right.size)
-    refinements, first = 0, None
-    while cycles > 0 and refinements <= NEWTON.restarts:
+    first = None
+    while cycles > 0:
         if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
             break
         cycle = _cycle(lambda vector: product(kept.apply(vector)), residual, norms, rtol * size, restart)
@@ -114,8 +116,7 @@ def solve_gmres(
         least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
         weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
         solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
-        refined = norms[-1] <= rtol * size
-        refinements, cycles = refinements + refined, cycles - (not refined)
+        cycles -= norms[-1] > rtol * size
         residual = right - (exact or product)(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):

@@ -114,7 +114,7 @@ class JacobianSolver:
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(factor, tangent, right, rtol, NEWTON.products, NEWTON.restarts)[0]
+        return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve corrects for `NEWTON.neutral_shift`."""
@@ -130,7 +130,7 @@ class JacobianSolver:
         return solution if np.all(np.isfinite(solution)) else first
 
     def _iterate(
-        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, restarts: int
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, cycles: float
     ) -> tuple[FloatArray, bool]:
         """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
         rest = _passive_rows(tangent)
@@ -153,7 +153,7 @@ class JacobianSolver:
         wanted = right.copy()
         wanted[rest] = 0.0
         # preconditioned from the right: the residual of GMRES is the true one
-        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, restarts, exact, self._recycled)
+        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact, self._recycled)
         return precondition(solution), found
 
 

@@ -46,9 +46,6 @@ class NewtonOptions:
     products: int = 80
     """Most products of a GMRES cycle, and of Arnoldi's method for a determinant or for Floquet multipliers. GMRES finds
     resonances one by one. At 160 pairs, eigenvalues at 0.01 converge with 32."""
-    restarts: int = 6
-    """Most cycles of GMRES with a new factorisation that is not exact. Most cycles that converge with products in
-    single precision only: a joint that slips as a whole moves far under small forces."""
 
     # choice of the factorisation (`cost`), in operations of a factorisation: 22e9 to 27e9 in a second of one core
     vector_cost: float = 7.0
