@@ -82,7 +82,7 @@ def follow_arc(
     direction[-1] = toward
     folds: list[float] = []
     turns: list[int] = []
-    length, left = CONTINUATION.longest_arc, CONTINUATION.arc_correctors
+    length, left = CONTINUATION.first_arc, CONTINUATION.arc_correctors
     low = min(start.parameter, target) - CONTINUATION.farthest * abs(span)
     high = max(start.parameter, target) + CONTINUATION.farthest * abs(span)
     while left > 0 and not budget.exhausted:
