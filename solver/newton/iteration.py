@@ -76,7 +76,7 @@ def solve_newton(
     most = NEWTON.iterations if most_iterations is None else most_iterations
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
-    cutting, shortest = False, 0.5**NEWTON.full_steps
+    cutting, shortest = False, NEWTON.shortest_step
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:

@@ -17,9 +17,11 @@ class NewtonOptions:
     """Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a
     resonance."""
     full_steps: int = 6
-    """Full steps in a row without a new lowest residual before steps are halved, and most halvings of a step. Twice as
-    many full steps find equal states. With three the dovetail gets another static state at a friction coefficient of
-    1000. With seven halvings a random scene takes 5 % more iterations, 22 other cases an equal number."""
+    """Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states. With
+    three the dovetail gets another static state at a friction coefficient of 1000."""
+    shortest_step: float = 1.0 / 128.0
+    """Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
+    `tests/solver/test_homotopy.py`) gets no accurate state."""
 
     # GMRES and Arnoldi's method
     forcing: float = 1e-3
