@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from importlib import import_module
 
 TUNABLE = {
-    "NEWTON": ("newton", ("iterations", "forcing", "exact_directions")),
-    "CONTINUATION": ("continuation", ("arc_iterations", "load_steps", "transient_effort", "longest_transient")),
+    "NEWTON": ("newton", ("iterations", "forcing", "most_directions")),
+    "CONTINUATION": ("continuation", ("arc_correctors", "load_steps", "transient_effort", "longest_transient")),
     "ACCURACY": (
         "accuracy",
         ("penetration_limit", "energy_limit", "level_iterations", "refinement_work", "most_samples", "most_unknowns"),

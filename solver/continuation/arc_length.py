@@ -19,6 +19,9 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance, solve_linearised
 from solver.packing import packable
 
+# step of a finite difference in natural lengths: a round-off of 1e-16 gives the difference an error of 1e-9
+_DIFFERENCE = 1e-7
+
 
 @dataclass(frozen=True)
 class ArcResult:
@@ -50,7 +53,7 @@ def follow_arc(
     """Follow the branch by arc length, through folds, to an accepted state at the target.
 
     The tangential history of the start is held. The search also ends at a distance of `CONTINUATION.farthest` from
-    start and target, and after `CONTINUATION.arc_steps` steps.
+    start and target, and after `CONTINUATION.arc_correctors` correctors.
 
     Parameters
     ----------
@@ -80,35 +83,32 @@ def follow_arc(
     direction[-1] = toward
     folds: list[float] = []
     turns: list[int] = []
-    length, failures = CONTINUATION.first_arc, 0
+    length, left = CONTINUATION.first_arc, CONTINUATION.arc_correctors
     low = min(start.parameter, target) - CONTINUATION.farthest * abs(span)
     high = max(start.parameter, target) + CONTINUATION.farthest * abs(span)
-    for _ in range(CONTINUATION.arc_steps):
-        if budget.exhausted:
-            break
+    while left > 0 and not budget.exhausted:
         point = points[-1]
         tangent = arc.tangent(point.parameter, point.evaluation, budget)
         if tangent is None:
             break
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
         reached = None
-        while reached is None and length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
+        while reached is None and length > CONTINUATION.shortest_arc and left > 0:
             reached = arc.step(point, tangent, length, tolerance, budget)
-            failures += reached is None
-            length *= CONTINUATION.arc_growth if reached is not None else 0.5
-        if reached is None and failures < CONTINUATION.arc_failures:
+            left -= 1
+            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
+        if reached is None:
             reached = arc.step_over_corner(point, tangent, tolerance, budget)
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
             # the start lies so near to a fold that the first step passes the fold
-            if 0.25 * length > CONTINUATION.shortest_arc and failures < CONTINUATION.arc_failures:
+            if 0.25 * length > CONTINUATION.shortest_arc:
                 length *= 0.25
-                failures += 1
                 continue
             folds.append(point.parameter)
             turns.append(0)
-        length = min(max(length, CONTINUATION.renewed_arc), CONTINUATION.longest_arc)
+        length = max(length, CONTINUATION.corner_arc)
         points.append(reached)
         path.append(arc.place(reached.parameter, reached.evaluation))
         if len(points) > 2 and (path[-1][-1] - path[-2][-1]) * (path[-2][-1] - path[-3][-1]) < 0.0:
@@ -171,7 +171,7 @@ class _Arc:
 
         A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
-        step = CONTINUATION.parameter_difference
+        step = _DIFFERENCE
         ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 
@@ -209,7 +209,7 @@ class _Arc:
         base = self.place(point.parameter, point.evaluation)
         unknown = base + length * tangent
         slope: FloatArray | None = None
-        for iteration in range(CONTINUATION.arc_iterations):
+        for iteration in range(CONTINUATION.near_iterations):
             parameter = float(unknown[-1] * self.span)
             balance = self.balance_at(parameter, self.history)
             evaluation = balance.evaluate(unknown[:-1].reshape(shape) * self.size)
@@ -243,66 +243,66 @@ class _Arc:
         """
         shape = point.evaluation.predicted_h.shape
         base = self.place(point.parameter, point.evaluation)
-        for length in CONTINUATION.corner_arcs:
-            ahead = base + length * tangent
-            parameter = float(ahead[-1] * self.span)
-            behind = self.balance_at(parameter, self.history).evaluate(ahead[:-1].reshape(shape) * self.size)
-            turned = self.tangent(parameter, behind, budget)
-            if turned is None:
+        length = CONTINUATION.corner_arc
+        ahead = base + length * tangent
+        parameter = float(ahead[-1] * self.span)
+        behind = self.balance_at(parameter, self.history).evaluate(ahead[:-1].reshape(shape) * self.size)
+        turned = self.tangent(parameter, behind, budget)
+        if turned is None:
+            return None
+        for sign in (np.sign(turned @ tangent) or 1.0, -np.sign(turned @ tangent) or -1.0):
+            reached = self.step(point, sign * turned, length, tolerance, budget)
+            if reached is None:
                 continue
-            for sign in (np.sign(turned @ tangent) or 1.0, -np.sign(turned @ tangent) or -1.0):
-                reached = self.step(point, sign * turned, length, tolerance, budget)
-                if reached is None:
-                    continue
-                chord = self.place(reached.parameter, reached.evaluation) - base
-                if chord @ tangent > -CONTINUATION.backward_cosine * np.linalg.norm(chord):
-                    return reached
+            chord = self.place(reached.parameter, reached.evaluation) - base
+            if chord @ tangent > -CONTINUATION.backward_cosine * np.linalg.norm(chord):
+                return reached
         return None
 
     def state_at(
         self, before: PathPoint, after: PathPoint, target: float, tolerance: float, budget: Budget
     ) -> PathPoint | None:
-        """State at the target between two points of the branch; None where Newton's method ends far from both."""
+        """State at the target between two points of the branch; None where Newton's method fails."""
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         start = one + fraction * (other - one)
         balance: Balance = self.balance_at(target, self.history)
         result = solve_balance(balance, start, self.solver, tolerance, budget, CONTINUATION.near_iterations)
-        found = result.evaluation.predicted_h
-        farthest = CONTINUATION.target_distance * np.linalg.norm(other - one) + CONTINUATION.target_slack * self.size
-        near = np.linalg.norm(found - start) <= farthest
-        return PathPoint(target, result.evaluation, self.history) if result.converged and near else None
+        return PathPoint(target, result.evaluation, self.history) if result.converged else None
 
     def fold(self, points: list[PathPoint], tolerance: float, budget: Budget) -> float:
         """Extreme value of the parameter at a fold, from three points around the fold.
 
         The value is the vertex of the parabola of the parameter over the chord length. Before, a few points of the
-        branch are added near the vertex, each in place of an outer point.
+        branch are added, each between the middle point and its neighbour on the side of the vertex.
         """
         top = points[1].parameter > points[0].parameter
         for _ in range(CONTINUATION.fold_points):
-            places = [self.place(point.parameter, point.evaluation) for point in points]
-            at = np.array([-np.linalg.norm(places[1] - places[0]), 0.0, np.linalg.norm(places[2] - places[1])])
-            square, slope, _ = np.polyfit(at, [place[-1] for place in places], 2)
-            low, high = CONTINUATION.vertex_reach * at[0], CONTINUATION.vertex_reach * at[2]
-            vertex = float(np.clip(-0.5 * slope / square, low, high)) if square != 0.0 else 0.0
-            if abs(vertex) < CONTINUATION.vertex_resolution * (at[2] - at[0]):
-                vertex = CONTINUATION.vertex_offset * (at[2] if at[2] > -at[0] else at[0])
-            other = places[2] if vertex > 0.0 else places[0]
-            chord = (other - places[1]) / np.linalg.norm(other - places[1])
-            added = self.step(points[1], chord, abs(vertex), tolerance, budget)
+            places, vertex, _ = self._vertex(points)
+            chord = (places[2] if vertex > 0.0 else places[0]) - places[1]
+            length = float(np.linalg.norm(chord))
+            added = self.step(points[1], chord / length, 0.5 * length, tolerance, budget)
             if added is None:
                 break
             new = [points[0], points[1], added, points[2]] if vertex > 0.0 else [points[0], added, *points[1:]]
             inner = [point.parameter for point in new[1:3]]
             best = 1 + int(np.argmax(inner) if top else np.argmin(inner))
             points = new[best - 1 : best + 2]
-        places = [self.place(point.parameter, point.evaluation) for point in points]
-        at = np.array([-np.linalg.norm(places[1] - places[0]), 0.0, np.linalg.norm(places[2] - places[1])])
-        square, slope, height = np.polyfit(at, [place[-1] for place in places], 2)
-        vertex = -0.5 * slope / square if square != 0.0 else 0.0
+        (before, middle, after), vertex, above = self._vertex(points)
         # at a corner of the branch the parabola has no meaning: the vertex must lie between the neighbours
-        inside = at[0] < vertex < at[2] and abs(0.5 * slope * vertex) < max(
-            abs(places[1][-1] - places[0][-1]), abs(places[2][-1] - places[1][-1])
-        )
-        return float((height + 0.5 * slope * vertex if inside else places[1][-1]) * self.span)
+        inside = -np.linalg.norm(before - middle) < vertex < np.linalg.norm(after - middle)
+        inside &= abs(above) < max(abs(middle[-1] - before[-1]), abs(after[-1] - middle[-1]))
+        return float((middle[-1] + above if inside else middle[-1]) * self.span)
+
+    def _vertex(self, points: list[PathPoint]) -> tuple[list[FloatArray], float, float]:
+        """Three points in scaled unknowns, and the vertex of the parabola through them, seen from the middle point.
+
+        The vertex has its distance along the chords, and the scaled parameter above that of the middle point.
+        """
+        places = [self.place(point.parameter, point.evaluation) for point in points]
+        back, ahead = (float(np.linalg.norm(places[1] - places[k])) for k in (0, 2))
+        before, after = ((places[k][-1] - places[1][-1]) for k in (0, 2))
+        square = (before / back + after / ahead) / (back + ahead)
+        slope = after / ahead - square * ahead
+        vertex = -0.5 * slope / square if square != 0.0 else 0.0
+        return places, vertex, 0.5 * slope * vertex

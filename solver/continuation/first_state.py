@@ -58,7 +58,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, b
         whole = balance_at(load_factor, point.history)
         # without gaps and wear the state grows in proportion to its load; high friction also allows other states
         grown = point.evaluation.predicted_h * (step / (step - 1.0))
-        result = solve_balance(whole, grown, solver, tolerance, budget, CONTINUATION.load_step_iterations)
+        result = solve_balance(whole, grown, solver, tolerance, budget, CONTINUATION.near_iterations)
         if result.converged:
             point = PathPoint(load_factor, result.evaluation, final_history(whole, result.evaluation))
             continue

@@ -68,17 +68,19 @@ def solve_from_less_friction(
         return replace(balance, joint=replace(balance.joint, friction_coefficient=friction))
 
     friction = min(largest, CONTINUATION.moderate_friction)
-    for _ in range(CONTINUATION.friction_attempts):
+    least = CONTINUATION.shortest_fraction * friction
+    while True:
         logarithm = float(np.log(friction / largest)) if friction < largest else 0.0
         less = balance_at(logarithm, balance.history)
-        result = solve_balance(less, start, solver, tolerance, budget, CONTINUATION.cold_iterations)
+        result = solve_balance(less, start, solver, tolerance, budget)
         if result.converged:
             lower = PathPoint(logarithm, result.evaluation, balance.history)
             point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, budget, keep_history=True)
             if arrived:
                 return PathPoint(largest, point.evaluation, point.history)
-        friction *= CONTINUATION.friction_reduction
-    return None
+        friction *= 0.5
+        if friction <= least:
+            return None
 
 
 def add_harmonics(

@@ -65,18 +65,18 @@ def follow_naturally(
     shortest = CONTINUATION.shortest_fraction if shortest is None else shortest
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
-    fraction, failures = 1.0, 0
+    # fractions of two: sums of them are exact, so that the last step ends at the target
+    fraction, done, failures = 1.0, 0.0, 0
     while point.parameter != target:
-        reach = point.parameter + fraction * whole
-        if (target - reach) * whole <= CONTINUATION.target_round_off * whole * whole:
-            reach = target
+        ahead = min(done + fraction, 1.0)
+        reach = target if ahead == 1.0 else start.parameter + ahead * whole
         balance = balance_at(reach, point.history)
         most = NEWTON.iterations if fraction <= 2.0 * shortest else CONTINUATION.near_iterations
         result = solve_balance(balance, point.evaluation.predicted_h, solver, tolerance, budget, most)
         smooth = abs(reach - point.parameter) <= fine or _is_smooth(point.evaluation, result.evaluation)
         if result.converged and smooth:
             history = point.history if keep_history else final_history(balance, result.evaluation)
-            point = PathPoint(reach, result.evaluation, history)
+            point, done = PathPoint(reach, result.evaluation, history), ahead
             fraction = min(2.0 * fraction, 1.0)
         else:
             fraction *= 0.5

@@ -179,8 +179,7 @@ def relax_to_periodic(
         - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
           state.
         - UNSTABLE: the motion settles at an unstable periodic state.
-        - UNSETTLED: the motion does not settle within `CONTINUATION.transient_steps` steps of a period or more, or
-          within `CONTINUATION.transient_effort` Newton iterations.
+        - UNSETTLED: the motion does not settle within `CONTINUATION.transient_effort` Newton iterations.
     point : PathPoint or None
         The state; its parameter is NaN. None where the outcome is not CONVERGED.
     """
@@ -191,20 +190,18 @@ def relax_to_periodic(
     period = 2.0 * np.pi / joint.omega
     length, tried = 1.0, np.inf
     size = float(np.abs(start.displacement_h).max())
-    last = min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
-    for _ in range(CONTINUATION.transient_steps):
-        if budget.iterations > last:
-            break
+    tolerance, most = case.settings.tolerance, CONTINUATION.near_iterations
+    left = CONTINUATION.transient_effort
+    while left > 0 and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
-        tolerance = max(CONTINUATION.transient_tolerance, case.settings.tolerance)
-        most = CONTINUATION.near_iterations
         result = solve_balance(balance, predicted, solver, tolerance, budget, most)
+        left -= max(result.iterations, 1)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
-        if not result.converged or (change > CONTINUATION.largest_change and length > 1.0):
+        if not result.converged or (change > 2.0 * CONTINUATION.smooth_change and length > 1.0):
             length *= CONTINUATION.transient_cut
-            if length < CONTINUATION.shortest_transient:
+            if length < CONTINUATION.shortest_fraction:
                 break
             continue
         motion, predicted = ahead, result.evaluation.predicted_h
@@ -214,21 +211,23 @@ def relax_to_periodic(
         if moved[:, :, 0].max() > CONTINUATION.runaway * size:
             return Outcome.ADRIFT, None
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
-        renewed = change < CONTINUATION.renewed_attempt * tried or length >= CONTINUATION.longest_transient
+        renewed = change < 0.5 * tried or length >= CONTINUATION.longest_transient
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
+            begun = budget.iterations
             found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, budget)
+            left -= budget.iterations - begun
             if found is not None and not stable and length >= CONTINUATION.longest_transient:
                 # the steps have their largest length and lead to an unstable state
                 return Outcome.UNSTABLE, None
             if found is not None and stable:
                 distance = _change(transient.periodic(found.evaluation), motion)
-                if distance < CONTINUATION.relaxed_distance:
+                if distance < CONTINUATION.smooth_change:
                     return Outcome.CONVERGED, found
         elif change > CONTINUATION.relaxed_change:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
-        growth = float(np.clip(CONTINUATION.wanted_change / max(change, 1e-300), *CONTINUATION.transient_growth))
+        growth = float(np.clip(CONTINUATION.smooth_change / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), CONTINUATION.longest_transient)
     return Outcome.UNSETTLED, None
 

@@ -87,8 +87,7 @@ def solve_newton(
             since_best += 1
         if iteration == most:
             break
-        lost = not np.isfinite(norm) or norm > NEWTON.divergence * best_norm
-        if not cutting and (lost or since_best > NEWTON.full_steps):
+        if not cutting and (not np.isfinite(norm) or since_best > NEWTON.full_steps):
             cutting = True
             unknown, current = best
         step = direction(current)

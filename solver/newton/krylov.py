@@ -69,7 +69,7 @@ def solve_gmres(
     right: FloatArray,
     rtol: float,
     restart: int,
-    cycles: int,
+    cycles: float = np.inf,
     exact: Product | None = None,
     recycled: Recycled | None = None,
 ) -> tuple[FloatArray, bool]:
@@ -83,8 +83,10 @@ def solve_gmres(
         Right-hand side.
     rtol : float
         Wanted relative residual.
-    restart, cycles : int
-        Most products of one cycle, and most cycles. A cycle that converges with inexact products only does not count.
+    restart : int
+        Most products of one cycle.
+    cycles : float
+        Most cycles; by default until stagnation. A cycle that converges with inexact products only does not count.
     exact : callable, optional
         The exact operator, `product` by default; applied once in a cycle.
     recycled : Recycled, optional
@@ -101,8 +103,8 @@ def solve_gmres(
     size = float(np.linalg.norm(right))
     norms = [size]
     restart = min(restart, right.size)
-    refinements, first = 0, None
-    while cycles > 0 and refinements <= NEWTON.restarts:
+    first = None
+    while cycles > 0:
         if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
             break
         cycle = _cycle(lambda vector: product(kept.apply(vector)), residual, norms, rtol * size, restart)
@@ -114,8 +116,7 @@ def solve_gmres(
         least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
         weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
         solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
-        refined = norms[-1] <= rtol * size
-        refinements, cycles = refinements + refined, cycles - (not refined)
+        cycles -= norms[-1] > rtol * size
         residual = right - (exact or product)(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):
@@ -199,7 +200,7 @@ def ritz_values(
         )
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)
-        look = enough is not None and k >= NEWTON.sign_products and k % NEWTON.sign_check == 0
+        look = enough is not None and k % NEWTON.sign_products == 0
         if not (lost or look or k == size):
             continue
         found, vectors = np.linalg.eig(projected[:k, :k])
@@ -250,6 +251,6 @@ def rotate_column(column: FloatArray, rotations: FloatArray, k: int) -> bool:
 
 
 def _stagnates(norms: list[float]) -> bool:
-    """Whether the residual norm has hardly decreased over the last products."""
+    """Whether the residual norm has not been halved over the last products."""
     products = NEWTON.stagnation_products
-    return len(norms) > products and norms[-1] > NEWTON.stagnation_ratio * norms[-1 - products]
+    return len(norms) > products and norms[-1] > 0.5 * norms[-1 - products]

@@ -13,10 +13,11 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
+from solver.newton.cost import is_dense_cheapest, worthwhile_products
 from solver.newton.krylov import Recycled, ritz_values, solve_gmres
 from solver.newton.options import NEWTON
 from solver.newton.preconditioner import Factor, build_factor
-from solver.newton.slip_preconditioner import build_slip_factor, find_slip_space
+from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, find_slip_space
 
 
 @dataclass
@@ -39,7 +40,7 @@ class JacobianSolver:
         rows = tangent.joint.rows_of(pairs)
         step = np.zeros_like(right)
         if rows.size:
-            if rows.size * m <= NEWTON.dense_unknowns:
+            if is_dense_cheapest(rows.size * m, rows.size):
                 step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
                 step[rows] = self._solve_kept(tangent, right, rtol)[rows]
@@ -53,7 +54,7 @@ class JacobianSolver:
         """Steps (n_rel, m) for two right-hand sides; a small system is factorised once."""
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
-        if not rows.size or rows.size * first.shape[1] > NEWTON.dense_unknowns:
+        if not rows.size or not is_dense_cheapest(rows.size * first.shape[1], rows.size):
             return self.solve(tangent, first), self.solve(tangent, second)
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
         solved = _solve_dense(tangent.dense(pairs), both)
@@ -108,7 +109,10 @@ class JacobianSolver:
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
         if self._factor is not None:
-            products = NEWTON.exact_products if self._factor.exact else NEWTON.products
+            products = NEWTON.products
+            if isinstance(self._factor, SlipFactor) and self._factor.exact:
+                space = self._factor.space
+                products = worthwhile_products(space.pairs.size, right.shape[1], space.size)
             solution, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
             if found:
                 return solution
@@ -116,7 +120,7 @@ class JacobianSolver:
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(factor, tangent, right, rtol, NEWTON.products, NEWTON.restarts)[0]
+        return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve corrects for `NEWTON.neutral_shift`."""
@@ -132,7 +136,7 @@ class JacobianSolver:
         return solution if np.all(np.isfinite(solution)) else first
 
     def _iterate(
-        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, restarts: int
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, cycles: float
     ) -> tuple[FloatArray, bool]:
         """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
         rest = _passive_rows(tangent)
@@ -155,7 +159,7 @@ class JacobianSolver:
         wanted = right.copy()
         wanted[rest] = 0.0
         # preconditioned from the right: the residual of GMRES is the true one
-        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, restarts, exact, self._recycled)
+        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact, self._recycled)
         return precondition(solution), found
 
 
@@ -168,7 +172,7 @@ def _passive_rows(tangent: Linearisation) -> IntArray:
 
 def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
     """Whether it is certain which eigenvalues are negative, from Ritz values and their residuals."""
-    doubtful = ~(values.real >= NEWTON.certain_real_part)
+    doubtful = ~(values.real >= NEWTON.settled)
     return bool(np.all((residuals < NEWTON.settled * np.abs(values))[doubtful]))
 
 

@@ -147,13 +147,18 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     return PeriodFactor(march, seen, bent, resonance)
 
 
+def fewest_samples(basis: FourierBasis) -> int:
+    """Samples of the march: the fewest that resolve the harmonics, for every sample costs a system."""
+    n_samples, highest = basis.n_samples, max(basis.orders, default=0)
+    while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
+        n_samples //= 2
+    return n_samples
+
+
 def build_march(tangent: Linearisation) -> SampleMarch:
     """March of a Jacobian. Raises numpy.linalg.LinAlgError where the system of a sample is singular."""
     joint = tangent.joint
-    # every sample costs a system: the fewest samples that resolve the harmonics
-    n_samples, highest = joint.basis.n_samples, max(joint.basis.orders, default=0)
-    while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
-        n_samples //= 2
+    n_samples = fewest_samples(joint.basis)
     at, stride = tangent.at, joint.basis.n_samples // n_samples
     own, carried = sample_tangents(
         at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride

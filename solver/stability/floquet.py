@@ -16,7 +16,7 @@ The time integration of disturbances limits the size of joints that are tested: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import cast
 
@@ -28,13 +28,17 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
 from solver.newton.krylov import ritz_values
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import Outcome
-from solver.settings import Resolution, all_orders
+from solver.settings import Resolution, all_orders, samples_for
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
 from solver.stability.options import STABILITY
 from solver.structure.identity import Identity
 from solver.structure.joint import Case, Joint
+
+# negative eigenvalue over the largest diagonal entry that counts as round-off: an estimate, 1e6 roundings of a number
+_ROUND_OFF = 1e-10
 
 
 @dataclass(frozen=True)
@@ -126,10 +130,10 @@ def find_instability(
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
     """The state with enough harmonics for a joint that opens and closes; None where no such state is found."""
-    least = Resolution(all_orders(STABILITY.opening_harmonics), case.resolution.samples)
-    if case.resolution.highest >= least.highest or not _opens_and_closes(at):
+    if case.resolution.highest >= STABILITY.opening_harmonics or not _opens_and_closes(at):
         return joint, at
-    sharp = case.at(replace(least, samples=max(least.samples, STABILITY.opening_samples)))
+    samples = max(case.resolution.samples, samples_for(STABILITY.opening_harmonics))
+    sharp = case.at(Resolution(all_orders(STABILITY.opening_harmonics), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
     moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), budget)
     return None if moved is None else (finer, moved.evaluation)
@@ -173,10 +177,10 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
         return monodromy.apply(vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: np.ndarray) -> bool:
-        return bool(residuals[np.argmax(np.abs(values))] < STABILITY.settled_multiplier)
+        return bool(residuals[np.argmax(np.abs(values))] < STABILITY.smallest_growth)
 
-    values, residuals = ritz_values(product, start, STABILITY.arnoldi_multipliers, settled)
-    return values[residuals < STABILITY.settled_multiplier]
+    values, residuals = ritz_values(product, start, NEWTON.products, settled)
+    return values[residuals < STABILITY.smallest_growth]
 
 
 def moving(joint: Joint, held: BoolArray) -> BoolArray:
@@ -216,7 +220,7 @@ def _is_passive(of: Identity) -> bool:
 def _is_semidefinite(matrix: Matrix) -> bool:
     size = float(np.abs(np.diag(matrix)).max(initial=0.0))
     try:
-        np.linalg.cholesky(matrix + STABILITY.indefinite * size * np.eye(len(matrix)))
+        np.linalg.cholesky(matrix + _ROUND_OFF * size * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
         return size == 0.0 and not matrix.any()
     return True

@@ -23,20 +23,14 @@ class StabilityOptions:
     opening_harmonics: int = 19
     """Smallest number of harmonics for a small joint that opens and closes: with fewer the impacts are too soft (9
     harmonics: multiplier 0.95 in place of 2.8)."""
-    opening_samples: int = 256
-    """Smallest number of samples of the law with these harmonics."""
     all_multipliers: int = 160
     """Size of a disturbance up to which all multipliers are computed: 40 displacements, 0.1 s."""
-    arnoldi_multipliers: int = 40
-    """Products of Arnoldi's method; the largest multiplier of 48 pairs settles in 20."""
-    settled_multiplier: float = 1e-3
-    """Largest residual of a multiplier that counts as converged."""
     most_rows: int = 600
     """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
     smallest_growth: float = 1e-3
-    """Growth in a period, beyond 1, that counts. Sliding pairs that stick have multipliers of 1."""
-    indefinite: float = 1e-10
-    """Negative eigenvalue over the largest diagonal entry of a matrix that still counts as round-off."""
+    """Growth in a period, beyond 1, that counts, and the residual of Arnoldi's method below which a multiplier has
+    converged. Sliding pairs that stick have multipliers of 1. The largest multiplier of 48 pairs converges in 20
+    products."""
 
 
 STABILITY = StabilityOptions()

@@ -80,8 +80,7 @@ def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> Non
     budget = Budget()
     result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, budget)
     assert result.point is None
-    attempts = CONTINUATION.arc_steps + CONTINUATION.arc_failures
-    assert budget.iterations <= attempts * CONTINUATION.arc_iterations
+    assert budget.iterations <= CONTINUATION.arc_correctors * CONTINUATION.near_iterations
 
 
 def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> None:

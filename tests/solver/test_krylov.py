@@ -70,7 +70,7 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends() -> None:
     assert not converged
     assert np.linalg.norm(found) < 100.0
     # next to nothing but what lies out of reach is left
-    assert 0.3 <= np.linalg.norm(matrix @ found - right) < 0.3 / NEWTON.stagnation_ratio
+    assert 0.3 <= np.linalg.norm(matrix @ found - right) < 0.6
     assert count[0] < 3 * NEWTON.stagnation_products
     # the part that it reaches is no harder than with any other operator
     assert solve_gmres(lambda x: matrix @ x, reached, 1e-6, 60, 1)[1]

@@ -7,8 +7,8 @@ import pytest
 
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
+from solver.newton.cost import is_dense_cheapest
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 
@@ -19,7 +19,7 @@ ACCURACY = 2e-3  # relative residual of a direction: Newton's method gains three
 def large(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
     """14 pairs, 42 displacements, 294 unknowns: above the size that is always solved directly."""
     balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), SETTINGS, seed, wear=wear)
-    assert predicted.size > NEWTON.dense_unknowns
+    assert not is_dense_cheapest(predicted.size, len(predicted))
     return balance, predicted
 
 
@@ -36,7 +36,7 @@ def error(found: FloatArray, exact: FloatArray) -> float:
 def test_a_small_system_is_solved_to_round_off() -> None:
     kinds = ("3d", "constant_load", "normal_only", "3d")
     balance, predicted = random_balance(random_model(1, kinds), SETTINGS, 2, wear=True)
-    assert predicted.size <= NEWTON.dense_unknowns
+    assert is_dense_cheapest(predicted.size, len(predicted))
     right = np.random.default_rng(3).normal(size=predicted.shape)
     step = JacobianSolver().solve(balance.linearise(balance.evaluate(predicted)), right)
     assert error(step, oracle(balance, predicted, right)) < 1e-10

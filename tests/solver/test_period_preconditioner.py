@@ -10,7 +10,7 @@ import pytest
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, sample_tangents
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
-from solver.newton import period_preconditioner, preconditioner
+from solver.newton import linear_solver, period_preconditioner, preconditioner
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import (
@@ -222,8 +222,7 @@ def products(monkeypatch: pytest.MonkeyPatch, tangent: Linearisation, right: Flo
 @pytest.fixture
 def large_slip_space(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every slip space is too large to be factorised."""
-    none = replace(NEWTON, exact_directions=0, most_directions=0)
-    monkeypatch.setattr(preconditioner, "NEWTON", none)
+    monkeypatch.setattr(preconditioner, "worthwhile_directions", lambda _: 0)
 
 
 @pytest.mark.usefixtures("large_slip_space")
@@ -243,16 +242,16 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
     right = tangent.apply(np.random.default_rng(2).normal(size=predicted.shape))
     found = products(monkeypatch, tangent, right, 2e-3)
     assert found <= 25
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(preconditioner.NEWTON, partial_directions=300))
+    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, most_directions=300))
     monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
     assert isinstance(build_factor(tangent), SlipFactor)
     assert found < 0.75 * products(monkeypatch, tangent, right, 0.1)
 
 
 @pytest.mark.usefixtures("large_slip_space")
-def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant() -> None:
+def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(linear_solver, "is_dense_cheapest", lambda *_: False)
     balance, predicted = case(8, highest=5, samples=64)
-    assert predicted.size > NEWTON.dense_unknowns - 50
     solver = JacobianSolver()
     random = np.random.default_rng(9)
     for _ in range(4):

@@ -80,8 +80,8 @@ def test_the_largest_directions_steer_the_iteration(monkeypatch: pytest.MonkeyPa
     assert part.size == most
     assert not part.exact
     assert largest_directions(tangent, MANY).size == whole.size
-    few = {"exact_directions": 0, "most_directions": 0, "partial_directions": most}
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, **few))
+    monkeypatch.setattr(preconditioner, "worthwhile_directions", lambda _: 0)
+    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, most_directions=most))
     monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
     found = build_factor(tangent)
     assert isinstance(found, SlipFactor)

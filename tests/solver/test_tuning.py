@@ -38,7 +38,7 @@ def test_all_names_are_those_of_constants() -> None:
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"history_iteration": 5}, "history_iteration: give one of arc_iterations, "),
+        ({"history_iteration": 5}, "history_iteration: give one of arc_correctors, "),
         ({"change_limits": 0.1}, "change_limits: give a value like "),
         ({"step_iterations": "many"}, "step_iterations: give a value like 10 instead of 'many'"),
     ],
