@@ -185,7 +185,7 @@ def _penetration(joint: Joint, evaluation: Evaluation) -> float:
     moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
-    still = ACCURACY.round_off * np.abs(flexed[..., 0])  # as in `_amplitude`
+    still = ACCURACY.round_off_fraction * np.abs(flexed[..., 0])  # as in `_amplitude`
     size = max(float(part.max(initial=0.0)) for part in (moved, elastic, still))
     return _relative(float(depth.max(initial=0.0)), size)
 
@@ -198,7 +198,7 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
     """Size (...) of the vibration in a series (..., m), at least a small fraction of its mean."""
-    round_off = ACCURACY.round_off * np.abs(values_h[..., 0])
+    round_off = ACCURACY.round_off_fraction * np.abs(values_h[..., 0])
     return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 

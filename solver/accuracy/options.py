@@ -13,7 +13,7 @@ class AccuracyOptions:
     """
 
     # shared
-    round_off: float = 1e-6
+    round_off_fraction: float = 1e-6
     """Fraction of a force, a motion or a depth: less is round-off. Good states have 1e-12 and below in the change of
     the tangential state of a pair that sticks, and in the even harmonics of the force of a symmetric joint."""
     negligible: float = 1e-3
@@ -27,10 +27,10 @@ class AccuracyOptions:
     # certificate
     penetration_limit: float = 0.1
     """Fraction of the largest relative motion. Good: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
-    violation_limit: float = 0.05
+    violation_limit: float = 0.03
     """Fraction of the largest normal force for a tension, of the largest friction limit for friction above this limit,
     of the largest work for the energy of a period. Good states: below 1e-12 for the forces, up to 0.01 for the energy
-    (vibro-impact); 10 % more friction is found."""
+    (vibro-impact); a pull by 5 % and 10 % more friction are found."""
     periodicity_limit: float = 1e-3
     """Fraction of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
     residual_round_off: float = 1e-10

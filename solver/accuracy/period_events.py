@@ -16,7 +16,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
     A pair that reaches its friction limit without slip counts as stuck.
     """
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off * np.abs(state_t).max(axis=2)
+    rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off_fraction * np.abs(state_t).max(axis=2)
     still = rests.all(axis=1) & ~separated.any(axis=1)
     sticks = (evaluation.status_t == STICK).all(axis=1)
     return bool((sticks | still | separated.all(axis=1)).all())
@@ -34,7 +34,7 @@ def half_wave_symmetric(evaluation: Evaluation) -> bool:
         return False
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
-    return bool(np.ptp(total, axis=2).max(initial=0.0) <= ACCURACY.round_off * size)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= ACCURACY.round_off_fraction * size)
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:

@@ -266,7 +266,7 @@ class ResolvedState:
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(ACCURACY.round_off * float(np.linalg.norm(response)), 1e-300)
+        return max(ACCURACY.round_off_fraction * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""

@@ -133,7 +133,7 @@ class NodeSweep:
         """
         self._forget()
         self._take_cases(case, case)
-        length = LOADING.search_distance * self.path.scale(point.parameter)
+        length = LOADING.longest_sweep_step * self.path.scale(point.parameter)
         self.state = replace(self.state, nodes=(point,), length=length)
         self._begin_reference()
         if self._choose_resolution() > SENSITIVE_ERROR:
@@ -199,7 +199,7 @@ class NodeSweep:
         assert here is not None
         scale = self.path.scale(here.parameter)
         shortest, free = LOADING.shortest_sweep_step * scale, LOADING.free_step * scale
-        length = float(np.clip(self.state.length, shortest, LOADING.search_distance * scale))
+        length = float(np.clip(self.state.length, shortest, LOADING.longest_sweep_step * scale))
         tolerance = self._node_tolerance()
         while not self.budget.exhausted:
             target = here.parameter + self.direction * length

@@ -27,7 +27,7 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
     """
     if contact.edge is None or not contact.edge.any():
         return math.nan
-    least = ACCURACY.round_off
+    least = ACCURACY.round_off_fraction
     reached = [values[:, contact.edge].max(axis=1) > least * values.max(axis=1) for values in (pressure, depth)]
     found = np.flatnonzero(np.logical_or(*reached))
     return float(cycles[found[0]]) if found.size else math.nan

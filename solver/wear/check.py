@@ -120,7 +120,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
-        return now > ACCURACY.round_off
+        return now > ACCURACY.round_off_fraction
     # the error at the last choice times now / left_out; a small change is no reason for a new choice
     if now > ACCURACY.safety * choice.left_out:
         return error * now > settings.rtol * choice.left_out

@@ -46,7 +46,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     free = np.abs(stiffness) < WEAR.free_stiffness * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
-    if np.count_nonzero(free) != 1 or closes > ACCURACY.round_off:
+    if np.count_nonzero(free) != 1 or closes > ACCURACY.round_off_fraction:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
     return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
