@@ -17,16 +17,20 @@ class WearOptions:
     """Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2). A step that is refused is shortened
     by this factor at most."""
     step_safety: float = 0.85
-    """Length of a step over the length with the allowed error."""
+    """Length of a step over the length with the allowed error. Dovetail of 16 pairs, 212.5 Hz: with 0.7 8 % fewer
+    iterations, with 0.95 7 % more; volumes equal within 0.13 %, the told error least with 0.85."""
     first_step: float = 0.05
     """Length of the first step over the explicit step limit, or over the length in which the fastest pair wears as much
-    as the joint moves, if smaller."""
+    as the joint moves, if smaller. The same dovetail: with 0.01 4 % fewer iterations, with 0.5 6 % more; volumes equal
+    within 0.12 %."""
     step_iterations: int = 10
-    """Most Newton iterations of a step before it is shortened. Each step adds as many to the budget of a history."""
+    """Most Newton iterations of a step before it is shortened. Each step adds as many to the budget of a history. The
+    same dovetail: with 6 and with 20 1 to 3 % fewer iterations, equal volumes."""
 
     # Euler steps
     arnoldi_products: int = 16
-    """Linear solves for the limit of the explicit step."""
+    """Linear solves for the limit of the explicit step. The same dovetail: the limit is equal with 8 and 32 in six
+    digits."""
     largest_moved_load: float = 10.0
     """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of
     the worn volume is a sufficient warning (27 % with 0.6)."""
