@@ -12,12 +12,13 @@ class WearOptions:
     # adaptive steps
     step_error_fraction: float = 0.5
     """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
-    rtol."""
+    rtol. Dovetail of 16 pairs, 212.5 Hz: volumes of 1.874, 1.859 and 1.846 mm3 with 0.25, 0.5 and 1, for 442, 377 and
+    313 iterations."""
     largest_step_ratio: float = 2.0
     """Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2). A step that is refused is shortened
     by this factor at most."""
     step_safety: float = 0.85
-    """Length of a step over the length with the allowed error. Dovetail of 16 pairs, 212.5 Hz: with 0.7 8 % fewer
+    """Length of a step over the length with the allowed error. The same dovetail: with 0.7 8 % fewer
     iterations, with 0.95 7 % more; volumes equal within 0.13 %, the told error least with 0.85."""
     first_step: float = 0.05
     """Length of the first step over the explicit step limit, or over the length in which the fastest pair wears as much
