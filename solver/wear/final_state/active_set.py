@@ -135,8 +135,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             if not arrived:
                 raise NoActiveSetError("without the pairs that slip under pressure no state was found")
             last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
-            continue
-        if (point.evaluation.status_t[off] == SEPARATED).all():
+        elif (point.evaluation.status_t[off] == SEPARATED).all():
             finer = ACCURACY.negligible * tolerance
             exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
