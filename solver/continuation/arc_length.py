@@ -230,7 +230,7 @@ class _Arc:
                 return _Corrected(False, unknown, iteration)
             change = (ahead - tangent[:-1] @ held) / pivot
             unknown = unknown - np.append(held - change * moved, change)
-        return _Corrected(False, unknown, CONTINUATION.arc_iterations)
+        return _Corrected(False, unknown, CONTINUATION.near_iterations)
 
     def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget

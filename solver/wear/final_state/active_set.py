@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -134,10 +135,9 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             if not arrived:
                 raise NoActiveSetError("without the pairs that slip under pressure no state was found")
             last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
-            continue
-        if (point.evaluation.status_t[off] == SEPARATED).all():
-            finer = WEAR.off_tolerance * tolerance
+        elif (point.evaluation.status_t[off] == SEPARATED).all():
+            finer = ACCURACY.negligible * tolerance
             exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
-        margin *= 10.0
+        margin *= WEAR.off_margin
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")
