@@ -16,6 +16,9 @@ from numba import njit
 from solver.model import ComplexArray, FloatArray
 from solver.newton.options import NEWTON
 
+ROUND_OFF = 1e-11
+"""Fraction of a vector, or of a slipping pair: less is no new direction. Double precision has 2e-16."""
+
 Product = Callable[[FloatArray], FloatArray]
 
 
@@ -151,7 +154,7 @@ def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: f
     projected[0] = norms[-1]
     k, lost = 0, False
     while k < most and not lost:
-        column, lost = extend_basis(basis, k, np.ascontiguousarray(product(basis[k])), NEWTON.round_off)
+        column, lost = extend_basis(basis, k, np.ascontiguousarray(product(basis[k])), ROUND_OFF)
         if not np.all(np.isfinite(column)) or not rotate_column(column, rotations, k):
             break
         triangle[: k + 1, k] = column[: k + 1]
@@ -196,7 +199,7 @@ def ritz_values(
     values, residuals = np.empty(0, complex), np.empty(0)
     for k in range(1, size + 1):
         projected[: k + 1, k - 1], lost = extend_basis(
-            basis, k - 1, np.ascontiguousarray(product(basis[k - 1])), NEWTON.round_off
+            basis, k - 1, np.ascontiguousarray(product(basis[k - 1])), ROUND_OFF
         )
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)

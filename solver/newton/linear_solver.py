@@ -123,7 +123,7 @@ class JacobianSolver:
         return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
-        """Solution by a factorisation of this Jacobian; a second solve corrects for `NEWTON.neutral_shift`."""
+        """Solution by a factorisation of this Jacobian; a second solve corrects for the shift of neutral directions."""
         rest = _passive_rows(tangent)
         right = right.copy()
         right[rest] = 0.0

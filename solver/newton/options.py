@@ -36,8 +36,6 @@ class NewtonOptions:
     recycled_directions: int = 30
     """Directions kept from solve to solve with a factorisation. Products a solve for 48 pairs: 12.4 with 0, 9.0 with
     30, 8.3 with 60 in an equal time."""
-    round_off: float = 1e-11
-    """Fraction of a vector, or of a slipping pair: less is no new direction. Double precision has 2e-16."""
     sign_products: int = 16
     """Products of Arnoldi's method between two computations of the eigenvalues. With four in place of 16, 23 cases (12
     random scenes, sliders, small joints) take equal iterations."""
@@ -62,9 +60,6 @@ class NewtonOptions:
     otherwise, and for sliding masses, to which the march does not apply."""
 
     # slip space
-    neutral_shift: float = 1e-8
-    """Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
-    arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign."""
 
     # march through the period
     march_periods: int = 2

@@ -26,8 +26,12 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.newton.options import NEWTON
+from solver.newton.krylov import ROUND_OFF
 from solver.structure.joint import Joint
+
+# Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
+# arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign.
+_NEUTRAL_SHIFT = 1e-8
 
 # direct calls of LAPACK: the wrappers of scipy take as long as the factorisation of one pair
 _PIVOTED_QR, _ORTHOGONAL = scipy.linalg.get_lapack_funcs(("geqp3", "orgqr"), dtype=np.float64)
@@ -87,7 +91,7 @@ def _held_back_rows(tangent: Linearisation) -> tuple[IntArray, FloatArray]:
     # one more row for the wear, which the static normal motion carries
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
     rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
-    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NEWTON.round_off)
+    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > ROUND_OFF)
     return pairs, rows[pairs]
 
 
@@ -101,7 +105,7 @@ def _directions(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.empty((width, 0)), np.empty(0)
     factor, _, scales, _, _ = _PIVOTED_QR(rows.T)
     sizes = np.abs(np.diag(factor))
-    rank = int(np.count_nonzero(sizes > NEWTON.round_off))
+    rank = int(np.count_nonzero(sizes > ROUND_OFF))
     return np.ascontiguousarray(_ORTHOGONAL(factor[:, :width], scales)[0][:, :rank]), sizes[:rank]
 
 
@@ -159,7 +163,7 @@ def build_slip_factor(tangent: Linearisation, space: SlipSpace) -> SlipFactor:
     )
     pushed = _pushed(joint, space, moved)
     matrix = np.eye(space.size)
-    matrix[np.diag_indices_from(matrix)] += NEWTON.neutral_shift
+    matrix[np.diag_indices_from(matrix)] += _NEUTRAL_SHIFT
     place = 0
     present = np.zeros((3 * joint.contact.n_contact, m), bool)
     present[joint.component_index] = True

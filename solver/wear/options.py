@@ -48,8 +48,6 @@ class WearOptions:
     """Number of increments of a wear rate with alternating sign and without decay that make an oscillation."""
     calming: float = 0.98
     """Ratio of two successive increments below which an oscillation decays."""
-    no_wear: float = 1e-12
-    """Fraction of `WearState.most_rate`: a joint that wears less sticks."""
 
     # steady state
     acted_back: float = 100.0

@@ -13,6 +13,9 @@ from solver.settings import Resolution
 from solver.structure.joint import Hold
 from solver.wear.rates import WearRates
 
+# Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off.
+_NO_WEAR = 1e-12
+
 
 @packable
 @dataclass(frozen=True)
@@ -78,6 +81,11 @@ class WearState:
     def depth(self) -> FloatArray:
         """Worn depth (n_contact,), m."""
         return self.point.evaluation.wear_depth
+
+    @property
+    def least_rate(self) -> float:
+        """Wear rate below which a joint sticks, m3 per cycle."""
+        return _NO_WEAR * self.most_rate
 
     def planned(self, length: float) -> WearState:
         """The state with another length of the next step, cycles."""

@@ -18,7 +18,6 @@ from solver.newton.solve_balance import Budget
 from solver.results.history import PeriodicState
 from solver.settings import Resolution
 from solver.structure.joint import Case, Hold, Joint
-from solver.wear.options import WEAR
 from solver.wear.rates import WearRates
 from solver.wear.state import Choice, WearState
 from solver.wear.step_limit import explicit_step_limit
@@ -90,7 +89,7 @@ class WearingJoint:
 
     def wears(self, state: WearState) -> bool:
         """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(state.rates.value[-1] > WEAR.no_wear * state.most_rate)
+        return bool(state.rates.value[-1] > state.least_rate)
 
     def begin(
         self,

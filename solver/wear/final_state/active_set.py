@@ -54,7 +54,7 @@ class WornOff:
 def least_rate(state: WearState, share: float) -> float:
     """Wear rate of a pair that counts as zero, m3 per cycle, as in `solver.wear.stop` and `WearingJoint.wears`."""
     largest = float(state.rates.largest[:-1].max(initial=0.0))
-    return max(share**2 * largest, WEAR.no_wear * state.most_rate)
+    return max(share**2 * largest, state.least_rate)
 
 
 def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray, share: float) -> WornOff:
