@@ -108,6 +108,7 @@ class Store:
                 f"INSERT OR REPLACE INTO tasks VALUES ({', '.join('?' * len(columns))})",
                 ([task.get(column) for column in columns] for task in tasks),
             )
+        self._is_new = False
 
     def put(self, table: str, key: str, packed: Packed, shown: Mapping[str, object], finished: str = "") -> None:
         """Adds an entry, in place of an earlier one.
@@ -258,7 +259,7 @@ class Store:
             self._take(wait=True)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and closes the file. A new file without entries is removed."""
+        """Writes what waits, as far as there is room, and closes the file. A new file without a study is removed."""
         try:
             # an error was said before, or there is nothing that waits for an answer
             with contextlib.suppress(StorageError):
@@ -268,7 +269,7 @@ class Store:
             with contextlib.suppress(sqlite3.Error):
                 database.close(self._database, self.path)
             if self._is_new and not any((*self._keys.values(), self._waiting, self._handed_over)):
-                # nothing was computed, as the scene or the disk is at fault
+                # the run has ended before it began: the scene or the disk is at fault
                 with contextlib.suppress(OSError):
                     self.path.unlink()
 
