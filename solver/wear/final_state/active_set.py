@@ -112,7 +112,10 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
     stiffness[joint.component_index[rows] // 3] = joint.structure.static_stiffness[rows, rows]
     forces = last.evaluation.force_h[:, 0, 0]
     overlap = np.divide(forces, stiffness, out=np.zeros_like(forces), where=stiffness > 0.0)
-    margin = WEAR.off_margin * unworn.size * float(overlap.max())
+    grazing = np.maximum(closing(joint, last.evaluation), unworn)
+    # a pair that grazes without force has no overlap
+    least = ACCURACY.round_off_fraction * float(np.abs(grazing[off]).max(initial=0.0))
+    margin = WEAR.off_margin * max(unworn.size * float(overlap.max()), least)
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
     for _ in range(WEAR.off_attempts):
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
