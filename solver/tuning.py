@@ -18,14 +18,7 @@ TUNABLE = {
     "CONTINUATION": ("continuation", ("arc_correctors", "load_steps", "transient_effort", "longest_transient")),
     "ACCURACY": (
         "accuracy",
-        (
-            "penetration_limit",
-            "violation_limit",
-            "level_iterations",
-            "refinement_work",
-            "most_samples",
-            "most_unknowns",
-        ),
+        ("penetration_limit", "energy_limit", "level_iterations", "refinement_work", "most_samples", "most_unknowns"),
     ),
     "LOADING": (
         "loading_history",

@@ -30,7 +30,7 @@ def n_unknowns(resolution: Resolution, n_rel: int) -> int:
 
 
 def room_for(unknowns: float, n_rel: int) -> float:
-    """Limit of the unknowns of a joint: `unknowns` is the limit of a small joint, a larger joint may have more.
+    """Limit of the unknowns of a joint: `unknowns` is the limit of one with 48 pairs, a larger joint may have more.
 
     The limit grows with the number of displacements, so that the number of harmonics does not depend on the mesh.
     """
@@ -77,10 +77,9 @@ def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
 
 
 def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
-    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs above the harmonic `highest`.
+    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs and for all harmonics above `highest`.
 
-    Judged at the next harmonic and at the levels above. G is evaluated at real rates (growth instead of vibration),
-    where the structure has no resonances.
+    G is evaluated at real rates (growth instead of vibration), where the structure has no resonances.
     omega: rad/s.
     """
     penalty = build_penalty(model, omega, highest)
@@ -88,8 +87,8 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
     pair, tangent = component_index // 3, component_index % 3 > 0
     held = np.where(tangent, penalty.tangential[pair], penalty.normal[pair])
     marched = tangent & penalty.inertial[pair]
-    for harmonic in (highest + 1, *(level for level in ACCURACY.harmonic_levels if level > highest + 1)):
-        rate = harmonic * omega
+    for octaves in np.arange(0.0, ACCURACY.octaves_beyond + 0.5, 0.5):
+        rate = (highest + 1) * omega * 2.0**octaves
         acts = np.where(marched, penalty.mass[pair] * rate**2, held)
         if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > ACCURACY.stiffness_mismatch:
             return False

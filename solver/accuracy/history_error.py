@@ -77,13 +77,13 @@ def history_error(
         Scheme of the history.
     """
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
-    difference = ACCURACY.safety * np.abs(depth - reference["wear_depth"])
-    error = np.fmax(difference @ area, ACCURACY.safety * met.largest_before(counts))
+    difference = ACCURACY.history_safety * np.abs(depth - reference["wear_depth"])
+    error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
     # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume)
     # the local errors of Euler steps have one sign and add up
-    error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.safety) * fine["local"])
+    error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.history_safety) * fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)

@@ -12,73 +12,114 @@ class AccuracyOptions:
     "Good states" are those in the table of `solver.accuracy.certificate`. "Level": an entry of `harmonic_levels`.
     """
 
-    # shared
-    round_off_fraction: float = 1e-6
-    """Fraction of a force, a motion or a depth: less is round-off. Good states have 1e-12 and below in the change of
-    the tangential state of a pair that sticks, and in the even harmonics of the force of a symmetric joint."""
-    negligible: float = 1e-3
-    """Fraction of a work or of a wear rate that has no influence: a loss factor that no structure notices, a slip work
-    over the work of the excitation."""
-    minor: float = 0.1
-    """Fraction of a larger quantity that counts little. Of rtol: creep in the slip work, the force of a contact whose
-    duration is not resolved, an error far below rtol. Of the largest peak: errors of smaller responses are relative to
-    this fraction."""
-
     # certificate
     penetration_limit: float = 0.1
     """Fraction of the largest relative motion. Good: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
     tension_limit: float = 0.01
-    """Fraction of the largest normal force. Good states: below 1e-12; a pull by 5 % is found."""
-    violation_limit: float = 0.05
-    """Fraction of the largest friction limit for friction above this limit, of the largest work for the energy of a
-    period. Good states: below 1e-12 for friction, up to 0.01 for the energy (vibro-impact); 10 % more friction is
-    found. With 0.03 a random joint of three pairs under fifty times its usual load is rejected (energy)."""
+    """Fraction of the largest normal force. Good states: below 1e-12."""
+    cone_limit: float = 0.05
+    """Fraction of the largest friction limit. Good states: below 1e-12; 10 % more friction is found."""
+    energy_limit: float = 0.05
+    """Fraction of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
     periodicity_limit: float = 1e-3
     """Fraction of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
     residual_round_off: float = 1e-10
     """Lowest tolerance of the scaled residual: 1e-5 of its stiffness holds the mean position of a sliding mass."""
+    points_per_sample: int = 4
+    """Points per sample at which series are judged: at the samples alone their violations are too small."""
+    noticed_loss_factor: float = 1e-3
+    """Loss factor too small to influence any structure."""
+    round_off_vibration: float = 1e-6
+    """Fraction of the mean: a smaller vibration is round-off."""
+
+    # events in a period
+    round_off_change: float = 1e-9
+    """Relative change of the tangential state in a period, or relative size of the even harmonics of the force. Less
+    is round-off (1e-12 and below in good states): the pair does not slip, or the state is symmetric."""
+    asymmetric_force: float = 1e-6
+    """Even harmonics of the force over its largest value: above, a state with odd harmonics only gets the even ones."""
 
     # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
     """Highest harmonics between which "auto" chooses. The last two serve for comparison only. 7 is left out: on the
     dovetail, states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and
     0.1 % with 5, 7 and 9)."""
+    most_mixed_harmonics: int = 79
+    """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
+    displacements_of_limits: int = 144
+    """Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a
+    larger joint some limits grow in proportion, so that they limit the harmonics and not the pairs."""
+    coarse_unknowns: int = 1600
+    """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584)."""
     periods_in_contact: float = 0.5
     """Shortest contact that the harmonics resolve, in periods of the highest harmonic."""
     stiffness_mismatch: float = 0.25
     """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
+    octaves_beyond: float = 8.0
+    """Octaves above the first harmonic left out over which |1 - E G| is judged."""
 
-    # limits of size
-    cheap_unknowns: int = 400
-    """Most unknowns of a cheap balance: that of a node of a sweep, and those that only resolve a short contact, the
-    structure at higher harmonics, or a state by homotopy."""
-    most_unknowns: int = 2000
-    """Most unknowns of a balance in a history with "auto", and of a balance that is solved to estimate an error.
-    Impacts couple all harmonics of a small joint, and no preconditioner helps."""
-    displacements_of_limits: int = 36
-    """Number of relative displacements to which both limits belong. They grow in proportion for a larger joint: five
-    harmonics are cheap for the dovetail of 48 pairs (1584 unknowns), and 27 are the most (7920), as for any mesh."""
-    most_samples: int = 2048
-    """Most samples of a period that "auto" takes, and samples in the search for a missed event: a sine can exceed a
-    limit between them by 1e-6 only. The exact references take 512 at rtol 1e-3. Nine pairs of a blade that lift off at
-    2000 N: with 8192 the wear rate at the edge of the contact is no more accurate."""
-
-    # estimates and refinement
-    safety: float = 1.5
-    """Error over the difference to a state two levels up, to a state with more samples, or to the reference solution of
-    a history; applied twice to the difference to one level up. The differences alone give 2 to 1.2 for an error as 1/H
-    to 1/H^3 two levels up, 2 to 1.3 for an error as the time step or its square with twice the samples. Histories of
-    the dovetail, 16 and 48 pairs, all schemes, steps of 250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
+    # states at other resolutions
+    event_samples: int = 2048
+    """Samples of a period in the search for a missed event: a sine can exceed a limit between them by 1e-6 only."""
     level_iterations: int = 40
     """Newton iterations of a solve that starts from the state at another resolution."""
+    dear_unknowns: int = 1000
+    """Unknowns of an expensive solve: above, no odd harmonics above 79, no homotopy, no 3 N + 2 samples to compare."""
+    far_unknowns: int = 400
+    """Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
+    compared_unknowns: int = 12000
+    """Most unknowns of a balance that is solved to estimate an error."""
+    two_levels_safety: float = 1.5
+    """Error over the difference to the state two levels up: 2 to 1.2 where the error falls as 1/H to 1/H^3."""
+    one_level_safety: float = 2.5
+    """Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
+    double_samples_safety: float = 1.5
+    """Error over the difference to twice the samples: 2 to 1.3 for an error as the time step or its square."""
+    triple_samples_safety: float = 2.0
+    """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
+    small_slip_work: float = 1e-3
+    """Fraction of the work of the excitation: errors of a smaller slip work are relative to this fraction."""
+    no_slip_work: float = 1e-3
+    """Fraction of the small slip work: below, nothing wears."""
+    creep_fraction: float = 0.1
+    """Fraction of rtol: part of the slip work that may be creep."""
+    small_peak: float = 0.01
+    """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
+    small_response: float = 1e-5
+    """Fraction of the response of the stiffness of the joint alone to the excitation: less has no meaning."""
+    kept_fraction: float = 0.5
+    """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
+    spare_fraction: float = 0.3
+    """Fraction of the kept error: a state with a smaller error is tried with fewer harmonics and samples."""
+    faint_force: float = 0.1
+    """Fraction of rtol times the largest normal force: contacts with less force need not be resolved."""
+
+    # refinement
+    most_samples: int = 8192
+    """Most samples of a period that "auto" takes."""
+    samples_of_unknowns: int = 512
+    """Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that
+    lift off at 2000 N: without this limit 27 harmonics take 8192 samples, 0.2 s an iteration, and the wear rate at the
+    edge of the contact is no more accurate than with 2048."""
     refinement_work: float = 1.2e6
     """Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A
     joint of 48 pairs with nine harmonics may take 200."""
-    kept_fraction: float = 0.5
-    """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
+    most_unknowns: int = 8000
+    """Most unknowns of a balance in a history with "auto"."""
+    small_joint: int = 40
+    """Relative displacements up to which a joint is small."""
+    few_pairs_unknowns: int = 2000
+    """`most_unknowns` of a small joint: impacts couple all harmonics, and no preconditioner helps."""
+    error_ratio: float = 3.0
+    """Ratio of the errors by harmonics and by samples: the smaller one is not refined where their ratio is larger."""
     vibration_recheck: float = 0.3
     """Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion
     of the dovetail on the far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
+
+    # wear histories
+    history_safety: float = 1.5
+    """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps
+    of 250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
     crossing_window: float = 0.5
     """Fraction of the cycle count. Two histories in which an event happens at different counts cross each other. So the
     error is the largest difference from this fraction of the count on (dovetail, 211.25 Hz, steps of 2000 cycles:
@@ -91,8 +132,8 @@ class AccuracyOptions:
         return {
             "penetration": self.penetration_limit,
             "tension": self.tension_limit,
-            "cone_violation": self.violation_limit,
-            "energy_error": self.violation_limit,
+            "cone_violation": self.cone_limit,
+            "energy_error": self.energy_limit,
             "periodicity_error": self.periodicity_limit,
         }
 

@@ -16,7 +16,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
     A pair that reaches its friction limit without slip counts as stuck.
     """
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off_fraction * np.abs(state_t).max(axis=2)
+    rests = np.ptp(state_t, axis=2) <= ACCURACY.round_off_change * np.abs(state_t).max(axis=2)
     still = rests.all(axis=1) & ~separated.any(axis=1)
     sticks = (evaluation.status_t == STICK).all(axis=1)
     return bool((sticks | still | separated.all(axis=1)).all())
@@ -24,17 +24,17 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
     """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
-    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation)
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ACCURACY.asymmetric_force)
 
 
-def half_wave_symmetric(evaluation: Evaluation) -> bool:
-    """Whether all even harmonics of the contact force but the static one are round-off."""
+def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
+    """Whether all even harmonics of the contact force but the static one are below a fraction of its largest value."""
     half = evaluation.force_t.shape[2] // 2
     if evaluation.force_t.shape[2] % 2:
         return False
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
-    return bool(np.ptp(total, axis=2).max(initial=0.0) <= ACCURACY.round_off_fraction * size)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= fraction * size)
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:

@@ -69,7 +69,7 @@ def refine(
     budget
         Counts the Newton iterations.
     most
-        Most unknowns of a small joint with more harmonics (`room_for`), by default `most_unknowns`.
+        Most unknowns of a joint of 48 pairs with more harmonics (`room_for`), by default `most_unknowns`.
     usual_work
         N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
 
@@ -145,7 +145,7 @@ class _Search:
             return Refined(here.case, here.point, NOTHING, True)
         if self.settings.samples == "auto":
             return missed
-        missing = here.difference(missed).times(ACCURACY.safety)
+        missing = here.difference(missed).times(ACCURACY.double_samples_safety)
         accurate = not self.settings.automatic or missing.largest <= self.settings.rtol
         return Refined(here.case, here.point, missing, accurate)
 
@@ -155,21 +155,20 @@ class _Search:
         """Error by missing harmonics, and the state with more harmonics that gave it."""
         error, richer = here.harmonics_error(self.budget, known)
         above = shifted(here.case.resolution, 1)
-        cheap = here.unknowns(above) <= ACCURACY.cheap_unknowns and self._allowed(here, above)
+        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
             richer = here.by_homotopy(above, self.budget)
-            error = error if richer is None else here.difference(richer).times(ACCURACY.safety**2)
+            error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         return error, richer
 
     def _wanted(self, here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
         """The next resolution, chosen by the errors of samples and of harmonics."""
         resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
         wanted = resolution
-        more_samples = self.settings.samples == "auto" and by_samples > by_harmonics
-        if self.settings.harmonics == "auto" and (not holds or not more_samples):
+        if self.settings.harmonics == "auto" and (not holds or by_harmonics > by_samples / ACCURACY.error_ratio):
             wanted = above if self.settings.samples == "auto" else Resolution(above.orders, resolution.samples)
-        if more_samples:
+        if self.settings.samples == "auto" and by_samples > by_harmonics / ACCURACY.error_ratio:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         return wanted
 
@@ -198,7 +197,18 @@ class _Search:
         """Whether "auto" may take these harmonics and samples."""
         if not here.case.model.holds(resolution.highest):
             return False
-        most = room_for(self.most, here.joint.component_index.size)
+        n_rel = here.joint.component_index.size
+        # the contact law costs unknowns times samples
+        room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
+        if here.unknowns(resolution) * resolution.samples > room:
+            return False
+        small = n_rel <= ACCURACY.small_joint
+        most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
+        if resolution.highest > ACCURACY.most_mixed_harmonics:
+            # more harmonics for friction without impacts only, whose harmonics are odd
+            if not all(order % 2 for order in resolution.orders):
+                return False
+            most = min(most, ACCURACY.dear_unknowns)
         # the two highest resolutions serve for a comparison only
         in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most

@@ -107,7 +107,7 @@ class ResolvedState:
     def at_rest(self, budget: Budget) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         settings = self.case.settings
-        fraction = ACCURACY.minor * settings.rtol
+        fraction = ACCURACY.creep_fraction * settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         rested = shake_down(self.joint, self.point, fraction, settings.tolerance, budget)
@@ -119,13 +119,13 @@ class ResolvedState:
         It is the larger one of `usual_work` and a fraction of the work of the excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return max(ACCURACY.negligible * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, budget: Budget) -> ResolvedState | None:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not half_wave_symmetric(self.point.evaluation):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
 
@@ -141,7 +141,7 @@ class ResolvedState:
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(ACCURACY.most_samples, 2 * samples)), budget)
+        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), budget)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
@@ -162,10 +162,11 @@ class ResolvedState:
           as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        few = self.unknowns(self.case.resolution) <= ACCURACY.cheap_unknowns
+        few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
         if finer is not None:
-            return self.difference(finer).times(ACCURACY.safety), finer
+            safety = ACCURACY.triple_samples_safety if few else ACCURACY.double_samples_safety
+            return self.difference(finer).times(safety), finer
         coarser = self.solve_at(Resolution(orders, samples // 2), budget) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
@@ -187,15 +188,15 @@ class ResolvedState:
         known: a state with more harmonics from an earlier comparison, used again where it has enough of them.
         """
         evaluation = self.point.evaluation
-        felt = ACCURACY.minor * self.case.settings.rtol
+        felt = ACCURACY.faint_force * self.case.settings.rtol
         contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
         # a contact of one period of the highest harmonic is resolved well, one of half a period just resolved
         far, seeing = (levels_to_see(self.case.resolution, part * contact, 2) for part in (0.5, 1.0))
-        while far > 2 and not self.may_solve(shifted(self.case.resolution, far), ACCURACY.cheap_unknowns):
+        while far > 2 and not self.may_solve(shifted(self.case.resolution, far), ACCURACY.far_unknowns):
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        most = ACCURACY.cheap_unknowns
+        most = ACCURACY.far_unknowns
         if self.may_solve(shifted(self.case.resolution, 2), most):
             reaching = levels_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
@@ -204,7 +205,7 @@ class ResolvedState:
                 reaching -= 1
         for levels in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
             other = shifted(self.case.resolution, levels)
-            affordable = self.unknowns(other) <= room_for(ACCURACY.most_unknowns, self.joint.component_index.size)
+            affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
                 level = level or self.solve_at(other, budget)
@@ -214,8 +215,7 @@ class ResolvedState:
                     richer = level if levels > 0 else None
                     if levels < seeing and seeing > 2:
                         return UNKNOWN, richer
-                    # one level alone shows less of the error
-                    safety = ACCURACY.safety ** (2 if levels == 1 else 1)
+                    safety = ACCURACY.one_level_safety if levels == 1 else ACCURACY.two_levels_safety
                     return self.difference(level).times(safety), richer
         return UNKNOWN, None
 
@@ -237,14 +237,14 @@ class ResolvedState:
         The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
         estimate: errors of the present state.
         """
-        here, rtol = self, self.case.settings.rtol
-        while estimate.largest <= ACCURACY.minor * rtol:
+        here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
+        while estimate.largest <= ACCURACY.spare_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, budget) if lower != here.case.resolution else None
             if level is None:
                 break
-            larger = level.difference(here).times(ACCURACY.safety) + estimate
-            if larger.largest > ACCURACY.kept_fraction * rtol or not level.holds():
+            larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate
+            if larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
         return here, estimate
@@ -266,7 +266,7 @@ class ResolvedState:
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(ACCURACY.round_off_fraction * float(np.linalg.norm(response)), 1e-300)
+        return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""
@@ -278,12 +278,12 @@ class ResolvedState:
         least = better.least_response()
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         mine_peak, its_peak = self.peaks(), better.peaks()
-        size = np.maximum(its_peak, max(ACCURACY.minor * float(its_peak.max(initial=0.0)), least))
+        size = np.maximum(its_peak, max(ACCURACY.small_peak * float(its_peak.max(initial=0.0)), least))
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= ACCURACY.negligible * work:
+        if max(its_slip, mine_slip) <= ACCURACY.no_slip_work * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, ACCURACY.negligible * work)
+        slip = max(its_slip, ACCURACY.no_slip_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

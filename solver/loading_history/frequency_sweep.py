@@ -186,6 +186,8 @@ class FrequencySweep:
                 lost.message = self._where_lost(nodes)
                 return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
+            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
+                refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return Found(Outcome.SINGULAR)
         # folds of a ramp are load factors
@@ -217,7 +219,7 @@ class FrequencySweep:
     def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
         """Find the first state of the sweep; no success where there is none, or where the structure is singular."""
         nodes.budget.limit = nodes.budget.iterations + LOADING.first_iterations
-        places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.free_step]
+        places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
         for place in places:
             if self._begin_at(nodes, place):
                 return
@@ -264,6 +266,17 @@ class FrequencySweep:
         if nodes.path.omega is not None:
             return f"the vibration repeats up to {100.0 * nodes.state.lost_at:.3g} % of the excitation"
         return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"
+
+    def _restarted_from_static(self, omega: float) -> Refined | None:
+        """An accurate state from the static one with other harmonics than the branch; None if there is none."""
+        for resolution in _other_starts()[1:]:
+            case, point = self._first_at(omega, 1.0, resolution, self.budget)[1:]
+            refined = None
+            if point is not None:
+                refined = refine(case, omega, self.excitation_amplitude, point, self.budget)
+            if refined is not None and refined.accurate:
+                return refined
+        return None
 
     def _first(self, omega: float, budget: Budget, load_factor: float = 1.0) -> tuple[Case, PathPoint | None]:
         """A state from the static one with the harmonics of the sweep, or else with others."""

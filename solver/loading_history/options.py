@@ -13,17 +13,22 @@ class LoadingOptions:
     """
 
     # where a sweep begins
+    begin_away: float = 0.3
+    """Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
+    0.38 the dovetail has the same state within 2e-3."""
     cells_per_octave: int = 4
-    """Cells in an octave. All points of a cell have one first frequency, two to three cells away: 105 Hz, half the
-    resonance, for the dovetail. At 0.78 and 0.62 times the frequency the dovetail has the same state within 2e-3."""
+    """Cells in an octave. All points of a cell have one first frequency: 105 Hz, half the resonance, for the
+    dovetail."""
     origin_candidates: int = 8
     """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen.
     They are 2 % apart and at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
+    first_load_factor: float = 1e-3
+    """Load factor at which a ramp begins."""
 
     # one step
     free_step: float = 1e-3
     """Fraction of the parameter: length of the steps with continuation through folds, or settling in time, where a
-    branch ends. A ramp begins at this fraction of the load."""
+    branch ends."""
     search_distance: float = 0.05
     """Fraction of the parameter: natural length of arc-length steps, and distance from the end of a sweep to the next
     attempt to begin it again."""
@@ -31,19 +36,26 @@ class LoadingOptions:
     # steps of a sweep: dovetail of 48 pairs, compared with steps twenty times as short. Errors of the motion at 211,
     # 211.5, 212 and 212.5 Hz: 0.25, 0.05, 0.18 and 0.8 % with a largest change of 0.2 (48 nodes in all), 0.06, 0.04,
     # 0.03 and 0.1 % with 0.05 (155 nodes)
+    change_per_rtol: float = 20.0
+    """Largest relative change of the vibration in a step, over rtol: see above."""
     change_limits: tuple[float, float] = (0.05, 0.2)
-    """Largest relative change of the vibration in a step, see above: the larger limit at the default rtol, and less in
-    proportion to rtol. Blade root of the deck `blade_root`, rtol 5e-2: the wear rates with 0.2 and 0.03 differ by
-    0.04 %, for 620 and 1680 iterations."""
+    """Limits of the largest change, see above. Blade root of the deck `blade_root`, rtol 5e-2: the wear rates with 0.2
+    and 0.03 differ by 0.04 %, for 620 and 1680 iterations."""
+    small_vibration: float = 0.3
+    """Fraction of the friction limits: changes of a smaller vibration are relative to this fraction. With 1 the error
+    of the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
     aimed_change: float = 0.75
     """Expected change of the vibration in the next step, as a fraction of the largest change. Few steps are refused."""
-    lengthening: tuple[float, float] = (0.25, 2.0)
+    lengthening: tuple[float, float] = (0.1, 2.0)
     """Limits of the ratio of the lengths of two steps of a sweep."""
     longest_sweep_step: float = 0.1
-    """Longest step, as a fraction of the parameter. With 0.05 the sweeps of random small joints take a sixth more."""
+    """Longest step, as a fraction of the parameter."""
     shortest_sweep_step: float = 2e-5
     """Shortest step, as a fraction of the parameter, whatever the change of the vibration is. An undamped slider passes
     its resonance in such steps."""
+    node_residual: float = 1e-3
+    """Scaled residual of a node, as a fraction of rtol. With a tenth and with ten times this value the motion of the
+    dovetail is equal to 1e-4. With the tolerance of a result, nodes take 1.4 times the iterations."""
     node_iterations: int = 2500
     """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
     first_iterations: int = 1000
@@ -59,6 +71,9 @@ class LoadingOptions:
     # where the first attempt fails
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))
     """Harmonics and samples of further attempts to find a first state."""
+    few_pairs: int = 12
+    """Most pairs of a joint whose inaccurate state is sought again from the static state: with impacts there are many
+    other states."""
 
 
 LOADING = LoadingOptions()

@@ -21,9 +21,9 @@ import numpy as np
 
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
-from solver.contact.coulomb import STICK
+from solver.contact.coulomb import STICK, friction_limit
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, vibration_change
+from solver.harmonic_balance.converged import PathPoint, vibration_change, vibration_size
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import LoadingPath, Step, in_rows
@@ -32,7 +32,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import packable
-from solver.settings import Resolution, SolverSettings
+from solver.settings import Resolution
 from solver.structure.joint import Case
 
 _FINAL = (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
@@ -224,7 +224,7 @@ class NodeSweep:
                     return Step(point)
                 shorter = float(np.clip(LOADING.aimed_change / change, LOADING.lengthening[0], LOADING.aimed_change))
             elif length > free:
-                shorter = max(LOADING.lengthening[0], free / length)
+                shorter = max(0.25, free / length)
             else:
                 step = self.path.step(here, target, self.solver, self.budget)
                 if isinstance(step, Step):
@@ -233,24 +233,25 @@ class NodeSweep:
                 self.state = replace(self.state, failure=step)
                 if length <= shortest or step in _FINAL:
                     return None
-                shorter = LOADING.lengthening[0]
+                shorter = 0.25
             length = max(shorter * length, shortest)
         return None
 
     def _node_tolerance(self) -> float:
         """Tolerance of the scaled residual of a node; reported states are solved to the tolerance of the settings."""
         settings = self.case.settings
-        return max(settings.tolerance, ACCURACY.negligible * settings.rtol)
+        return max(settings.tolerance, LOADING.node_residual * settings.rtol)
 
     def _change(self, before: PathPoint, after: PathPoint) -> float:
         """Change of the vibration in a step over the largest change allowed."""
         one, other = before.evaluation, after.evaluation
+        limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
+        size = max(vibration_size(one), LOADING.small_vibration * float(limit))
         if (one.status_t == STICK).all() and (other.status_t == STICK).all():
             most = CONTINUATION.linear_change
         else:
-            rigour = self.case.settings.rtol / SolverSettings.rtol
-            most = float(np.clip(LOADING.change_limits[1] * rigour, *LOADING.change_limits))
-        return vibration_change(one, other) / most
+            most = float(np.clip(LOADING.change_per_rtol * self.case.settings.rtol, *LOADING.change_limits))
+        return float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:])) / (size * most)
 
     def _advance(self, step: Step) -> None:
         """Make the next node the current one."""

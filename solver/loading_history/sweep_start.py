@@ -1,8 +1,8 @@
 """The first frequency of a sweep, which depends on the scene and on the point but not on the other points of a study.
 
 In a run-up or run-down a machine passes other frequencies before the point, and the joint keeps their history. So a
-sweep begins well away from the point: for "up" between 0.5 and 0.71 times its frequency, for "down" between 1.41 and
-2 times. All points of a quarter octave have one first frequency: the one at which the vibration loads the stuck
+sweep begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and
+1.85 times. All points of a quarter octave have one first frequency: the one at which the vibration loads the stuck
 joint least, so that no sweep begins at a resonance.
 """
 
@@ -46,7 +46,9 @@ def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
         return Origin((), high, cell)
     width = 2.0 ** (1.0 / LOADING.cells_per_octave)
     # further attempts where no state is found at the quiet frequency
-    near, away = (low / width**2, 1.0 / width) if sweep == "up" else (high * width**2, width)
+    near, away = (
+        ((1.0 - LOADING.begin_away) * low, 1.0 / width) if sweep == "up" else ((1.0 + LOADING.begin_away) * high, width)
+    )
     return Origin((_quiet(model, near * away, near), near, near / away), high, cell)
 
 

@@ -19,6 +19,7 @@ from solver.settings import Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.free_slide import creeps, free_slide
+from solver.wear.options import WEAR
 from solver.wear.state import Choice, Failure, WearState
 from solver.wear.wearing_joint import WearingJoint
 
@@ -120,12 +121,10 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
-        return now > ACCURACY.round_off_fraction
-    # the error at the last choice times now / left_out; a small change is no reason for a new choice
-    if now > ACCURACY.safety * choice.left_out:
+        return now > ACCURACY.asymmetric_force
+    if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
-    fewer_may_do = error * now < ACCURACY.minor * settings.rtol * choice.left_out
-    return fewer_may_do and ACCURACY.safety * now < choice.left_out
+    return now < WEAR.left_out_fallen * choice.left_out
 
 
 def _vibrates_otherwise(state: WearState) -> bool:

@@ -10,7 +10,6 @@ from typing import Protocol
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
 from solver.model import FloatArray
@@ -86,7 +85,7 @@ class AdaptiveSteps:
         if fastest > 0.0:
             moved = float(np.abs(at.displacement_h[:, :, 1:]).max())
             # the limit is no bound where almost nothing slips
-            length = WEAR.first_step * min(state.step_limit, moved / fastest)
+            length = min(WEAR.first_step * state.step_limit, WEAR.first_depth * moved / fastest)
         return replace(state, length=length, first_length=length)
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
@@ -96,10 +95,10 @@ class AdaptiveSteps:
         much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there.
         """
         length = state.length
-        shortest = max(0.5 * WEAR.fold_resolution * state.cycle, ACCURACY.negligible * state.first_length)
+        shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
         while True:
             tried = bdf2_attempt(work, state, length)
-            shorter = 1.0 / WEAR.largest_step_ratio
+            shorter = WEAR.smallest_step_ratio
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
                 ratio = size / self._allowed(work, state, tried.point.evaluation.wear_depth, length)
@@ -107,9 +106,9 @@ class AdaptiveSteps:
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 calm = vibration_change(state.point.evaluation, tried.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
-                    ahead = length * float(np.clip(wanted, WEAR.step_safety, WEAR.largest_step_ratio))
+                    ahead = length * float(np.clip(wanted, WEAR.refused_step_ratio, WEAR.largest_step_ratio))
                     return Step(work.accepted(state, tried.point, length).planned(ahead), size, length)
-                shorter = max(float(wanted), shorter)
+                shorter = float(np.clip(wanted, WEAR.smallest_step_ratio, WEAR.refused_step_ratio))
             if length <= shortest:
                 one_step = bounded_euler_step if self.bounded else euler_step
                 taken = one_step(work, state, length, "implicit")

@@ -17,10 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
@@ -46,7 +44,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     free = np.abs(stiffness) < WEAR.free_stiffness * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
-    if np.count_nonzero(free) != 1 or closes > ACCURACY.round_off_fraction:
+    if np.count_nonzero(free) != 1 or closes > WEAR.free_closing:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
     return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
@@ -72,7 +70,7 @@ def held_on(
     other = held.joint(joint.omega, joint.excitation_amplitude)
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
     found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, budget, keep_history=True)
-    changed = vibration_change(last.evaluation, found.evaluation) > CONTINUATION.smooth_change
+    changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
     if (
         not arrived
         or changed

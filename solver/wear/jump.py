@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
@@ -57,7 +56,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     landed = state_after_fold(work.case, work.at(state), state.point, worn, work.solver, work.budget)
     if not isinstance(landed, PathPoint):
         return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
-    if vibration_change(state.point.evaluation, landed.evaluation) <= CONTINUATION.smooth_change:
+    if vibration_change(state.point.evaluation, landed.evaluation) <= WEAR.jump_change:
         # a small fold of the branch at a corner is no jump, and there may be many corners
         return replace(state, point=landed)
     first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, IntArray
 from solver.packing import packable
 from solver.wear.options import WEAR
@@ -58,11 +57,10 @@ class WearRates:
             strongest=np.maximum(self.strongest, weakest),
         )
 
-    @property
-    def oscillate(self) -> bool:
+    def oscillate(self, least: float = 0.0) -> bool:
         """Whether a rate went up and down `alternations` times in a row without decay.
 
         The tiny rate of a pair at the edge of the slip zone alternates with steps of any length. So the increments must
-        not be negligible beside the wear rate of the whole joint.
+        be larger than `least`, m3 per cycle, and larger than a fraction of the wear rate of the whole joint.
         """
-        return bool(self.strongest.max(initial=0.0) > ACCURACY.negligible * self.largest[-1])
+        return bool(self.strongest.max(initial=0.0) > max(WEAR.noticeable_oscillation * self.largest[-1], least))

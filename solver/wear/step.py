@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from solver.accuracy.error_estimate import euler_error
-from solver.accuracy.options import ACCURACY
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -56,7 +55,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
             return _euler(work, state, point, length)
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
-    shortest = max(min(resolution, CONTINUATION.shortest_fraction), ACCURACY.negligible)
+    shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
     last, arrived = follow_naturally(
         balance_at, base, 1.0, work.solver, tolerance, work.budget, keep_history=True, shortest=shortest
     )

@@ -135,8 +135,7 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
     fraction = moved_fraction(joint, before, wear_depth)
     if fraction <= WEAR.largest_moved_load:
         return None
-    # as far below one load as the limit is above: a usual step of the dovetail moves 0.001 to 0.01 of the load
-    advised = length / (WEAR.largest_moved_load * fraction)
+    advised = length * WEAR.advised_moved_load / fraction
     return (
         f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
         f" normal forces of the joint: at most {advised:.2g} cycles at once would do"

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.outcome import Outcome
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
@@ -52,7 +51,7 @@ class InSteadyState:
         if self._is_steady(work, state, output):
             steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
-        if n_steps >= WEAR.steps_to_the_end or state.cycle > WEAR.longest_history:
+        if n_steps >= WEAR.steps_to_the_end or state.cycle > WEAR.longest_march:
             still = f"the joint still wears at {rate:.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {state.cycle:.4g}, {still}")
         return None
@@ -66,12 +65,11 @@ class InSteadyState:
     def _is_steady(self, work: WearingJoint, state: WearState, output: DenseOutput) -> bool:
         """Whether wear goes on without end.
 
-        Every pair that carries load slips, and the wear rate is constant within rtol although the wear is deep enough
-        to act back.
+        Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
         """
         joint, at = work.at(state), state.point.evaluation
         normal = at.force_h[:, 0, 0]
-        pressed = normal > ACCURACY.round_off_fraction * float(normal.max(initial=0.0))
+        pressed = normal > WEAR.bears * float(normal.max(initial=0.0))
         if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
             return False
         course = output.taken.course
@@ -80,7 +78,7 @@ class InSteadyState:
         first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
         if (
             volumes[first] > 0.1 * volumes[-1]
-            or (np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]).any()
+            or (np.abs(rates[first:] - rates[-1]) > WEAR.steady_rate * rates[-1]).any()
         ):
             return False
         rows = np.flatnonzero(joint.component_index % 3 == 0)

@@ -131,7 +131,7 @@ def test_the_course_names_the_count_of_every_change_of_harmonics() -> None:
 
 
 def test_the_course_of_many_steps_is_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, kept_steps=8))
+    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, course_steps=8))
     course = taken([0.0], n_steps=100).taken.course
     assert len(course.ends) == 101
     assert len(course.cycles) == len(course.depths) == len(course.rates) <= 9

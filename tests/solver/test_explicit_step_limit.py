@@ -117,7 +117,8 @@ def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscil
     followed = WearRates.none(2)
     for rate in rates:
         followed = followed.after(np.array([1.0, rate]))
-    assert followed.oscillate is oscillates is oscillation_of_all(rates)
+    assert followed.oscillate() is oscillates is oscillation_of_all(rates)
+    assert not followed.oscillate(10.0)
 
 
 @pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
@@ -126,7 +127,7 @@ def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, osci
     for step in range(8):
         pair = share * (1.0 + step % 2)
         followed = followed.after(np.array([pair, 2.0, 2.0 + pair]))
-    assert followed.oscillate is oscillates
+    assert followed.oscillate() is oscillates
 
 
 @settings(max_examples=200)
@@ -137,7 +138,7 @@ def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates: list[fl
         if place == cut:
             followed = unpack(pack(followed))
         followed = followed.after(np.array([rate]))
-    assert followed.oscillate is oscillation_of_all(rates)
+    assert followed.oscillate() is oscillation_of_all(rates)
     assert followed.largest[0] == max(rates, default=0.0)
 
 

@@ -9,7 +9,7 @@ from solver.settings import Resolution, all_orders
 
 def test_a_large_joint_may_have_as_many_harmonics_as_that_of_48_pairs() -> None:
     ours = n_unknowns(Resolution(all_orders(27), 128), 144)
-    assert ours <= room_for(ACCURACY.most_unknowns, 144)
+    assert ours <= ACCURACY.most_unknowns
     for n_pairs in (1, 48, 160, 2000):
         most = room_for(ACCURACY.most_unknowns, 3 * n_pairs)
         assert n_unknowns(Resolution(all_orders(27), 128), 3 * n_pairs) <= most

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history import node_resolution
+from solver.loading_history import sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -162,7 +162,7 @@ def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest
         (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
         (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
     ):
-        monkeypatch.setattr(node_resolution, "ACCURACY", replace(node_resolution.ACCURACY, cheap_unknowns=200))
+        monkeypatch.setattr(sweep, "ACCURACY", replace(sweep.ACCURACY, coarse_unknowns=200))
         kept: list[tuple[frozenset[int], Packed]] = []
         whole: dict[int, StartState] = {}
 

@@ -103,7 +103,7 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: fl
     assert (history.wear_depth_error[1:, 0] > 0.5 * true).all()
     apart = np.abs(history.worn_volume - history.reference_volume)[1:]
     assert (apart > 0.0).all()
-    least = ACCURACY.safety * apart / history.worn_volume[1:]
+    least = ACCURACY.history_safety * apart / history.worn_volume[1:]
     assert (history.worn_volume_error[1:] >= least * (1.0 - 1e-12)).all()
     assert history.error_estimate < 0.3
 
@@ -211,7 +211,7 @@ def test_an_error_adds_up_what_differs_at_each_pair() -> None:
     # volumes agree by chance: what the first pair wears less the second one wears more
     other = [[0.0, 0.0], [1.2, 0.9], [2.4, 1.8]]
     found = history_error(COUNTS, read(DEPTH), read(other), NOWHERE, AREA, "implicit")
-    safety = ACCURACY.safety
+    safety = ACCURACY.history_safety
     assert found.worn_volume == pytest.approx([0.0, safety * 0.4 / 3.0, safety * 0.8 / 6.0])
     assert found.wear_depth == pytest.approx(safety * np.abs(np.subtract(DEPTH, other)))
     assert found.response == pytest.approx(np.full(3, 1e-3))
@@ -225,7 +225,7 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing() -> None:
     # it falls to the pairs as they are worn
     assert found.wear_depth == pytest.approx(0.1 * np.array(DEPTH))
     crossing = history_error(COUNTS, fine, read(DEPTH), Met(np.array([1.5]), np.array([6.0])), AREA, "adaptive")
-    assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.safety])
+    assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.history_safety])
 
 
 def test_a_volume_is_known_no_better_than_the_wear_rates_of_the_start_state() -> None:

@@ -168,7 +168,7 @@ def test_three_harmonics_that_do_not_suffice_are_not_called_accurate() -> None:
     assert refined.estimate.response > 1e-3
 
 
-@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("most_unknowns", 5)])
+@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("few_pairs_unknowns", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     name: str, most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

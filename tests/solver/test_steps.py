@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from solver.accuracy.error_estimate import Estimate, euler_error
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import left_out
 from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
@@ -121,8 +120,8 @@ def test_the_first_adaptive_step_wears_little_and_is_stable() -> None:
     work, state = begun()
     first = AdaptiveSteps(1e-2).begin(work, state).length
     moved = float(np.abs(state.point.evaluation.displacement_h[:, :, 1:]).max())
-    by_depth = moved / float(work.rate(state.point.evaluation).max())
-    assert first == OPTIONS.first_step * min(state.step_limit, by_depth)
+    by_depth = OPTIONS.first_depth * moved / float(work.rate(state.point.evaluation).max())
+    assert first == min(OPTIONS.first_step * state.step_limit, by_depth)
 
 
 def test_adaptive_steps_know_the_wear_coefficient_by_its_product_with_cycles_alone() -> None:
@@ -141,11 +140,11 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
 
     monkeypatch.setattr(control, "bdf2_attempt", lambda *given: lose(*given, most=1))
     _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
-    assert tried[:2] == [first, first / OPTIONS.largest_step_ratio]
+    assert tried[:2] == [first, OPTIONS.smallest_step_ratio * first]
     assert shorter.length == tried[-1]
     monkeypatch.setattr(control, "bdf2_attempt", lambda *_: None)
     states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)
-    assert euler.length == pytest.approx(ACCURACY.negligible * first, rel=2e-3)
+    assert euler.length == pytest.approx(OPTIONS.shortest_slow_step * first, rel=2e-3)
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
 
 

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint, final_history
@@ -35,6 +34,10 @@ from solver.wear.wearing_joint import WearingJoint
 
 class NoActiveSetError(Exception):
     """The active set gives no final state; the text is the reason."""
+
+
+# Overlap of a pair that grazes without force, over its distance.
+_LEAST_OVERLAP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
     overlap = np.divide(forces, stiffness, out=np.zeros_like(forces), where=stiffness > 0.0)
     grazing = np.maximum(closing(joint, last.evaluation), unworn)
     # a pair that grazes without force has no overlap
-    least = ACCURACY.round_off_fraction * float(np.abs(grazing[off]).max(initial=0.0))
+    least = _LEAST_OVERLAP * float(np.abs(grazing[off]).max(initial=0.0))
     margin = WEAR.off_margin * max(unworn.size * float(overlap.max()), least)
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
     for _ in range(WEAR.off_attempts):
@@ -138,9 +141,10 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             if not arrived:
                 raise NoActiveSetError("without the pairs that slip under pressure no state was found")
             last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
-        elif (point.evaluation.status_t[off] == SEPARATED).all():
-            finer = ACCURACY.negligible * tolerance
+            continue
+        if (point.evaluation.status_t[off] == SEPARATED).all():
+            finer = WEAR.off_tolerance * tolerance
             exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
-        margin *= WEAR.off_margin
+        margin *= 10.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")
