@@ -32,9 +32,13 @@ def worthwhile_products(n_pairs: int, m: int, k: int) -> int:
 
 
 def worthwhile_directions(tangent: Linearisation) -> int:
-    """Largest number of directions whose exact factorisation takes no longer than the march with its products."""
+    """Largest number of directions whose exact factorisation takes no longer than the march with its products.
+
+    A small joint and one with sliding masses have no choice: the march is no good for them.
+    """
     joint, most = tangent.joint, NEWTON.most_directions
-    if joint.penalty.inertial.any():
+    small = joint.component_index.size <= NEWTON.small_joint_displacements
+    if small or joint.penalty.inertial.any():
         return most
     n_pairs, m = tangent.active().size, joint.basis.synthesis.shape[0]
     n = 3 * n_pairs * m

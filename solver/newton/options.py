@@ -55,6 +55,9 @@ class NewtonOptions:
     of a march five."""
     usual_products: int = 8
     """Products of a solve with a kept factorisation: 7.6 in the default study."""
+    small_joint_displacements: int = 40
+    """Relative displacements up to which a joint is small: impacts couple most harmonics and directions, and products
+    with any other factorisation are in vain (three pairs with 115 harmonics, `tests/solver/test_refinement.py`)."""
     most_directions: int = 2500
     """Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
     otherwise, and for sliding masses, to which the march does not apply."""

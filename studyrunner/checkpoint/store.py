@@ -26,7 +26,7 @@ from studyrunner.system.endings import uninterrupted
 from studyrunner.system.files import NotPlainError, has_locks
 from studyrunner.user_error import StorageError
 
-SECONDS_A_TRANSACTION = 1.0
+SECONDS_A_TRANSACTION = 0.25
 """Longest time, s, that a result or progress waits for others that go into the same transaction."""
 
 MOST_BYTES_WAITING = 32e6
