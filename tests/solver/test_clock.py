@@ -65,7 +65,8 @@ def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(state_report, "largest_distance", njit(state_report.largest_distance.py_func))
     fresh, says = march()
     assert fresh > 0.1 + compiled
-    assert says < 0.3 * fresh
+    # at most half of what compiling took
+    assert says < 0.5 * (compiled + fresh)
 
 
 def test_what_is_compiled_is_noticed_and_what_is_there_is_not() -> None:
