@@ -7,7 +7,7 @@ With n unknowns in n_rel rows, m = 2H + 1 harmonics and k directions of slip and
 - march (`period_preconditioner`): one small system at each sample, and the d directions in which the harmonics differ.
 
 A kept factorisation takes some products for each solve. Costs are in operations of a factorisation.
-`python -m tests.benchmarks.solve_costs` compares costs with times: within a factor of 2.5 for times above 1 ms.
+`python -m tests.benchmarks.solve_costs` compares costs with times.
 """
 
 from __future__ import annotations
