@@ -17,7 +17,8 @@ from studyrunner.plan.estimate import (
 from studyrunner.plan.tasks import TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.variables import loop_numbers
-from studyrunner.study.study import AUTO, Study
+from studyrunner.study.sections import AUTO
+from studyrunner.study.study import Study
 from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE

@@ -15,7 +15,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from solver.settings import Automatic
-from studyrunner.study.study import AUTO, Study
+from studyrunner.study.sections import AUTO
+from studyrunner.study.study import Study
 
 Index = tuple[int, ...]
 Choice = tuple[int, int, int]

@@ -29,7 +29,8 @@ from studyrunner.plan.sharing import (
     rtol_is_idle,
     share_histories,
 )
-from studyrunner.study.study import AUTO, SOLVER_AXES, Study
+from studyrunner.study.sections import AUTO, SOLVER_AXES
+from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"

@@ -9,30 +9,30 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
-from studies.sandboxed_read import check_scene_readable, is_hdf5
-from studies.scene_error import SceneError
-from studies.scenes import scene_has, scene_parameters
+from studies.sandboxed_read import is_hdf5
+from studyrunner.study.checked_table import check_table
 from studyrunner.study.room_for_wear import with_room_for_wear
+from studyrunner.study.scene_axes import SceneAxis, as_checked, combinations, take_scene_axes
 from studyrunner.study.scene_errors import scene_errors
+from studyrunner.study.scene_table import check_scene, parameters_of
+from studyrunner.study.sections import SOLVER_AXES, AxesSection
 from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.study import SOLVER_AXES, SceneFileParameters, SceneSection, Study, names_file, names_model
-from studyrunner.study.study_of_result import SCENE_GROUP, Archived, read_archived
+from studyrunner.study.study import Study, check_n_points
+from studyrunner.study.study_of_result import Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
-from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.study.wear_section import WearSection
+from studyrunner.user_error import UserError, WrongValueError
 
-Checked = TypeVar("Checked", bound=BaseModel)
 Table = dict[str, object]
 
-_OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-_SECTIONS = tuple(name for name in Study.model_fields if name not in ("source", "folder", "archived"))
+_SECTIONS = tuple(
+    name for name in Study.model_fields if name not in ("source", "folder", "archived", "scene_axes", "variants")
+)
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
@@ -102,12 +102,17 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     if twice:
         value = _section(table, "solver")[twice[0]]
         raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
+    scene_axes = _take_scene_axes(sections, source)
+    if scene_axes:
+        return _with_variants(sections, scene_axes, source, path, archived)
     # only what was kept on request takes the place of what a bundled scene builds
     kept = archived if _section(table, "outputs").get("scene") is True else None
-    sections["scene"] = _check_scene(_section(table, "scene"), source, path, archived, kept)
+    sections["scene"] = check_scene(_section(table, "scene"), source, path, archived, kept)
     moved = _move_solver_axes(sections)
     try:
-        study = _check(Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, "")
+        study = check_table(
+            Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, ""
+        )
         return with_room_for_wear(study)
     except UserError as error:
         if error.key in moved:
@@ -115,11 +120,45 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
         raise
 
 
+def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
+    """Axes of the study that are keys of [scene] or [wear]."""
+    if all(name in AxesSection.model_fields for name in _section(sections, "axes")):
+        return ()
+    with scene_errors(source, None):
+        kind = parameters_of(_section(sections, "scene").get("model"))
+    return take_scene_axes(sections, tuple(AxesSection.model_fields), kind, WearSection, source)
+
+
+def _with_variants(
+    sections: Table, scene_axes: Sequence[SceneAxis], source: str, path: Path, archived: Archived | None
+) -> Study:
+    """A study with axes that are keys of [scene] or [wear]."""
+    variants = []
+    moved: dict[str | None, str] = {f"{axis.table}.{axis.dotted}": f"axes.{axis.dotted}" for axis in scene_axes}
+    try:
+        for tables in combinations(sections, scene_axes):
+            variants.append(check_study(tables, source, path, archived))
+    except UserError as error:
+        raise UserError(error.place, moved.get(error.key, error.key), error.value, error.remedy) from None
+    study = variants[0].model_copy(update={"scene_axes": as_checked(scene_axes, variants), "variants": tuple(variants)})
+    try:
+        check_n_points(study)
+    except WrongValueError as error:
+        raise UserError(source, error.key or "axes", error.value, error.remedy) from None
+    return study
+
+
 def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
     sections = study.model_dump(mode="json")
     scene = sections["scene"]
     sections["scene"] = {"model": scene["model"], **scene["parameters"]}
+    for axis in study.scene_axes:
+        given, axes = sections[axis.table], sections["axes"]
+        for name in axis.key[:-1]:
+            given, axes = given[name], axes.setdefault(name, {})
+        del given[axis.key[-1]]
+        axes[axis.key[-1]] = list(axis.values)
     for key in SOLVER_AXES:
         if sections["axes"][key] is not None:
             del sections["solver"][key]
@@ -165,9 +204,11 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
             raise UserError(source, shown, value, f"{name} holds a value and no keys: give all of it")
         place = inner
     place[names[-1]] = value
-    other = {"axes": "solver", "solver": "axes"}.get(names[0])
-    if other is not None and len(names) == 2 and names[1] in SOLVER_AXES:
-        _section(table, other).pop(names[1], None)
+    # the last place where a key is given counts, here or under [axes]
+    others = {"axes": ("solver", "scene", "wear"), **dict.fromkeys(("solver", "scene", "wear"), ("axes",))}
+    if len(names) == 2:
+        for other in others.get(names[0], ()):
+            _section(table, other).pop(names[1], None)
 
 
 def _override_value(key: str, text: str) -> object:
@@ -214,122 +255,6 @@ def _move_solver_axes(sections: Table) -> dict[str, str]:
     if "solver" in sections:
         sections["solver"], sections["axes"] = solver, axes
     return moved
-
-
-def _check_scene(
-    table: Table, source: str, path: Path, archived: Archived | None, kept: Archived | None
-) -> SceneSection:
-    """The scene in a table. kept: the result that may hold what a bundled scene was built to, None to build it."""
-    parameters = dict(table)
-    model = parameters.pop("model", None)
-    if model is None:
-        raise UserError(source, "scene.model", None, "missing: give a bundled scene or the path of a scene file")
-    if not isinstance(model, str):
-        raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
-    if names_model(model):
-        return _check_model_scene(model, parameters, source, path, archived)
-    if names_file(model):
-        found = _find_scene(model, source, path, archived)
-        return SceneSection(model=model, parameters=_check(SceneFileParameters, parameters, source, "scene"), **found)
-    try:
-        kind = scene_parameters(model)
-        offers = tuple(name for name, function in _OFFERED.items() if scene_has(model, function))
-    except SceneError as error:
-        raise UserError(source, "scene.model", model, error.remedy) from None
-    checked, found = _check(kind, parameters, source, "scene"), {}
-    if kept is not None and kept.holds_scene and model == kept.scene.get("model"):
-        before = {key: value for key, value in kept.scene.items() if key != "model"}
-        if checked == _check(kind, before, source, "scene"):
-            found = _find_scene(model, source, path, kept)
-    return SceneSection(model=model, parameters=checked, **{**found, "offers": offers})
-
-
-def _check_model_scene(model: str, table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:
-    """A finite-element model; a result file holds what it was reduced to."""
-    # what reads and reduces it is loaded where there is one
-    from studies.fe_models.from_files.model import find_files
-    from studies.fe_models.from_files.parameters import Parameters
-
-    parameters = _check(Parameters, table, source, "scene")
-    if archived is not None and archived.holds_scene and model == archived.scene.get("model"):
-        before = _check(
-            Parameters, {key: archived.scene[key] for key in archived.scene if key != "model"}, source, "scene"
-        )
-        for key, value in parameters:
-            if value != getattr(before, key) and not (key == "friction_coefficient" and isinstance(value, float)):
-                remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
-                raise UserError(source, f"scene.{key}", table.get(key), remedy)
-        return SceneSection(model=model, parameters=parameters, **_find_scene(model, source, path, archived))
-    with scene_errors(source, None):
-        files = find_files(path.parent, model, parameters)
-    return SceneSection(model=model, parameters=parameters, files=files, offers=("mesh",))
-
-
-def _find_scene(model: str, source: str, path: Path, archived: Archived | None) -> dict[str, Any]:
-    """Where the scene of a scene file stands and what it offers, once it is known that it can be read at all."""
-    from studies.scene_file import has_mesh
-
-    if archived is not None and archived.holds_scene and model == archived.scene.get("model"):
-        scene_path, group = path, SCENE_GROUP
-    else:
-        scene_path, group = path.parent / model, ""
-        try:
-            exists = scene_path.is_file()
-        except (OSError, ValueError):
-            exists = False
-        if not exists:
-            remedy = "there is no such file: give a path relative to the study file"
-            raise UserError(source, "scene.model", model, remedy)
-    with scene_errors(source, scene_path):
-        if not group:
-            check_scene_readable(scene_path)
-        offers = ("mesh",) if has_mesh(scene_path, group) else ()
-    return {"path": scene_path, "group": group, "offers": offers}
-
-
-def _check(kind: type[Checked], table: Mapping[str, object], source: str, prefix: str) -> Checked:
-    """`kind` from the table, or UserError for the first thing wrong in it. Keys of the table stand under `prefix`."""
-    try:
-        return kind.model_validate(table, strict=True)
-    except ValidationError as error:
-        details = error.errors(include_url=False)[0]
-    except SceneError as error:
-        raise UserError(
-            source, ".".join(filter(None, (prefix, error.key))), Verbatim(error.value), error.remedy
-        ) from None
-    raise _user_error(kind, details, source, prefix)
-
-
-def _user_error(kind: type[BaseModel], details: ErrorDetails, source: str, prefix: str) -> UserError:
-    owner, names = _owner(kind, [str(part) for part in details["loc"]])
-    key, field = ".".join(filter(None, (prefix, *names))), names[-1] if names else ""
-    description = owner.model_fields[field].description if field in owner.model_fields else None
-    unit = f" ({description})" if description else ""
-    if details["type"] == "extra_forbidden":
-        return UserError(source, key, details["input"], f"unknown key, give {nearest_name(field, owner.model_fields)}")
-    if details["type"] == "missing":
-        return UserError(source, key, None, f"missing: give it{unit}")
-    cause = details.get("ctx", {}).get("error")
-    if isinstance(cause, WrongValueError):
-        return UserError(source, cause.key or key, cause.value, cause.remedy + unit)
-    if isinstance(cause, SceneError):
-        named = ".".join(filter(None, (prefix, cause.key)))
-        return UserError(source, named or key, Verbatim(cause.value), cause.remedy + unit)
-    if isinstance(details["input"], list) and details["type"].endswith("_type") and prefix != "axes":
-        several = "give one value: only keys of [axes] have several, which keys of [solver] may be, too"
-        return UserError(source, key, details["input"], several + unit)
-    message = details["msg"].removeprefix("Value error, ").replace("Input should be", "give").strip()
-    return UserError(source, key, details["input"], message + unit)
-
-
-def _owner(kind: type[BaseModel], place: Sequence[str]) -> tuple[type[BaseModel], Sequence[str]]:
-    """Class that holds the key at `place`, and the names that lead to it, without places in a list."""
-    for depth, name in enumerate(place, start=1):
-        inner = kind.model_fields[name].annotation if name in kind.model_fields else None
-        if depth == len(place) or not (isinstance(inner, type) and issubclass(inner, BaseModel)):
-            return kind, place[:depth]
-        kind = inner
-    return kind, ()
 
 
 def _toml_key(key: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Iterable
 from fractions import Fraction as Rational
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 from pydantic import (
     AfterValidator,
@@ -75,6 +76,24 @@ def _spread(value: object) -> tuple[object, ...]:
     if not value:
         raise WrongValueError(value, "give at least one value")
     return tuple(value)
+
+
+def read_axis(value: object) -> tuple[Any, ...]:
+    """Values of an axis of any kind: numbers, flags or names, each once. Raises WrongValueError.
+
+    A range between whole numbers whose values are whole numbers gives whole numbers.
+    """
+    values = _spread(value)
+    for each in values:
+        if not isinstance(each, bool | int | float | str) or (isinstance(each, float) and not math.isfinite(each)):
+            raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
+    if isinstance(value, dict) and all(isinstance(value[key], int) for key in ("start", "stop")):
+        values = tuple(int(each) if each == int(each) else each for each in cast("tuple[float, ...]", values))
+    if len({float if type(each) is int else type(each) for each in values}) > 1:
+        raise WrongValueError(value, "give values of one kind: numbers, flags or names")
+    if len(values) > LONGEST_AXIS:
+        raise WrongValueError(len(values), f"give at most {LONGEST_AXIS} values")
+    return once(values)
 
 
 def _spread_range(table: dict[str, object]) -> tuple[float, ...]:

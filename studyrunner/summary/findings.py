@@ -15,7 +15,8 @@ from studyrunner.plan.point_text import describe_point, describe_reach, settings
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.room_for_wear import describe_room
-from studyrunner.study.study import AUTO, Study
+from studyrunner.study.sections import AUTO
+from studyrunner.study.study import Study
 
 MOST_NAMED = 10
 """Points that are named, of all outcomes together but for one each."""

@@ -1,0 +1,145 @@
+"""Axes that are keys of [scene] or [wear]: friction, speed, mesh, a threshold, the factor of a surface."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from pydantic import BaseModel
+
+from studyrunner.study.similar_names import nearest_name
+from studyrunner.study.values import read_axis
+from studyrunner.user_error import UserError, WrongValueError
+
+Table = dict[str, Any]
+AxisValue = float | int | bool | str
+
+_IN_WEAR = ("threshold", "surfaces")
+_UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
+_UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N s/m", "kg", "kg/m3", "J/m2"), "")
+
+
+@dataclass(frozen=True)
+class SceneAxis:
+    """An axis of a study whose values belong to a key of [scene] or [wear].
+
+    name: of the dimension. table, key: the key whose values these are; a second name in `key` is that of a surface.
+    values: in the order of the study file. units, meaning: as in the description of the key.
+    """
+
+    name: str
+    table: Literal["scene", "wear"]
+    key: tuple[str, ...]
+    values: tuple[AxisValue, ...]
+    units: str
+    meaning: str
+
+    @property
+    def dotted(self) -> str:
+        """Name of the key in the study file, below its table."""
+        return ".".join(self.key)
+
+
+def take_scene_axes(
+    sections: Mapping[str, Any], own: Sequence[str], scene: type[BaseModel], wear: type[BaseModel], source: str
+) -> tuple[SceneAxis, ...]:
+    """Axes in the table [axes] that are keys of [scene] or [wear].
+
+    Parameters
+    ----------
+    sections
+        Tables of the study file.
+    own
+        Keys that [axes] has of itself.
+    scene, wear
+        What [scene] of this model and [wear] consist of.
+    source
+        File of the study, as the user named it.
+
+    Raises
+    ------
+    UserError
+        Where a key is unknown, is given twice, or a value can be no value of an axis.
+    """
+    found: list[SceneAxis] = []
+    kinds: tuple[tuple[Literal["scene", "wear"], type[BaseModel]], ...] = (("scene", scene), ("wear", wear))
+    for name, value in sections["axes"].items():
+        if name in own:
+            continue
+        table = next((table for table, kind in kinds if name in kind.model_fields), None)
+        if table is None or (table == "wear" and name not in _IN_WEAR):
+            known = [*own, *scene.model_fields, *_IN_WEAR]
+            raise UserError(source, f"axes.{name}", value, f"unknown key, give {nearest_name(name, known)}")
+        units, meaning = _describe(dict(kinds)[table], name)
+        each = value.items() if _is_table(value) else [(None, value)]
+        for inner, values in each:
+            key = (name,) if inner is None else (name, str(inner))
+            dotted = ".".join(key)
+            _check_once(sections.get(table, {}), table, key, source)
+            if not "_".join(key).isidentifier():
+                remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
+                raise UserError(source, f"axes.{dotted}", values, remedy)
+            try:
+                of_axis = read_axis(values)
+            except WrongValueError as error:
+                raise UserError(source, f"axes.{dotted}", error.value, error.remedy) from None
+            found.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
+    return tuple(found)
+
+
+def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
+    """The tables of a study with each combination of values in [scene] and [wear], the last axis fastest."""
+    names = {axis.key[0] for axis in scene_axes}
+    axes = {name: value for name, value in sections["axes"].items() if name not in names}
+    for values in itertools.product(*(axis.values for axis in scene_axes)):
+        tables = {name: copy.copy(table) for name, table in sections.items()}
+        tables["axes"] = axes
+        for axis, value in zip(scene_axes, values, strict=True):
+            table = tables.setdefault(axis.table, {})
+            if len(axis.key) == 1:
+                table[axis.key[0]] = value
+            else:
+                table[axis.key[0]] = {**table.get(axis.key[0], {}), axis.key[1]: value}
+        yield tables
+
+
+def as_checked(scene_axes: Sequence[SceneAxis], variants: Sequence[Any]) -> tuple[SceneAxis, ...]:
+    """The axes with their values as the checked studies of all combinations have them: 3 is 3.0 where that is meant."""
+    checked, apart = [], len(variants)
+    for axis in scene_axes:
+        apart //= len(axis.values)
+        values = []
+        for variant in variants[::apart][: len(axis.values)]:
+            table = variant.scene.parameters if axis.table == "scene" else variant.wear
+            value = getattr(table, axis.key[0])
+            values.append(value if len(axis.key) == 1 else value[axis.key[1]])
+        checked.append(replace(axis, values=tuple(values)))
+    return tuple(checked)
+
+
+def _is_table(value: object) -> bool:
+    """Whether a value holds values by surface, and no range."""
+    return isinstance(value, dict) and not {"start", "stop", "num"} & value.keys()
+
+
+def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source: str) -> None:
+    """Raises UserError where the table has the key of an axis."""
+    given: Any = table
+    for part in key:
+        if not isinstance(given, Mapping) or part not in given:
+            return
+        given = given[part]
+    dotted = ".".join(key)
+    raise UserError(source, f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
+
+
+def _describe(kind: type[BaseModel], name: str) -> tuple[str, str]:
+    """Unit and meaning in the description of a key: parts between commas, of which one is the unit."""
+    text = kind.model_fields[name].description or ""
+    units = next((part for part in reversed(re.split("[,;] ", text)) if part in _UNITS), "1")
+    parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
+    return _UNITS.get(units) or units, ", ".join(parts) or name.replace("_", " ")
