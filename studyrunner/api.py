@@ -10,7 +10,6 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
-from studyrunner.mpi.broadcast import Broadcast
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
 from studyrunner.mpi.version_check import describe_machine
@@ -20,7 +19,7 @@ from studyrunner.netcdf.output import check_output
 from studyrunner.report.reading.result import open_vetted
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
 from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-from studyrunner.scene.scene import build_study_scene
+from studyrunner.scene_building import build_scenes
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, SilentProgress
@@ -104,9 +103,9 @@ def run_study(
             ProgressDisplay() if progress else SilentProgress() as shown,
         ):
             alone = Alone()
-            model = Broadcast(alone, {0: describe_machine()}, build_study_scene(study, computed=store))
+            scenes = build_scenes(alone, {0: describe_machine()}, study, store, shown.say)
             given = RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked)
-            serve_study(alone, study, model, target, store, shown, given)
+            serve_study(alone, study, scenes, target, shown, given)
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left

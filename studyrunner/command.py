@@ -169,7 +169,11 @@ def _follow(ranks: Ranks) -> int:
         os._exit(UNEXPECTED)
     if model is not None:
         from studyrunner.run import work_on_job
+        from studyrunner.scene_building import SeveralScenes, help_to_build
 
+        if isinstance(model, SeveralScenes):
+            help_to_build(ranks)
+            model = None
         work_on_job(ranks, model)
     return CONVERGED
 
@@ -177,14 +181,15 @@ def _follow(ranks: Ranks) -> int:
 def _show_plan(study: Study) -> int:
     from studyrunner.plan.estimate import largest_memory
     from studyrunner.plan.plan_text import format_plan
-    from studyrunner.plan.tasks import build_tasks
-    from studyrunner.scene.scene import build_study_scene, describe_scene
+    from studyrunner.plan.planning import build_tasks
+    from studyrunner.scene.planned_scenes import plan_scenes
 
     before = largest_memory()
-    facts = describe_scene(build_study_scene(study, _SlowSteps().say))
+    planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
-    plan = build_tasks(study, facts.n_displacements)
-    print(format_plan(study, facts, plan, built_with, time.process_time()), flush=True)
+    plan = build_tasks(study, planned.n_displacements)
+    seconds = time.process_time() + planned.seconds_left
+    print(format_plan(study, planned.largest, plan, built_with, seconds, planned.describe()), flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
@@ -215,12 +220,12 @@ def _write_scene(study: Study, path: Path) -> int:
 
 
 def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
-    from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-    from studyrunner.scene.scene import build_study_scene
+    from studyrunner.scene.scene_set import merge_facts
+    from studyrunner.scene_building import build_scenes
     from studyrunner.system.progress import ProgressDisplay, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
@@ -230,15 +235,15 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     try:
         with open_progress(target) as store:
             # Before anything is said: a wrong scene is bad input, which ends with one line.
-            model = Broadcast(ranks, machines, build_study_scene(study, _SlowSteps().say, store))
-            for line in compare_with_archived(study, model.value):
+            scenes = build_scenes(ranks, machines, study, store, _SlowSteps().say)
+            for line in compare_with_archived(study, merge_facts(scenes.facts).digest):
                 print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
             with progress:
                 if ranks.size == 1 and (announced := job_size()) > 1:
                     progress.note(
                         f"one process, although the job has room for {announced}: srun or mpiexec starts them"
                     )
-                summary = serve_study(ranks, study, model, target, store, progress, given)
+                summary = serve_study(ranks, study, scenes, target, progress, given)
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
         kept = f"{done} are kept, {path} is the finished result that it was"

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Literal, cast
+from typing import Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error
+from solver.packed_model import unpack_model
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
@@ -29,22 +30,63 @@ from studyrunner.system.machine_faults import (
 _ROUND_OFF = 1e-10
 
 
-def build_evaluator(model: ReducedModel, friction_coefficient: float | None, law: WearLaw = ARCHARD) -> Evaluate:
-    """The function that does the tasks of a study on this model by this wear law and gives their results one by one."""
+MODELS_A_RANK = 2
+"""Models that a rank holds where a study has several scenes."""
+
+Model = TypeVar("Model")
+
+
+class ModelCache(Generic[Model]):
+    """The models of the scenes that a rank has computed with last, by number of the scene.
+
+    Rank 0 keeps such a list for each rank, without models, and so knows which models the rank has.
+    """
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[int, Model] = OrderedDict()
+
+    def use(self, number: int) -> bool:
+        """Whether the model is there; the model is then the last to be removed."""
+        if number in self._models:
+            self._models.move_to_end(number)
+        return number in self._models
+
+    def add(self, number: int, model: Model) -> None:
+        """Adds a model; removes the model that was not used for longest where there are too many."""
+        self._models[number] = model
+        if len(self._models) > MODELS_A_RANK:
+            self._models.popitem(last=False)
+
+    def __getitem__(self, number: int) -> Model:
+        return self._models[number]
+
+
+def build_evaluator(model: ReducedModel | None) -> Evaluate:
+    """The function that does the tasks of a study and gives their results one by one.
+
+    model: of the only scene; None where there are several scenes, whose models come with tasks.
+    """
+    models: ModelCache[ReducedModel] = ModelCache()
+    if model is not None:
+        models.add(0, model)
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         guard_kernel_cache()
-        if isinstance(task, BranchTask):
-            yield from follow(model, friction_coefficient, task, keep)
+        number = task.joint.scene
+        if task.model is not None:
+            models.add(number, unpack_model(task.model))
+        elif not models.use(number):
+            raise RuntimeError(f"no model of scene {number} for {task}")
+        of_task = replace(task, model=None)
+        if isinstance(of_task, BranchTask):
+            yield from follow(models[number], of_task, keep)
         else:
-            yield from integrate(model, friction_coefficient, task, keep, law)
+            yield from integrate(models[number], of_task, keep)
 
     return evaluate
 
 
-def follow(
-    model: ReducedModel, friction_coefficient: float | None, task: BranchTask, keep: Keep
-) -> Iterator[StartResult]:
+def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
     """Start states of one branch as the sweep reaches them, but those that are known; the last of them ends it."""
     # numba is loaded where a task runs, so that --plan and --help do without it.
     from solver.loading_history.start_states import follow_branch
@@ -52,7 +94,7 @@ def follow(
     wanted = sorted(task.order_left)
     branch = follow_branch(
         model,
-        friction_coefficient,
+        task.joint.friction_coefficient,
         task.excitation_amplitude,
         # no state depends on those that are known
         np.array([task.frequencies[position] for position in wanted]),
@@ -87,9 +129,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
         yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
 
 
-def integrate(
-    model: ReducedModel, friction_coefficient: float | None, task: MarchTask, keep: Keep, law: WearLaw = ARCHARD
-) -> Iterator[MarchResult]:
+def integrate(model: ReducedModel, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
     """The histories of a task, the one of the march itself first.
 
     One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
@@ -102,7 +142,7 @@ def integrate(
         reached = reached if isinstance(progress, str) else progress
         keep(progress)
 
-    history = _solve(model, friction_coefficient, task, law, note)
+    history = _solve(model, task, note)
     # with more time it goes on from there
     left = reached if history.outcome is Outcome.TIME_LIMIT else None
     yield replace(build_result(task, history), progress=left)
@@ -111,16 +151,10 @@ def integrate(
             yield replace(build_result(task, history, place), progress=left)
         else:
             alone = replace(task, histories=(scaled,), resume=None)
-            yield replace(build_result(alone, _solve(model, friction_coefficient, alone, law)), place=place)
+            yield replace(build_result(alone, _solve(model, alone)), place=place)
 
 
-def _solve(
-    model: ReducedModel,
-    friction_coefficient: float | None,
-    task: MarchTask,
-    law: WearLaw,
-    keep: Keep | None = None,
-) -> WearHistory:
+def _solve(model: ReducedModel, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.final_state.find import find_final_state
     from solver.wear.history import integrate_wear
@@ -142,12 +176,12 @@ def _solve(
         counts,
         task.step,
         largest_depth=task.largest_depth,
-        law=law,
+        law=task.law,
         until=task.until,
         loops=task.loops,
     )
     solve = find_final_state if final and isinstance(counts, ToTheEnd) else integrate_wear
-    history = solve(model, friction_coefficient, task.settings, start, asked, keep, task.resume)
+    history = solve(model, task.joint.friction_coefficient, task.settings, start, asked, keep, task.resume)
     _raise_fault(history)
     return history
 

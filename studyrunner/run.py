@@ -31,11 +31,12 @@ from studyrunner.netcdf.output import crash_folder, older_folder, progress_file,
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
-from studyrunner.scene.scene import KeptScene, SceneFacts, describe_scene, scene_to_keep
-from studyrunner.scene.static_response import static_response
-from studyrunner.scene.variables import SceneVariable, build_scene_variables
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import PairArrays, merge_facts, pair_arrays
+from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending
@@ -44,9 +45,7 @@ from studyrunner.task_progress import TaskProgress, fault_of
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
-    from solver.contact.wear_law import WearLaw
     from solver.model import ReducedModel
-    from studyrunner.mpi.broadcast import Broadcast
     from studyrunner.netcdf.gather import Gathered
 
 
@@ -60,15 +59,11 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Job:
-    """What every rank needs for its tasks beside the model.
+    """What every rank needs for its tasks beside models.
 
-    friction_coefficient: of all pairs; None where each pair has its own.
-    law: wear law.
     crashes: folder of the notes on crashes; not every rank needs to see it.
     """
 
-    friction_coefficient: float | None
-    law: WearLaw
     crashes: Path
 
 
@@ -114,8 +109,8 @@ class RunOptions:
 class _ResultWriter:
     """Writes the result file from the finished points.
 
-    study, plan, facts: the study, its tasks, and facts of its scene.
-    of_scene, kept_scene: variables of the scene, and the model that the file keeps.
+    study, plan, facts: the study, its tasks, and facts of its scenes.
+    scenes, pairs: the scenes, and where their pairs are.
     target: the file.
     software: attributes on the program.
     date: as in `RunOptions`.
@@ -125,8 +120,8 @@ class _ResultWriter:
     study: Study
     plan: TaskPlan
     facts: SceneFacts
-    of_scene: Sequence[SceneVariable]
-    kept_scene: KeptScene | None
+    scenes: Scenes
+    pairs: PairArrays
     target: Target
     software: Mapping[str, str]
     date: str | None
@@ -144,10 +139,11 @@ class _ResultWriter:
             self.facts,
             completion,
             target.path,
-            self.of_scene,
-            self.kept_scene,
+            self.scenes.variables,
+            self.scenes.kept,
             target.finished,
             {**self.software, **describe_date(self.date)},
+            self.pairs,
         )
         for doubt in gathered.doubts:
             if doubt not in self.said:
@@ -179,9 +175,8 @@ def open_progress(target: Target) -> Iterator[Store]:
 def serve_study(
     ranks: Ranks,
     study: Study,
-    broadcast: Broadcast[ReducedModel],
+    scenes: Scenes,
     target: Target,
-    store: Store,
     progress: ProgressDisplay,
     options: RunOptions,
 ) -> RunSummary:
@@ -193,12 +188,10 @@ def serve_study(
     ----------
     ranks, study
         The ranks, and the study that they compute.
-    broadcast
-        The reduced model of the scene, which every rank gets.
+    scenes
+        The scenes of the study, as `build_scenes` gives them, with the open file of the progress.
     target
         The result file, as `check_result` gives it.
-    store
-        The open file of the progress, as `open_progress` gives it, with what an earlier run has left.
     progress
         What the user sees during the run.
     options
@@ -213,17 +206,18 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; finished points have been written.
     """
-    completion, writer = _prepare(study, broadcast.value, target, store, progress, options)
+    completion, writer = _prepare(study, scenes, target, progress, options)
     crashes = crash_folder(target.path)
     with _crash_notes(crashes):
         n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
-            broadcast.send()
-            job = Job(study.friction_coefficient, study.wear_law, crashes)
+            if scenes.broadcast is not None:
+                scenes.broadcast.send()
+            job = Job(crashes)
             for rank in range(1, ranks.size):
                 ranks.send(job, rank)
-            with _evaluator(broadcast.value, job, rank=0) as evaluate:
-                run_tasks(ranks, completion, crashes, evaluate, progress)
+            with _evaluator(scenes.model, job, rank=0) as evaluate:
+                run_tasks(ranks, completion, crashes, evaluate, progress, scenes)
             progress.say("writing the result")
             summary = writer.write(completion, n_found, progress)
         except BaseException as error:
@@ -237,35 +231,25 @@ def serve_study(
 
 
 def _prepare(
-    study: Study,
-    model: ReducedModel,
-    target: Target,
-    store: Store,
-    progress: ProgressDisplay,
-    options: RunOptions,
+    study: Study, scenes: Scenes, target: Target, progress: ProgressDisplay, options: RunOptions
 ) -> tuple[CompletionIndex, _ResultWriter]:
-    """The index of finished points, and the writer of the result.
-
-    Raises UserError where the scene lacks what the study asks for, before anything is computed.
-    """
-    facts = replace(describe_scene(model), static_response=static_response(model))
-    plan = build_tasks(study, facts.n_displacements)
-    if "natural_frequency" in study.outputs.variables:
-        progress.say("finding the natural frequencies of the scene")
-    of_scene = build_scene_variables(study, model, store)
-    kept_scene = scene_to_keep(study, model)
+    """The index of finished points, and the writer of the result."""
+    store, facts = scenes.store, merge_facts(scenes.facts)
+    plan = build_tasks(study, [each.n_displacements for each in scenes.facts])
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
     said = doubts_of_study(study)
-    for note in (*store.notes, *_older(target.path), *said):
+    for note in (*store.notes, *_older(target.path), *scenes.notes, *said):
         progress.note(note)
     for path in (target.path, progress_file(target.path)):
         remove_leftovers(path, alone=store.locked)
-    completion = CompletionIndex(plan, Identities(study, facts.digest, hash_of_kind(kind.descr)), store, kind)
+    identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
+    completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)
     store.note_study(label.name, label.model, layout_of(kind), completion.describe_tasks())
-    writer = _ResultWriter(study, plan, facts, of_scene, kept_scene, target, software, options.date, said)
+    pairs = pair_arrays(study, scenes.facts)
+    writer = _ResultWriter(study, plan, facts, scenes, pairs, target, software, options.date, said)
     return completion, writer
 
 
@@ -368,18 +352,21 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
     )
 
 
-def work_on_job(ranks: Ranks, model: ReducedModel) -> None:
-    """Any other rank after it has received the model: does tasks until there are none."""
+def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:
+    """Any other rank after it has received the model, if there is only one: does tasks until there are none."""
     job = wait_for_message(ranks)
+    if job is None:
+        # nothing has to be computed
+        return
     if not isinstance(job, Job):
         raise TypeError(f"rank 0 sent {job!r} instead of a job")
     with _evaluator(model, job, ranks.rank) as evaluate:
         work_on_tasks(ranks, evaluate)
 
 
-def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
+def _evaluator(model: ReducedModel | None, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
     """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
-    compute = build_evaluator(model, job.friction_coefficient, job.law)
+    compute = build_evaluator(model)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
         given: set[int] = set()
@@ -406,7 +393,12 @@ def _evaluator(model: ReducedModel, job: Job, rank: int) -> contextlib.AbstractC
 
 
 def run_tasks(
-    ranks: Ranks, completion: CompletionIndex, folder: Path, evaluate: Evaluate, progress: ProgressDisplay
+    ranks: Ranks,
+    completion: CompletionIndex,
+    folder: Path,
+    evaluate: Evaluate,
+    progress: ProgressDisplay,
+    scenes: Scenes,
 ) -> None:
     """Rank 0: has the remaining tasks done and their results saved. folder: of the notes on crashes."""
     tally = read_tally(folder)
@@ -451,6 +443,6 @@ def run_tasks(
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
     progress.begin_tasks()
-    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick)
+    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
     serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
     completion.store.flush()

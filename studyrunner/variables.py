@@ -362,5 +362,13 @@ COORDINATES = {
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
     "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_exists": Variable(
+        ("contact",),
+        "1",
+        "whether the scene has the contact pair",
+        "int8",
+        ("missing", "present"),
+        comment="Scenes of the study differ in their pairs. Values of a missing pair are NaN.",
+    ),
 }
 """Coordinates, the axes first."""

@@ -6,6 +6,7 @@ Every bundled scene is a module of this package with a pydantic class `Parameter
 - `describe_mesh(parameters) -> SurfaceMesh`,
 - `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more of them than its reduced model,
 - `with_room_for_wear(parameters, expected) -> Parameters`, where its pairs end at an artificial edge,
+- `FRICTION_IN_MODEL`, where the model depends on the friction coefficient,
 - `exact_answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles) -> ExactAnswer`.
 
 A module is imported when its scene is asked for, so that listing the scenes costs nothing.

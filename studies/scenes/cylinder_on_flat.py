@@ -36,6 +36,9 @@ to 0.9 % off, of first order."""
 _WIDEST = 0.45
 """Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
 
+FRICTION_IN_MODEL = True
+"""The default load, and the width of what wears, depend on the friction coefficient."""
+
 
 class Parameters(BaseModel):
     """Parameters of bodies, loads and strips.

@@ -36,6 +36,9 @@ _NEAR = 0.08
 _WIDEST = 0.5
 """Of the radius of the sphere: beyond it is no paraboloid."""
 
+FRICTION_IN_MODEL = True
+"""The default load, and the width of what wears, depend on the friction coefficient."""
+
 
 class Parameters(BaseModel):
     """Parameters of bodies, loads and patches.

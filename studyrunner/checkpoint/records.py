@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from solver.packing import Packed
 from studyrunner.checkpoint.contents import join_bytes, sort_bytes
+from studyrunner.plan.planning import march_variables
 from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import march_variables
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
@@ -41,10 +41,11 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
 
 
 def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
-    """Record (1,) of a history."""
+    """Record (1,) of a history. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
     records = empty_record(kind)
     for name, values in result.values.items():
-        records[name] = values
+        own = tuple(slice(size) for size in np.shape(values))
+        records[name][0:1][(slice(None), *own)] = values
     return records
 
 

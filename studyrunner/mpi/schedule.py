@@ -176,6 +176,7 @@ class Handlers(Generic[Task, Result]):
     keep: called with a task and its progress, or words on its progress; never after the last result of the task.
     take_back: called with a lost rank and the tasks that it had; returns the tasks to be done instead.
     is_sick: whether a result of a rank shows that the rank should get no more tasks.
+    prepare: the task as a rank gets it; called once for each task that is sent, in the order of sending.
     """
 
     take: Callable[[Task, Result], Iterable[Task]]
@@ -183,6 +184,7 @@ class Handlers(Generic[Task, Result]):
     keep: Callable[[Task, object], None] = lambda *_: None
     take_back: TakeBack[Task] = give_again
     is_sick: Callable[[int, Result], bool] = lambda *_: False
+    prepare: Callable[[int, Task], Task] = lambda _, task: task
 
 
 def serve_tasks(
@@ -288,7 +290,8 @@ class _Server(Generic[Task, Result]):
     def _hand_out(self) -> None:
         while self._dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self._dispatcher.add(more)
-        for rank, assignment in self._dispatcher.assign():
+        for rank, assigned in self._dispatcher.assign():
+            assignment = Assignment(assigned.number, self._handlers.prepare(rank, assigned.task))
             if rank == 0:
                 self._local.assign(assignment)
             else:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import PairArrays
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
@@ -40,29 +41,42 @@ def coordinate_entry(study: Study, name: str) -> Variable:
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
+    axis = next((axis for axis in study.scene_axes if axis.name == name), None)
+    if axis is not None:
+        return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
     return COORDINATES[name]
 
 
-def coordinates(study: Study, facts: SceneFacts) -> dict[str, tuple[str, NDArray[np.generic]]]:
-    """Coordinates of the file: name, dimension, values."""
-    found: dict[str, tuple[str, NDArray[np.generic]]] = {
-        name: (name, _labels(values)) for name, values in study.dimensions.items()
-    }
-    found["cycle"] = ("cycle", np.array(study.cycles_kept))
-    found["contact"] = ("contact", np.arange(len(facts.area), dtype=np.int32))
-    found["response"] = ("response", _labels(facts.response_names))
+def coordinates(
+    study: Study, facts: SceneFacts, pairs: PairArrays
+) -> dict[str, tuple[tuple[str, ...], NDArray[np.generic]]]:
+    """Coordinates of the file: name, dimensions, values."""
+    along: dict[str, NDArray[np.generic]] = {name: _labels(values) for name, values in study.dimensions.items()}
+    along["cycle"] = np.array(study.cycles_kept)
+    along["contact"] = np.arange(len(facts.area), dtype=np.int32)
+    along["response"] = _labels(facts.response_names)
     if study.outputs.loops:
-        found["phase"] = ("phase", 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES)
-        found["component"] = ("component", _labels(LOOP_COMPONENTS))
-    for column, name in enumerate(("contact_x", "contact_y", "contact_z")):
-        found[name] = ("contact", np.array(facts.position[:, column]))
-    found["contact_area"] = ("contact", np.array(facts.area))
-    found["contact_surface"] = ("contact", _labels(facts.surface))
-    return found
+        along["phase"] = 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
+        along["component"] = _labels(LOOP_COMPONENTS)
+    of_pairs: dict[str, NDArray[np.generic]] = {
+        name: pairs.position[..., column] for column, name in enumerate(("contact_x", "contact_y", "contact_z"))
+    }
+    of_pairs |= {"contact_area": pairs.area, "contact_surface": pairs.surface}
+    if pairs.exists is not None:
+        of_pairs["contact_exists"] = pairs.exists.astype(np.int8)
+    return {
+        **{name: ((name,), values) for name, values in along.items()},
+        **{name: (pairs.dimensions, np.array(values)) for name, values in of_pairs.items()},
+    }
 
 
 def _labels(values: Sequence[object]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text."""
+    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text.
+
+    True and false, which NetCDF does not have, are 1 and 0.
+    """
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
+    if array.dtype.kind == "b":
+        return array.astype(np.int8)
     return array.astype(np.int32) if array.dtype.kind == "i" else array

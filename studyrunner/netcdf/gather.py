@@ -25,6 +25,7 @@ from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordina
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
+from studyrunner.scene.scene_set import PairArrays, pair_arrays
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.summary.certificates import CertificateTable
@@ -71,6 +72,7 @@ def gather(
     scene: KeptScene | None = None,
     keep_finished: bool = False,
     origin: Mapping[str, str] | None = None,
+    pairs: PairArrays | None = None,
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
@@ -92,6 +94,8 @@ def gather(
         Whether `path` holds a finished result, which is kept where points of the new result are missing.
     origin
         Attributes on place and time of the computation.
+    pairs
+        Where the pairs are, if not as in `facts`.
 
     Raises
     ------
@@ -112,7 +116,7 @@ def gather(
                 file.setncattr("plausibility", "\n".join(gathered.doubts))
             _write_values(file, study, facts, completion, keys)
             _write_scene(file, study, completion.kind.itemsize, of_scene)
-            _write_coordinates(file, study, facts)
+            _write_coordinates(file, study, facts, pairs or pair_arrays(study, [facts]))
             if scene is not None:
                 write_scene_group(file, scene)
     except OSError as error:
@@ -279,9 +283,9 @@ def _write_scene(file: netCDF4.Dataset, study: Study, bytes_a_point: int, of_sce
             variable[region] = values[region]
 
 
-def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts) -> None:
-    for name, (dimension, values) in coordinates(study, facts).items():
-        _write_whole(file, name, (dimension,), values, coordinate_entry(study, name))
+def _write_coordinates(file: netCDF4.Dataset, study: Study, facts: SceneFacts, pairs: PairArrays) -> None:
+    for name, (dimensions, values) in coordinates(study, facts, pairs).items():
+        _write_whole(file, name, dimensions, values, coordinate_entry(study, name))
 
 
 def _write_whole(

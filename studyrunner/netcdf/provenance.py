@@ -5,15 +5,11 @@ from __future__ import annotations
 import hashlib
 import platform
 from importlib import metadata
-from typing import TYPE_CHECKING
 
 from studyrunner.plan.identity import solver_digest
-from studyrunner.scene.scene import SceneFacts, describe_scene
+from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
 
@@ -85,12 +81,13 @@ def describe_versions() -> str:
     return ", ".join([f"Python {platform.python_version()}", *packages])
 
 
-def compare_with_archived(study: Study, model: ReducedModel) -> tuple[str, ...]:
+def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
     """Reasons why a study from a result file may now have another result, as lines; none for other studies.
 
-    Only the scene of the file is compared: with other parameters the study is another one.
+    scene_sha256: digest of the scene built now. Only the scene of the file is compared: with other parameters the study
+    is another one.
     """
     archived = study.archived
     if archived is None:
         return ()
-    return archived.differences(describe_scene(model).digest, solver_digest(), describe_versions())
+    return archived.differences(scene_sha256, solver_digest(), describe_versions())

@@ -15,22 +15,20 @@ from functools import cache
 
 from studyrunner.plan.sharing import ScaledHistory
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.study.study import Study
 from studyrunner.system.source_digest import package_digest
 
 
 class Identities:
-    """Hashes of the tasks of a study on one scene.
+    """Hashes of the tasks of a study.
 
-    scene_digest: hash of the model, see SceneFacts.
+    scene_digests: hash of the model of each scene, see SceneFacts; one text for a study with one scene.
     kind: description of the record of a result. Results with other variables or other numbers of outputs have other
         hashes.
     """
 
-    def __init__(self, study: Study, scene_digest: str, kind: str) -> None:
+    def __init__(self, scene_digests: str | Sequence[str], kind: str) -> None:
         self._kind = kind
-        self._scene = (scene_digest, study.friction_coefficient, solver_digest())
-        self._law = asdict(study.wear_law)
+        self._digests = (scene_digests,) if isinstance(scene_digests, str) else tuple(scene_digests)
         self._lines: dict[int, tuple[str, ...]] = {}
         self._kept: dict[tuple[object, ...], str] = {}
 
@@ -40,7 +38,8 @@ class Identities:
             # A time limit decides whether there is a result, not the values of the result.
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
             line = (branch.excitation_amplitude, branch.sweep, settings)
-            key = _digest("line", self._scene, line)
+            scene = (self._digests[branch.joint.scene], branch.joint.friction_coefficient, solver_digest())
+            key = _digest("line", scene, line)
             self._lines[branch.number] = tuple(_digest("start", key, frequency) for frequency in branch.frequencies)
         return self._lines[branch.number]
 
@@ -52,7 +51,7 @@ class Identities:
         kept = march.cycles, march.loops, tuple(ends)
         if kept not in self._kept:
             self._kept[kept] = _digest(self._kind, kept)
-        base = ("history", start, self._kept[kept], own, march.largest_depth, self._law)
+        base = ("history", start, self._kept[kept], own, march.largest_depth, asdict(march.law))
         wear = (self._wear(march, scaled) for scaled in march.histories)
         return tuple(_digest(*base, place > 0, each) for place, each in enumerate(wear))
 

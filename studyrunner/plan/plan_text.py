@@ -24,11 +24,14 @@ from studyrunner.user_error import show_text
 from studyrunner.variables import ASKED, KEPT, SCENE
 
 
-def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float = 0.0) -> str:
+def format_plan(
+    study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float = 0.0, scenes: str = ""
+) -> str:
     """The plan of a study in lines.
 
-    built_with: memory for building the scene, bytes. prepared_in: CPU time from the start of the process until the
-    scene is built, s; a run needs this time, too.
+    facts: of the scene with the most pairs. built_with: memory for building a scene, bytes.
+    prepared_in: CPU time from the start of the process until the scenes are built, s; a run needs this time, too.
+    scenes: what there is to say of several scenes.
     """
     marches = [task for line in plan.marches for task in line]
     n_tasks = len(plan.branches) + len(marches)
@@ -48,6 +51,7 @@ def format_plan(study: Study, facts: SceneFacts, plan: TaskPlan, built_with: flo
     rows = [
         ("study", f"{study.study.name}: {study.study.title}".rstrip(": ")),
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
+        *([("scenes", scenes)] if scenes else []),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
         ("cycles", _cycles(study)),
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),

@@ -9,7 +9,6 @@ from typing import Any
 from studyrunner.advice import Used
 from studyrunner.percent import show_percent
 from studyrunner.study.study import Study
-from studyrunner.variables import COORDINATES
 
 _SHORT = 1e4
 
@@ -38,14 +37,14 @@ def describe_point(study: Study, point: Sequence[int]) -> str:
     texts = []
     for (name, values), index in zip(study.dimensions.items(), point, strict=True):
         if len(values) > 1:
-            texts.append(describe_value(name, values[index]))
+            texts.append(describe_value(study, name, values[index]))
     return ", ".join(texts)
 
 
-def describe_value(name: str, value: float | str) -> str:
+def describe_value(study: Study, name: str, value: float | str) -> str:
     """A value of an axis: the scheme by its word and the frequency by its unit, all others with their name."""
-    shown = value if isinstance(value, str) else f"{value:.8g}"
-    units = COORDINATES[name].units
+    shown = value if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value:.8g}"
+    units = study.units(name)
     after = f" {units}" if units != "1" and not isinstance(value, str) else ""
     return f"{shown}{after}" if name in ("frequency", "scheme") else f"{name} {shown}{after}"
 

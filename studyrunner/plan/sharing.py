@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from solver.settings import Automatic
@@ -24,6 +24,9 @@ Choice = tuple[int, int, int]
 
 _SAME = 1e-12  # relative: products of wear coefficient and step that differ by round-off, and numbers of steps
 
+IDLE_RTOL, EQUAL_POINTS = "rtol", "equal points"
+"""Reasons that are no choice of wear coefficient, step and scheme."""
+
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
     "wear_coefficient": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
@@ -33,7 +36,8 @@ _REASONS = {
     "final steps": 'the scheme "final" takes no step of a given length, whatever the step axis says',
     "final wear": 'the scheme "final" comes to the same state for every wear_coefficient',
     "equal products": "wear_coefficient times step is that of another point: the same history at other cycle counts",
-    "rtol": "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
+    IDLE_RTOL: "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
+    EQUAL_POINTS: "all values are those of another point",
 }
 
 
@@ -83,12 +87,10 @@ class Sharing:
     marches: tuple[Alike, ...]
     causes: Counter[str]
 
-    def left_out(self, n_starts: int, n_points: int) -> tuple[LeftOut, ...]:
-        """Numbers of points that are not computed alone, by reason, of a study with so many start states and points."""
-        n_choices = len(self.marches) + self.causes.total()
-        counts = Counter({cause: n_starts * n for cause, n in self.causes.items()})
-        counts["rtol"] = n_points - n_starts * n_choices
-        return tuple(LeftOut(counts[cause], reason) for cause, reason in _REASONS.items() if counts[cause])
+
+def describe_left_out(causes: Mapping[str, int]) -> tuple[LeftOut, ...]:
+    """Numbers of points that are not computed alone, by reason. causes: these numbers by the name of the reason."""
+    return tuple(LeftOut(causes[cause], reason) for cause, reason in _REASONS.items() if causes.get(cause))
 
 
 def share_histories(study: Study) -> Sharing:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from solver.packed_model import pack_model, unpack_model
 from solver.packing import Packed, pack, unpack
 from studies.scene_answers import NaturalFrequencies
+from studies.scenes import scene_has
 from studyrunner.study.study import Study
 from studyrunner.system.source_digest import package_digest
 
@@ -51,8 +52,20 @@ def model_once(study: Study, n_harmonics: int, computed: Computed, build: Callab
 
     Both are equal to the last bit, and so are all results (`solver.packed_model`).
     """
-    key = _key("model", study, n_harmonics)
-    return _once(key, computed, build, pack_model, unpack_model)
+    return _once(model_key(study, n_harmonics), computed, build, pack_model, unpack_model)
+
+
+def model_key(study: Study, n_harmonics: int) -> str:
+    """Hash under which the model of a scene is kept."""
+    return _key("model", study, n_harmonics)
+
+
+def keep_model(study: Study, n_harmonics: int, model: ReducedModel, computed: Computed) -> None:
+    """Keeps a model, however long it has taken. Raises ValueError where the model cannot be kept."""
+    packed = pack_model(model)
+    if packed is None:
+        raise ValueError(f"the matrices of {study.scene.model} are not stored by rows")
+    computed.keep_computed(model_key(study, n_harmonics), packed)
 
 
 def frequencies_once(study: Study, computed: Computed, find: Callable[[], NaturalFrequencies]) -> NaturalFrequencies:
@@ -85,6 +98,17 @@ def _once(
     return found
 
 
+def scene_parameters_of(study: Study) -> dict[str, object]:
+    """Parameters that the model of a scene depends on: without one friction coefficient for all pairs, on which most
+    scenes do not depend.
+    """
+    given: dict[str, object] = study.scene.parameters.model_dump(mode="json")
+    depends = study.scene.is_bundled and scene_has(study.scene.model, "FRICTION_IN_MODEL")
+    if not depends and not isinstance(given["friction_coefficient"], dict):
+        del given["friction_coefficient"]
+    return given
+
+
 def _key(what: str, study: Study, *more: object) -> str:
     """Hash of a value of the scene of a study: its model, parameters and files, and the source of the scenes."""
     # imported here: most studies have no finite-element model
@@ -94,6 +118,6 @@ def _key(what: str, study: Study, *more: object) -> str:
 
         origin = describe_origin(study.scene.files, study.scene.parameters)
     sources = [package_digest(package) for package in ("studies", "solver")]
-    given = study.scene.model, study.scene.parameters.model_dump(mode="json"), origin, more
+    given = study.scene.model, scene_parameters_of(study), origin, more
     text = json.dumps((what, sources, given), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

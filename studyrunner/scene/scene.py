@@ -142,6 +142,9 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
     """
     from studies.scene_file import write_scene
 
+    if study.variants:
+        names = ", ".join(f"axes.{axis.dotted}" for axis in study.scene_axes)
+        raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
     model = build_study_scene(study, progress)
     with scene_errors(study.source, study.scene.path):
         mesh, origin = build_mesh(study), describe_origin(study)

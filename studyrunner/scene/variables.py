@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import scene_answer, scene_frequencies, scene_has, scene_mesh
+from studies.scenes import scene_frequencies, scene_has, scene_mesh
 from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
@@ -74,7 +74,7 @@ def loop_numbers(study: Study) -> int:
 def build_scene_variables(
     study: Study, model: ReducedModel, computed: Computed | None = None
 ) -> tuple[SceneVariable, ...]:
-    """All that the study asks of its scene. Natural frequencies of a bundled sector take some seconds.
+    """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
 
     computed: holds those of an earlier run.
 
@@ -88,7 +88,7 @@ def build_scene_variables(
     with _user_errors(study):
         return tuple(
             variable
-            for name, build in (("mesh", _mesh), ("natural_frequency", partial(_frequencies, kept)), ("exact", _exact))
+            for name, build in (("mesh", _mesh), ("natural_frequency", partial(_frequencies, kept)))
             if name in asked
             for variable in build(study, model)
         )
@@ -149,28 +149,3 @@ def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Itera
     yield SceneVariable("natural_frequency", entry, found.frequencies)
     for name, values in labels.items():
         yield SceneVariable(name, COORDINATES[name], np.array(values, dtype=np.int32), coordinate=True)
-
-
-def _exact(study: Study, _: ReducedModel) -> Iterator[SceneVariable]:
-    """At every frequency, wear coefficient and excitation amplitude; steps, schemes and settings change nothing."""
-    axes = study.axes
-    answers = [
-        [
-            scene_answer(
-                study.scene.model,
-                study.scene.parameters,
-                frequency,
-                amplitude,
-                np.array(axes.wear_coefficient),
-                np.array(study.cycles_kept),
-            )
-            for amplitude in axes.excitation_amplitude
-        ]
-        for frequency in axes.frequency
-    ]
-    others = (1,) * (len(study.dimensions) - 3)
-    for name, entry in SCENE["exact"].items():
-        found = np.array([[getattr(answer, name.removeprefix("exact_")) for answer in row] for row in answers])
-        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
-        values = np.swapaxes(found, 1, 2)
-        yield SceneVariable(name, entry, values.reshape(*values.shape[:3], *others, *values.shape[3:]), axes=True)

@@ -28,7 +28,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED
+from studyrunner.variables import ASKED, COORDINATES
 
 _MOST_POINTS = 1_000_000
 
@@ -203,6 +203,11 @@ class Study(Section):
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         own = {name: getattr(self.axes, name) for name in self.own_axes}
         return {**own, **{axis.name: axis.values for axis in self.scene_axes}}
+
+    def units(self, name: str) -> str:
+        """Unit of an axis; "1" where it has none."""
+        of_scene = {axis.name: axis.units for axis in self.scene_axes}
+        return of_scene[name] if name in of_scene else COORDINATES[name].units
 
     @property
     def own_axes(self) -> tuple[str, ...]:

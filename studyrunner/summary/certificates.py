@@ -20,7 +20,7 @@ from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
 from studyrunner.summary.worn_volumes import WornVolumes
 from studyrunner.system.progress import count
-from studyrunner.variables import CERTIFICATE, COORDINATES
+from studyrunner.variables import CERTIFICATE
 
 _NOT_OF_A_SWEEP = ("wear_coefficient", "step", "scheme")
 _FOLDS_NAMED = 5
@@ -205,7 +205,7 @@ def _where(study: Study, place: _Place) -> str:
     texts = []
     for (name, values), index in zip(study.dimensions.items(), place.point, strict=True):
         if len(values) > 1:
-            value, units = values[index], COORDINATES[name].units
+            value, units = values[index], study.units(name)
             shown = value if isinstance(value, str) else f"{value:.8g}"
             texts.append(f"{name} {shown}" + (f" {units}" if units != "1" else ""))
     if place.cycle is not None and len(study.cycles_kept) > 1:

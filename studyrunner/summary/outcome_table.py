@@ -55,11 +55,11 @@ class OutcomeTable:
         dimensions = self._study.dimensions
         down, across = (dimensions[name] for name in self._axes)
         each = math.prod(len(values) for values in dimensions.values()) // (len(down) * len(across))
-        cells = [[describe_value(self._axes[1], value) for value in across]]
+        cells = [[describe_value(self._study, self._axes[1], value) for value in across]]
         cells += [[self._cell(row, column, each) for column in range(len(across))] for row in range(len(down))]
         widths = [max(len(line[column]) for line in cells) for column in range(len(across))]
         head = "outcomes (known to rtol)" if self._wears else "outcomes"
-        labels = [head, *(f"  {describe_value(self._axes[0], value)}" for value in down)]
+        labels = [head, *(f"  {describe_value(self._study, self._axes[0], value)}" for value in down)]
         texts = [" | ".join(map(str.ljust, line, widths)).rstrip() for line in cells]
         return list(zip(labels, texts, strict=True))
 

@@ -1,0 +1,127 @@
+"""The scenes of a study: which of its parts share one, and what the result file says of all of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studyrunner.scene.computed import scene_parameters_of
+from studyrunner.scene.scene import SceneFacts, harmonics_to_build
+from studyrunner.study.realisation import realise
+from studyrunner.study.study import Study
+
+
+@dataclass(frozen=True)
+class SceneSet:
+    """The different scenes of a study.
+
+    studies: for each scene a study without axes of the scene, from which the scene is built.
+    numbers: number of the scene of each part of the study (`realise`).
+    """
+
+    studies: tuple[Study, ...]
+    numbers: tuple[int, ...]
+
+
+def find_scenes(study: Study) -> SceneSet:
+    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it."""
+    numbers: dict[str, int] = {}
+    studies: list[Study] = []
+    of_parts = []
+    for part in realise(study):
+        key = _key(part.study)
+        if key not in numbers:
+            numbers[key] = len(numbers)
+            studies.append(part.study)
+        of_parts.append(numbers[key])
+    return SceneSet(tuple(studies), tuple(of_parts))
+
+
+def _key(study: Study) -> str:
+    scene = study.scene
+    files = None if scene.files is None else [str(path) for path in scene.files.all]
+    where = None if scene.path is None else str(scene.path), scene.group, files
+    return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
+
+
+def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
+    """Facts of the scene with the most pairs, with the largest sizes and a digest of all scenes."""
+    if len(facts) == 1:
+        return facts[0]
+    largest = max(facts, key=lambda each: len(each.area))
+    harmonics = [each.largest_harmonics for each in facts if each.largest_harmonics is not None]
+    return replace(
+        largest,
+        n_displacements=max(each.n_displacements for each in facts),
+        digest=hashlib.sha256("".join(each.digest for each in facts).encode()).hexdigest(),
+        largest_harmonics=min(harmonics, default=None),
+        static_response=None,
+        edge=largest.edge if all(len(each.area) == len(largest.area) for each in facts) else None,
+    )
+
+
+@dataclass(frozen=True)
+class PairArrays:
+    """Where the pairs are, for the coordinates of the result file.
+
+    dimensions: axes along which the pairs differ, then "contact"; "contact" alone where the pairs are the same in all
+        scenes. position (..., n_contact, 3): m. area (..., n_contact): m2. surface (..., n_contact): labels.
+    exists (..., n_contact): whether there is a pair; None where all scenes have the same pairs. Where there is none
+        position and area are NaN, and the label is empty.
+    """
+
+    dimensions: tuple[str, ...]
+    position: NDArray[np.float64]
+    area: NDArray[np.float64]
+    surface: NDArray[np.str_]
+    exists: NDArray[np.bool_] | None
+
+
+def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
+    """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
+    one = facts[0]
+    if all(_same_pairs(one, each) for each in facts[1:]):
+        return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
+    n_contact = max(len(each.area) for each in facts)
+    shape = (len(facts), n_contact)
+    position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
+    surface = np.full(shape, "", np.array([label for each in facts for label in each.surface]).dtype)
+    for number, each in enumerate(facts):
+        own = slice(len(each.area))
+        position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
+    places, numbers = axes_of_difference(study, find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b]))
+    kept = [study.scene_axes[place].name for place in places]
+    exists = np.isfinite(area[numbers])
+    return PairArrays((*kept, "contact"), position[numbers], area[numbers], surface[numbers], exists)
+
+
+def axes_of_difference(
+    study: Study, scenes: SceneSet, are_equal: Callable[[int, int], bool]
+) -> tuple[tuple[int, ...], NDArray[np.intp]]:
+    """Axes of the scene along which something differs, as indices in `study.scene_axes`, and numbers of scenes along
+    these axes.
+
+    are_equal: whether two scenes, given by number, are equal in it.
+    """
+    numbers = np.array(scenes.numbers).reshape([len(axis.values) for axis in study.scene_axes])
+    places = []
+    for place in reversed(range(numbers.ndim)):
+        first = np.broadcast_to(numbers.take([0], axis=place), numbers.shape)
+        if all(a == b or are_equal(a, b) for a, b in zip(first.flat, numbers.flat, strict=True)):
+            numbers = numbers.take(0, axis=place)
+        else:
+            places.append(place)
+    return tuple(reversed(places)), numbers
+
+
+def _same_pairs(one: SceneFacts, other: SceneFacts) -> bool:
+    return (
+        one.surface == other.surface
+        and np.array_equal(one.position, other.position, equal_nan=True)
+        and np.array_equal(one.area, other.area)
+    )

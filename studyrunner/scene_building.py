@@ -1,0 +1,204 @@
+"""The scenes of a run: built once, and handed to the ranks that compute with them.
+
+A single scene is built by rank 0, and each machine gets the model once. Several scenes are built by all ranks side by
+side, each scene once. Their models are kept in the file of the run; a task brings the model to a rank that does not
+have the model, so that a rank holds few models, whatever their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from solver.packing import Packed
+from studyrunner.checkpoint.store import Store
+from studyrunner.evaluate import ModelCache
+from studyrunner.mpi.broadcast import Broadcast
+from studyrunner.mpi.ranks import Ranks
+from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
+from studyrunner.mpi.version_check import Machine
+from studyrunner.plan.cost_model import CostKeys, CostModel
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.scene.computed import InMemory, keep_model, model_key
+from studyrunner.scene.scene import (
+    KeptScene,
+    SceneFacts,
+    build_study_scene,
+    describe_scene,
+    harmonics_to_build,
+    scene_to_keep,
+)
+from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
+from studyrunner.scene.static_response import static_response
+from studyrunner.scene.variables import SceneVariable, build_scene_variables
+from studyrunner.study.study import Study
+from studyrunner.user_error import UserError
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+
+
+class SeveralScenes:
+    """What a rank gets in place of the model of the only scene: scenes to build first, then tasks with models."""
+
+
+@dataclass(frozen=True)
+class SceneTask:
+    """One scene to build. study: of this scene alone. known: what an earlier run has computed for the scene."""
+
+    number: int
+    study: Study
+    known: Mapping[str, Packed]
+    cost: float = 1.0
+    n_results: int = 1
+    opens_others: bool = False
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated time, s; all scenes are alike."""
+        del first
+        return self.cost
+
+    @property
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks."""
+        return (("scene",),)
+
+
+@dataclass(frozen=True)
+class SceneBuilt:
+    """A scene that was built.
+
+    facts: None where the scene is wrong. variables: what the study asks of the scene. computed: what later runs need
+        not compute. error: what the user has to change.
+    """
+
+    facts: SceneFacts | None
+    variables: tuple[SceneVariable, ...] = ()
+    computed: Mapping[str, Packed] = field(default_factory=dict)
+    error: UserError | None = None
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """The scenes of a run.
+
+    scenes: which there are. facts: of each. variables: what the study asks of them.
+    kept: the model that the result file keeps. notes: what the user should know.
+    broadcast: the model of the only scene; None where there are several.
+    store: file of the run, with the models of several scenes.
+    """
+
+    scenes: SceneSet
+    facts: tuple[SceneFacts, ...]
+    variables: tuple[SceneVariable, ...]
+    kept: KeptScene | None
+    notes: tuple[str, ...]
+    broadcast: Broadcast[ReducedModel] | None
+    store: Store
+    _held: dict[int, ModelCache[None]] = field(default_factory=dict)
+
+    @property
+    def model(self) -> ReducedModel | None:
+        """The model of the only scene; None where there are several."""
+        return None if self.broadcast is None else self.broadcast.value
+
+    def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+        """The task as a rank gets it: with the model where the rank does not have the model."""
+        if self.broadcast is not None:
+            return task
+        held, number = self._held.setdefault(rank, ModelCache()), task.joint.scene
+        if held.use(number):
+            return task
+        held.add(number, None)
+        study = self.scenes.studies[number]
+        model = self.store.read_computed(model_key(study, harmonics_to_build(study)))
+        if model is None:
+            raise RuntimeError(f"the model of scene {number} has gone")
+        return replace(task, model=model)
+
+
+def build_scenes(
+    ranks: Ranks, machines: Mapping[int, Machine], study: Study, store: Store, say: Callable[[str], None]
+) -> Scenes:
+    """Rank 0: builds the scenes of a study, several of them together with the other ranks.
+
+    Parameters
+    ----------
+    ranks, machines
+        All ranks, and the machine of each.
+    study
+        The study.
+    store
+        The file of the run, with what an earlier run has computed.
+    say
+        Takes a line on the next step, where a step may take long.
+
+    Raises
+    ------
+    UserError
+        Where a scene is wrong, or lacks what the study asks for.
+    """
+    scenes = find_scenes(study)
+    if len(scenes.studies) == 1:
+        model = build_study_scene(study, say, store)
+        if "natural_frequency" in study.outputs.variables:
+            say("finding the natural frequencies of the scene")
+        variables = (*build_scene_variables(study, model, store), *exact_answers(study))
+        facts = replace(describe_scene(model), static_response=static_response(model))
+        broadcast = Broadcast(ranks, machines, model)
+        return Scenes(scenes, (facts,), variables, scene_to_keep(study, model), (), broadcast, store)
+    if study.outputs.scene:
+        remedy = f"leave it out: the study has {len(scenes.studies)} scenes, and a result keeps one"
+        raise UserError(study.source, "outputs.scene", True, remedy)
+    Broadcast(ranks, machines, SeveralScenes()).send()
+    built = _build_all(ranks, scenes, store, say)
+    for each in built:
+        if each.error is not None:
+            raise each.error
+    facts_of_all = tuple(each.facts for each in built if each.facts is not None)
+    variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
+    return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, store)
+
+
+def _build_all(ranks: Ranks, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> list[SceneBuilt]:
+    """All scenes, in their order."""
+    found: dict[int, SceneBuilt] = {}
+
+    def tasks() -> Iterator[SceneTask]:
+        for number, study in enumerate(scenes.studies):
+            key = model_key(study, harmonics_to_build(study))
+            model = store.read_computed(key)
+            yield SceneTask(number, study, {} if model is None else {key: model})
+
+    def take(task: SceneTask, built: SceneBuilt) -> Sequence[SceneTask]:
+        for key, value in built.computed.items():
+            store.keep_computed(key, value)
+        found[task.number] = built
+        say(f"{len(found)} of {len(scenes.studies)} scenes are built")
+        return ()
+
+    handlers: Handlers[SceneTask, SceneBuilt] = Handlers(take, tick=lambda _: store.tick())
+    serve_tasks(ranks, tasks(), build_scene_task, handlers, CostModel())
+    store.flush()
+    return [found[number] for number in range(len(scenes.studies))]
+
+
+def build_scene_task(task: SceneTask, _: Callable[[object], None]) -> Iterator[SceneBuilt]:
+    """Builds one scene."""
+    computed = InMemory(task.known)
+    try:
+        model = build_study_scene(task.study, computed=computed)
+        variables = build_scene_variables(task.study, model, computed)
+    except UserError as error:
+        yield SceneBuilt(None, error=error)
+        return
+    keep_model(task.study, harmonics_to_build(task.study), model, computed)
+    new = {key: value for key, value in computed.items() if key not in task.known}
+    yield SceneBuilt(describe_scene(model), variables, new)
+
+
+def help_to_build(ranks: Ranks) -> None:
+    """Any other rank: builds scenes until all are built."""
+    work_on_tasks(ranks, build_scene_task)
