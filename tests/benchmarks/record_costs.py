@@ -13,8 +13,8 @@ import sys
 import time
 
 from studyrunner.evaluate import build_evaluator
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import build_tasks
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import start_marches
@@ -32,7 +32,7 @@ def main() -> None:
     study = read_study("dovetail", STUDY)
     model = build_study_scene(study)
     plan = build_tasks(study, describe_scene(model).n_displacements)
-    evaluate = build_evaluator(model, study.friction_coefficient, study.wear_law)
+    evaluate = build_evaluator(model)
     next(iter(evaluate(plan.branches[0])))  # compiles
     print("frequency,wear_coefficient,seconds,n_unknowns,moves")
     (branch,) = plan.branches

@@ -18,8 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan, build_tasks
+from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.study.study_file import read_study
 from tests.benchmarks.simulation import Overheads, Replay, lognormal, replay
 

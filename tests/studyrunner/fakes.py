@@ -135,7 +135,7 @@ def open_completion(
 ) -> CompletionIndex:
     """What is in the file of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    identities = Identities(study, facts.digest, hash_of_kind(kind.descr))
+    identities = Identities(facts.digest, hash_of_kind(kind.descr))
     completion = CompletionIndex(plan, identities, Store(path), kind)
     if fresh:
         completion.forget_all()

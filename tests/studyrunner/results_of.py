@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.checkpoint.records import record_of, record_type
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import Index
-from studyrunner.plan.tasks import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from tests.studyrunner.fakes import FACTS, changed, fake_histories

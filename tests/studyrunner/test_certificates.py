@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from studyrunner.checkpoint.records import record_of, record_type
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.certificates import CertificateTable

@@ -15,7 +15,8 @@ from solver.outcome import COMPLETE
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.database import RESULTS, STARTS
-from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.plan.planning import build_tasks
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
 from tests.studyrunner.fakes import FACTS, changed, fake_branch, fake_march, open_completion, without_values

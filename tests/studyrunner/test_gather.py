@@ -18,8 +18,8 @@ from studyrunner.accessor import FretwearAccessor
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.gather import Gathered
 from studyrunner.netcdf.output import progress_file
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError

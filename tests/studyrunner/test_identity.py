@@ -13,7 +13,8 @@ import solver
 from studyrunner.checkpoint.records import record_type
 from studyrunner.plan import identity
 from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.tasks import TaskPlan, build_tasks
+from studyrunner.plan.planning import build_tasks
+from studyrunner.plan.tasks import TaskPlan
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS
 
@@ -36,7 +37,7 @@ def hashes(scene: str = FACTS.digest, **changes: str) -> dict[tuple[float, ...],
     overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
     plan = build_tasks(study, FACTS.n_displacements)
-    found = Identities(study, scene, hash_of_kind(record_type(study, FACTS).descr))
+    found = Identities(scene, hash_of_kind(record_type(study, FACTS).descr))
     points = {}
     for branch, line in zip(plan.branches, plan.marches, strict=True):
         starts = found.of_starts(branch)
@@ -137,7 +138,7 @@ def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
     overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
     plan = build_tasks(study, FACTS.n_displacements)
-    own = Identities(study, FACTS.digest, hash_of_kind(record_type(study, FACTS).descr))
+    own = Identities(FACTS.digest, hash_of_kind(record_type(study, FACTS).descr))
     return [
         (own.of_starts(branch)[march.position], history)
         for branch, line in zip(plan.branches, plan.marches, strict=True)
@@ -197,7 +198,7 @@ def test_the_step_matters_to_those_who_take_it_only() -> None:
 
 def plan_and_identities() -> tuple[TaskPlan, Identities]:
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in BASE.items()])
-    return build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
+    return build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
 
 
 def test_progress_is_known_by_all_that_its_task_gives() -> None:

@@ -15,7 +15,7 @@ from solver.results.loops import LOOP_PHASES, loop_phases
 from studyrunner import variables
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
-from studyrunner.plan.tasks import build_tasks
+from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values

@@ -12,7 +12,8 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mpi.crashes import Crash
-from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.plan.planning import build_tasks
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
 from tests.studyrunner.fakes import fake_branch, fake_march, open_completion

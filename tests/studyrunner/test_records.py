@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from studyrunner.checkpoint.records import empty_record, pack_record, record_of, record_type, unpack_records, values_in
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import failed_result
-from studyrunner.plan.tasks import build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import KEPT
 from tests.studyrunner.fakes import FACTS, fake_histories

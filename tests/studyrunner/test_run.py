@@ -18,8 +18,9 @@ from solver.settings import SolverSettings
 from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.history_result import build_result
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, build_tasks
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import format_seconds

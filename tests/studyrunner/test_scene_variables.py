@@ -15,7 +15,7 @@ from studies.scenes import dovetail_sector, scene_mesh
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.output import progress_file
-from studyrunner.plan.tasks import build_tasks
+from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import variables as scene_variables
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.scene.variables import build_scene_variables

@@ -22,9 +22,10 @@ from solver.settings import Resolution
 from solver.wear.solutions import SlowTime
 from studyrunner.evaluate import integrate
 from studyrunner.history_result import build_result
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import ScaledHistory, march_counts, share_histories
-from studyrunner.plan.tasks import MarchTask, build_tasks
+from studyrunner.plan.tasks import MarchTask
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import KEPT

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import BranchTask, TaskPlan, build_tasks
+from studyrunner.plan.tasks import BranchTask, TaskPlan
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
 from tests.benchmarks.scheduling import SHAPES, replay_shape

@@ -12,8 +12,9 @@ import pytest
 from solver.settings import SolverSettings
 from studyrunner.cli import main
 from studyrunner.plan.estimate import AUTOMATIC_HARMONICS, largest_memory, memory_a_rank
+from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import TaskPlan, build_tasks
+from studyrunner.plan.tasks import TaskPlan
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import start_marches

@@ -16,7 +16,7 @@ from studyrunner.accessor import join_results
 from studyrunner.netcdf.attributes import attributes, coordinate_entry
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.plan_text import format_plan
-from studyrunner.plan.tasks import build_tasks
+from studyrunner.plan.planning import build_tasks
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_numbers
 from studyrunner.study.study import Study
@@ -84,7 +84,7 @@ def test_a_history_is_known_by_how_it_ends() -> None:
     keys = []
     for overrides in ((), ("slow_time.final_share=1e-3",), ("slow_time.outputs=7",), ("slow_time.cycles=5",)):
         study = study_with(*overrides)
-        plan, of = build_tasks(study, FACTS.n_displacements), Identities(study, FACTS.digest, "kind")
+        plan, of = build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
         keys.append(of.of_histories(plan.branches[0], plan.marches[0][0]))
     assert len(set(keys)) == 4
 
