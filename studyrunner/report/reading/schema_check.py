@@ -67,7 +67,9 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
                 kept[name] = _check_variable(dataset, name, entry, (*axes, *entry.dimensions))
         for name, entry in (_WITHOUT_AXES | _OF_CONTACTS).items():
             if name in dataset.variables:
-                kept[name] = _check_variable(dataset, name, entry, entry.dimensions)
+                # where scenes differ, along the axes along which they do
+                along = tuple(axis for axis in axes if axis in dataset.variables[name].dims)
+                kept[name] = _check_variable(dataset, name, entry, (*along, *entry.dimensions))
         _check_values(kept)
     except _WrongError as wrong:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
