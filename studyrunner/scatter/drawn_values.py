@@ -1,0 +1,120 @@
+"""The values that the samples of a study draw of its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cholesky
+from scipy.special import ndtri
+
+from studyrunner.scatter.design import unit_design
+from studyrunner.scatter.section import Distribution, Kind, Of, Scattered, ScatterSection
+from studyrunner.user_error import WrongValueError
+
+_ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
+_NOT_BELOW_ZERO = ("friction_coefficient", "wear_coefficient")
+
+_NUGGET = 1e-8
+"""Share of the variance of a field that is independent from pair to pair.
+
+Its Cholesky factor exists then for any positions; a value changes by 1e-4 standard deviations.
+"""
+
+
+@dataclass(frozen=True)
+class ScatteredPairs:
+    """Contact pairs between which inputs may differ. surface (n_pairs,): labels. position (n_pairs, 3): m, or NaN."""
+
+    surface: tuple[str, ...]
+    position: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What the samples draw of an input.
+
+    values (samples,), or (samples, n_pairs) where pairs differ: values in the unit of the input, offsets in this unit
+    from the study's own value, or factors of it, as `kind` says. of: what has a draw of its own.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    kind: Kind
+    of: Of
+
+    def apply(self, own: ArrayLike) -> NDArray[np.float64]:
+        """The input in each sample, of the study's own value: a number, or (n_pairs,).
+
+        (samples,), or (samples, n_pairs) where pairs differ in the draw or in their own value. Without width it is the
+        own value to the last bit.
+        """
+        own = np.asarray(own, dtype=np.float64)
+        values = self.values if own.ndim == 0 or self.values.ndim == 2 else self.values[:, None]
+        if self.kind == "offset":
+            return np.asarray(own + values)
+        return np.asarray(own * values if self.kind == "factor" else np.zeros_like(own) + values)
+
+
+def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs) -> dict[str, Drawn]:
+    """What the samples draw of each input that scatters, in the order of `section.inputs`.
+
+    own_values: for those drawn around it the study's own value: a number, (n_pairs,), or (n_values, 1) for an axis.
+    pairs: of the scene; their positions are used for correlation lengths only.
+
+    Raises WrongValueError, with its key, where a draw is none that physics allows, positions are missing, or a relative
+    width is one of 0.
+    """
+    inputs = section.inputs
+    groups = [_n_columns(each, pairs) for each in inputs.values()]
+    design = unit_design(section.method, section.seed, section.samples, sum(groups), groups)
+    scores = np.split(ndtri(design), np.cumsum(groups)[:-1], axis=1)
+    found = {}
+    for (name, scattered), score in zip(inputs.items(), scores, strict=True):
+        if scattered.of == "each surface":
+            score = score[:, [_surfaces(pairs).index(label) for label in pairs.surface]]
+        elif scattered.correlation_length is not None:
+            score = score @ _field(name, scattered.correlation_length, pairs).T
+        distribution = scattered.distribution
+        values = distribution.draw(score if scattered.of != "all pairs" else score[:, 0])
+        found[name] = Drawn(name, values, distribution.kind, scattered.of)
+        own = 0.0 if distribution.kind == "value" else own_values[name]
+        _check(found[name], distribution, np.atleast_2d(np.asarray(own, dtype=np.float64)))
+    return found
+
+
+def _surfaces(pairs: ScatteredPairs) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(pairs.surface))
+
+
+def _n_columns(scattered: Scattered, pairs: ScatteredPairs) -> int:
+    return {"all pairs": 1, "each surface": len(_surfaces(pairs)), "each pair": len(pairs.surface)}[scattered.of]
+
+
+def _field(name: str, length: float, pairs: ScatteredPairs) -> NDArray[np.float64]:
+    """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
+
+    Correlation exp(-(r / length)^2 / 2) of two pairs of a surface at the distance r; surfaces are independent.
+    """
+    if not np.isfinite(pairs.position).all():
+        remedy = "leave it out: the scene does not say where its contact pairs are"
+        raise WrongValueError(length, remedy, f"scatter.{name}.correlation_length")
+    distance = np.linalg.norm(pairs.position[:, None] - pairs.position[None], axis=2)
+    surface = np.array(pairs.surface)
+    covariance = np.where(surface[:, None] == surface, np.exp(-0.5 * (distance / length) ** 2), 0.0)
+    covariance = (1.0 - _NUGGET) * covariance + _NUGGET * np.eye(len(covariance))
+    return np.asarray(cholesky(covariance, lower=True))
+
+
+def _check(draw: Drawn, distribution: Distribution, own: NDArray[np.float64]) -> None:
+    """Refuses draws that physics forbids. own: rows of values of all pairs."""
+    key, name = f"scatter.{draw.name}", draw.name
+    if draw.kind == "factor" and distribution.has_width and not own.any():
+        remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
+        raise WrongValueError(distribution.model_dump(), remedy, key)
+    smallest = min(float(draw.apply(row).min()) for row in own)
+    if (smallest < 0.0 and name in _NOT_BELOW_ZERO) or (smallest <= 0.0 and name in _ABOVE_ZERO):
+        remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
+        raise WrongValueError(distribution.model_dump(), remedy, key)

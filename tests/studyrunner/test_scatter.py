@@ -1,0 +1,243 @@
+"""[scatter]: its sentences, the designs, and the values that samples draw."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.stats import kstest, sobol_indices
+
+from studyrunner.scatter.design import SaltelliLayout, unit_design
+from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
+from studyrunner.scatter.section import Method, ScatterSection
+from studyrunner.user_error import WrongValueError
+
+FRICTION = {"normal": {"mean": 0.5, "std": 0.03}}
+ANY_INPUT = {"friction_coefficient": FRICTION}
+PAIRS = ScatteredPairs(("left",) * 3 + ("right",) * 2, np.linspace(0.0, 1.0, 15).reshape(5, 3))
+OWN = {"friction_coefficient": 0.3, "gap": np.linspace(0.0, 4e-6, 5), "wear_coefficient": 1.1e-11, "area": 0.1 + 0.2}
+
+
+def read(**table: Any) -> ScatterSection:
+    return ScatterSection.model_validate({"samples": 64, **table}, strict=True)
+
+
+def draw(pairs: ScatteredPairs = PAIRS, **table: Any) -> dict[str, Drawn]:
+    return drawn(read(**table), OWN, pairs)
+
+
+def refusal(table: Any) -> WrongValueError:
+    with pytest.raises(ValidationError) as caught:
+        ScatterSection.model_validate(table, strict=True)
+    cause = caught.value.errors()[0]["ctx"]["error"]
+    assert isinstance(cause, WrongValueError)
+    return cause
+
+
+# --- the table ---
+
+
+def test_defaults_and_what_is_written_back() -> None:
+    section = read(**ANY_INPUT)
+    assert (section.samples, section.method, section.seed, section.realisations) == (64, "sobol", 1, 64)
+    assert section.model_dump(mode="json") == {
+        "samples": 64,
+        "method": "sobol",
+        "seed": 1,
+        "friction_coefficient": {**FRICTION, "of": "all pairs"},
+    }
+    assert ScatterSection.model_validate(section.model_dump(mode="json"), strict=True) == section
+
+
+def test_order_of_the_keys_does_not_matter() -> None:
+    gap, speed = {"normal": {"std": 1e-6}, "of": "each pair"}, {"uniform": {"half_width": 1.0}}
+    one, other = read(gap=gap, rotation_speed=speed), read(rotation_speed=speed, gap=gap)
+    assert one == other
+    assert list(one.model_dump()) == list(other.model_dump())
+    assert list(one.inputs) == ["rotation_speed", "gap"]
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "remedy"),
+    [
+        (3, None, "give a table"),
+        ({**ANY_INPUT}, "samples", "missing"),
+        ({"samples": 2.5, **ANY_INPUT}, "samples", "whole number, at least 1 and at most 1000000"),
+        ({"samples": True, **ANY_INPUT}, "samples", "whole number"),
+        ({"samples": 8, "seed": -1, **ANY_INPUT}, "seed", "whole number, at least 0"),
+        ({"samples": 8, "method": "halton", **ANY_INPUT}, "method", 'give "sobol" or "latin_hypercube"'),
+        ({"samples": 12, "method": "saltelli", **ANY_INPUT}, "samples", "power of 2"),
+        ({"samples": 8}, "samples", "name what scatters"),
+        ({"samples": 8, "mu": 0.5}, "mu", "one distribution, normal or lognormal or uniform"),
+        ({"samples": 8, "mu": {"of": "each pair"}}, "mu", "one distribution"),
+        ({"samples": 8, "mu": FRICTION | {"uniform": {"half_width": 1.0}}}, "mu", "one distribution"),
+        ({"samples": 8, "mu": FRICTION | {"width": 1.0}}, "mu.width", "unknown key, give one of normal"),
+        ({"samples": 8, "mu": {"normal": 0.1}}, "mu.normal", "keys out of mean, std, relative_std"),
+        ({"samples": 8, "mu": {"normal": {"sigma": 0.1}}}, "mu.normal.sigma", "unknown key, give one of mean, std"),
+        ({"samples": 8, "mu": {"normal": {"std": -0.1}}}, "mu.normal.std", "finite number that is 0 or more"),
+        ({"samples": 8, "mu": {"normal": {"mean": 0.5}}}, "mu.normal", "either std"),
+        ({"samples": 8, "mu": {"normal": {"mean": float("nan"), "std": 0.1}}}, "mu.normal.mean", "finite number"),
+        ({"samples": 8, "mu": {"lognormal": {"median": 1.0}}}, "mu.lognormal.factor", "1 or more"),
+        ({"samples": 8, "mu": {"lognormal": {"factor": 0.9}}}, "mu.lognormal.factor", "1 or more"),
+        ({"samples": 8, "mu": {"uniform": {"low": 2.0, "high": 1.0}}}, "mu.uniform.low", "less than high = 1"),
+        ({"samples": 8, "mu": {"uniform": {"low": 2.0}}}, "mu.uniform", "either low and high, or half_width"),
+        ({"samples": 8, "mu": FRICTION | {"of": "pairs"}}, "mu.of", '"each pair"'),
+        ({"samples": 8, "mu": FRICTION | {"of": "each pair"}}, "mu.of", "only area, friction_coefficient, gap"),
+        ({"samples": 8, "gap": FRICTION | {"correlation_length": 0.1}}, "gap.correlation_length", "each pair"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_key(table: Any, key: str | None, remedy: str) -> None:
+    error = refusal(table)
+    assert error.key == (None if key is None else f"scatter.{key}")
+    assert remedy in error.remedy
+
+
+# --- the designs ---
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random", "saltelli"])
+def test_designs_fill_the_cube_and_further_columns_change_none(method: Method) -> None:
+    design = unit_design(method, 3, 256, 4)
+    assert ((design > 0.0) & (design < 1.0)).all()
+    assert [kstest(column, "uniform").pvalue > 1e-3 for column in design.T] == [True] * 4
+    assert np.abs(np.corrcoef(design.T) - np.eye(4)).max() < (0.2 if method == "random" else 0.1)
+    if method != "saltelli":
+        np.testing.assert_array_equal(unit_design(method, 3, 256, 9)[:, :4], design)
+        assert not np.array_equal(unit_design(method, 4, 256, 4), design)
+
+
+@pytest.mark.parametrize("method", ["sobol", "random", "saltelli"])
+def test_more_samples_go_on_from_those_there_are(method: Method) -> None:
+    few, many = unit_design(method, 1, 64, 3), unit_design(method, 1, 128, 3)
+    np.testing.assert_array_equal(many[: len(few)], few)
+
+
+def test_a_scrambled_sobol_sequence_is_a_digital_net() -> None:
+    """128 points, of the first two columns: one in each cell of 2^-k times 2^-(7-k), as without scrambling."""
+    design = unit_design("sobol", 7, 128, 2)
+    for power in range(8):
+        cells = np.floor(design * [2**power, 2 ** (7 - power)])
+        assert len(np.unique(cells, axis=0)) == 128
+
+
+def test_rows_of_saltelli_are_those_of_scipy() -> None:
+    """Indices of a linear function of three groups of columns; the second group has two columns."""
+    layout = SaltelliLayout(3)
+    design = unit_design("saltelli", 1, 1024, 4, (1, 2, 1))
+    assert design.shape == (1024 * layout.rows_per_base, 4)
+    f_A, f_B, f_AB = layout.split(design @ [1.0, 2.0, 2.0, 4.0])
+    found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": f_AB[:, None]}, n=1024)
+    np.testing.assert_allclose(found.first_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
+    np.testing.assert_allclose(found.total_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
+
+
+def test_a_sobol_sequence_with_too_many_columns_is_refused() -> None:
+    with pytest.raises(WrongValueError, match='give "random"'):
+        unit_design("sobol", 1, 2, 30_000)
+
+
+# --- the drawn values ---
+
+
+def test_each_distribution_has_its_quantiles() -> None:
+    section = {
+        "absolute": {"lognormal": {"median": 2.0, "factor": 1.5}},
+        "area": {"normal": {"relative_std": 0.1}},
+        "gap": {"uniform": {"half_width": 1e-6}},
+        "range": {"uniform": {"low": 3.0, "high": 5.0}},
+        "wear_coefficient": {"lognormal": {"factor": 1.5}},
+    }
+    found = draw(samples=4096, **section)
+    assert {name: one.kind for name, one in found.items()} == {
+        "absolute": "value",
+        "area": "factor",
+        "gap": "offset",
+        "range": "value",
+        "wear_coefficient": "factor",
+    }
+    share = 0.8413447460685429  # one standard deviation above the median
+    expected = {"absolute": 3.0, "area": 1.1, "gap": 1e-6 * (2 * share - 1), "range": 3 + 2 * share}
+    for name, value in {**expected, "wear_coefficient": 1.5}.items():
+        assert np.quantile(found[name].values, share) == pytest.approx(value, rel=2e-3)
+
+
+@pytest.mark.parametrize("of", ["all pairs", "each surface", "each pair"])
+@pytest.mark.parametrize(
+    "distribution", [{"normal": {"std": 0}}, {"lognormal": {"factor": 1}}, {"uniform": {"half_width": 0}}]
+)
+def test_zero_width_is_the_own_value_to_the_last_bit(of: str, distribution: Any) -> None:
+    (found,) = draw(area={**distribution, "of": of}).values()
+    own = 0.1 + 0.2 * np.arange(5.0)
+    assert (found.apply(own) == own).all()
+    assert (found.apply(0.1 + 0.2) == 0.1 + 0.2).all()
+
+
+def test_draws_of_one_input_do_not_depend_on_the_pairs_of_another() -> None:
+    gap = {"normal": {"std": 1e-6}, "of": "each pair"}
+    alone = draw(**ANY_INPUT)["friction_coefficient"]
+    beside = draw(**ANY_INPUT, gap=gap)
+    np.testing.assert_array_equal(beside["friction_coefficient"].values, alone.values)
+    assert beside["gap"].apply(OWN["gap"]).shape == (64, 5)
+
+
+def test_each_surface_has_a_draw() -> None:
+    found = draw(friction_coefficient={**FRICTION, "of": "each surface"})["friction_coefficient"]
+    assert found.values.shape == (64, 5)
+    assert [len(np.unique(row)) for row in found.values] == [2] * 64
+    assert (found.values[:, 0] == found.values[:, 2]).all()
+
+
+def test_a_draw_of_all_pairs_moves_each_from_its_own_value() -> None:
+    found = draw(gap={"normal": {"std": 1e-6}})["gap"]
+    np.testing.assert_array_equal(found.apply(OWN["gap"]), OWN["gap"] + found.values[:, None])
+
+
+def test_neighbouring_pairs_are_correlated_over_the_length() -> None:
+    along = np.outer(np.repeat([0.0, 1.0, 3.0], 2), [1.0, 0.0, 0.0])
+    pairs = ScatteredPairs(("left", "right") * 3, along)
+    gap = {"normal": {"std": 2.0}, "of": "each pair", "correlation_length": 1.0}
+    values = drawn(read(gap=gap, samples=4096), {"gap": 0.0}, pairs)["gap"].values
+    expected = np.where(
+        np.arange(6)[:, None] % 2 == np.arange(6) % 2, np.exp(-0.5 * (along[:, :1] - along[:, 0]) ** 2), 0
+    )
+    np.testing.assert_allclose(np.corrcoef(values.T), expected, atol=0.03)
+    np.testing.assert_allclose(values.std(axis=0), 2.0, rtol=0.02)
+
+
+def test_a_correlation_length_needs_positions() -> None:
+    pairs = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
+    gap = {"normal": {"std": 1e-6}, "of": "each pair", "correlation_length": 1e-3}
+    with pytest.raises(WrongValueError, match="where its contact pairs are") as caught:
+        draw(pairs, gap=gap)
+    assert caught.value.key == "scatter.gap.correlation_length"
+
+
+@pytest.mark.parametrize(
+    ("name", "distribution"),
+    [
+        ("friction_coefficient", {"normal": {"std": 0.3}}),
+        ("wear_coefficient", {"normal": {"relative_std": 1.0}}),
+        ("area", {"uniform": {"low": -1e-3, "high": 1.0}}),
+        ("frequency", {"uniform": {"low": -1.0, "high": 1.0}}),
+        ("excitation_amplitude", {"normal": {"mean": 1.0, "std": 1.0}}),
+    ],
+)
+def test_draws_that_physics_forbids_are_refused(name: str, distribution: Any) -> None:
+    with pytest.raises(WrongValueError, match=re.escape(f"which {name} cannot be")) as caught:
+        draw(**{name: distribution}, samples=10_000)
+    assert caught.value.key == f"scatter.{name}"
+
+
+def test_every_value_of_an_axis_is_looked_at() -> None:
+    section = read(friction_coefficient={"uniform": {"half_width": 0.2}})
+    assert drawn(section, {"friction_coefficient": [[0.3], [0.4]]}, PAIRS)
+    with pytest.raises(WrongValueError, match="less width"):
+        drawn(section, {"friction_coefficient": [[0.3], [0.1]]}, PAIRS)
+
+
+def test_a_share_of_nothing_is_refused() -> None:
+    with pytest.raises(WrongValueError, match="own value is 0"):
+        drawn(read(gap={"normal": {"relative_std": 0.1}}), {"gap": np.zeros(5)}, PAIRS)
