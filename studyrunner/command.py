@@ -182,12 +182,14 @@ def _show_plan(study: Study) -> int:
     from studyrunner.plan.estimate import largest_memory
     from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.planning import build_tasks
+    from studyrunner.scene.drawn_contacts import contact_changes
     from studyrunner.scene.planned_scenes import plan_scenes
 
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
-    plan = build_tasks(study, planned.n_displacements)
+    contacts = contact_changes(study, planned.scenes, [planned.facts[number] for number in planned.nearest])
+    plan = build_tasks(study, planned.n_displacements, contacts)
     seconds = time.process_time() + planned.seconds_left
     print(format_plan(study, planned.largest, plan, built_with, seconds, planned.describe()), flush=True)
     error = last_error(sys.stdout)

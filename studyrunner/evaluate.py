@@ -6,7 +6,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Generic, Literal, TypeVar, cast
+from typing import Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +77,14 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
             models.add(number, unpack_model(task.model))
         elif not models.use(number):
             raise RuntimeError(f"no model of scene {number} for {task}")
-        of_task = replace(task, model=None)
+        of_task, own = replace(task, model=None), models[number]
+        if task.joint.contact:
+            drawn: dict[str, Any] = {name: np.array(values) for name, values in task.joint.contact}
+            own = replace(own, contact=replace(own.contact, **drawn))
         if isinstance(of_task, BranchTask):
-            yield from follow(models[number], of_task, keep)
+            yield from follow(own, of_task, keep)
         else:
-            yield from integrate(models[number], of_task, keep)
+            yield from integrate(own, of_task, keep)
 
     return evaluate
 

@@ -125,12 +125,17 @@ def _variable(
     slower: wear coefficient over that of the history.
     """
     values: NDArray[np.generic]
+    if name == "wear_depth_last":
+        known = rows[reached]
+        return history.wear_depth[known[-1]] if known.size else np.full_like(history.wear_depth[0], np.nan)
     if name == "response_amplitude":
         values = np.abs(history.response)
     elif name == "response_phase":
         values = np.angle(history.response)
     elif name == "wear_rate":
         values = slower * history.wear_rate
+    elif name == "wear_depth_max":
+        values = history.wear_depth.max(axis=1, initial=0.0)
     elif name == "cycle_count":
         values = history.cycles / slower
     else:

@@ -29,11 +29,13 @@ from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.existing_result import Label, Target
 from studyrunner.netcdf.output import crash_folder, older_folder, progress_file, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
+from studyrunner.netcdf.sample_coordinates import sample_coordinates
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays, merge_facts, pair_arrays
 from studyrunner.scene_building import Scenes
@@ -144,6 +146,7 @@ class _ResultWriter:
             target.finished,
             {**self.software, **describe_date(self.date)},
             self.pairs,
+            tuple(sample_coordinates(self.study, self.scenes.facts)),
         )
         for doubt in gathered.doubts:
             if doubt not in self.said:
@@ -235,7 +238,8 @@ def _prepare(
 ) -> tuple[CompletionIndex, _ResultWriter]:
     """The index of finished points, and the writer of the result."""
     store, facts = scenes.store, merge_facts(scenes.facts)
-    plan = build_tasks(study, [each.n_displacements for each in scenes.facts])
+    contacts = contact_changes(study, scenes.scenes, scenes.facts)
+    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts)
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)

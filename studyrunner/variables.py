@@ -48,6 +48,10 @@ ASKED = {
     "wear_depth": Variable(
         ("cycle", "contact"), "m", "wear depth", comment="Of both surfaces of the pair together; it opens the pair."
     ),
+    "wear_depth_max": Variable(("cycle",), "m", "largest wear depth of any pair"),
+    "wear_depth_last": Variable(
+        ("contact",), "m", "wear depth at the last count", comment="At the last count that the point has reached."
+    ),
     "mean_pressure": Variable(
         ("cycle", "contact"),
         "Pa",
@@ -150,6 +154,20 @@ ASKED = {
     ),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
+
+OF_SAMPLES = (
+    "worn_volume",
+    "wear_rate",
+    "wear_depth_max",
+    "wear_depth_last",
+    "response_amplitude",
+    "response_peak",
+    "worn_volume_error",
+)
+"""Those of a study with [scatter] that names none: what statistics and pictures need, as there are many points."""
+
+USUAL = tuple(name for name in ASKED if name not in ("wear_depth_max", "wear_depth_last"))
+"""Those of other studies that name none."""
 
 SCENE: dict[str, dict[str, Variable]] = {
     "mesh": {
@@ -342,6 +360,7 @@ COORDINATES = {
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
+    "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),

@@ -23,6 +23,7 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
+from studyrunner.netcdf.sample_coordinates import SampleCoordinate
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
 from studyrunner.scene.scene_set import PairArrays, pair_arrays
@@ -37,7 +38,7 @@ from studyrunner.variables import ASKED, COORDINATES, COUNTS, KEPT, LOOPS, Varia
 _BYTES_A_SLAB = 16e6
 _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment
 _BYTES_OF_CACHE = 2**16
-_ON_CONTACT = " ".join(sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)))
+_ON_CONTACT = sorted(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",))
 
 _KEY_TYPE = "S32"
 
@@ -73,6 +74,7 @@ def gather(
     keep_finished: bool = False,
     origin: Mapping[str, str] | None = None,
     pairs: PairArrays | None = None,
+    samples: Sequence[SampleCoordinate] = (),
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
@@ -96,12 +98,15 @@ def gather(
         Attributes on place and time of the computation.
     pairs
         Where the pairs are, if not as in `facts`.
+    samples
+        What the samples have drawn.
 
     Raises
     ------
     StorageError
         Where the file cannot be written, or the file of the run cannot be read.
     """
+    pairs = pair_arrays(study, [facts]) if pairs is None else pairs
     keys, gathered = _read_through(study, facts, completion)
     left = gathered.outcomes[Outcome.NOT_COMPUTED]
     if left and keep_finished:
@@ -114,9 +119,11 @@ def gather(
             file.setncatts(origin or {})
             if gathered.doubts:
                 file.setncattr("plausibility", "\n".join(gathered.doubts))
-            _write_values(file, study, facts, completion, keys)
+            _write_values(file, study, facts, completion, keys, pairs, samples)
             _write_scene(file, study, completion.kind.itemsize, of_scene)
-            _write_coordinates(file, study, facts, pairs or pair_arrays(study, [facts]))
+            _write_coordinates(file, study, facts, pairs)
+            for each in samples:
+                _write_whole(file, each.name, each.entry.dimensions, each.values, each.entry)
             if scene is not None:
                 write_scene_group(file, scene)
     except OSError as error:
@@ -167,8 +174,15 @@ def _records_at_once(bytes_a_record: int) -> int:
 
 
 def _write_values(
-    file: netCDF4.Dataset, study: Study, facts: SceneFacts, completion: CompletionIndex, keys: Keys
+    file: netCDF4.Dataset,
+    study: Study,
+    facts: SceneFacts,
+    completion: CompletionIndex,
+    keys: Keys,
+    pairs: PairArrays,
+    samples: Sequence[SampleCoordinate],
 ) -> None:
+    on_contact = [name for name in _ON_CONTACT if pairs.exists is not None or name != "contact_exists"]
     shape = tuple(len(values) for values in study.dimensions.values())
     sizes = variable_sizes(study, facts)
     asked = [name for name in ASKED if name in study.outputs.variables]
@@ -185,10 +199,11 @@ def _write_values(
             continue
         own = (1 if _one_pair(name, dimension) else sizes[dimension] for dimension in entry.dimensions)
         variable = _create(file, name, entry, dimensions, (*slab, *own))
-        if "contact" in entry.dimensions:
-            variable.setncattr("coordinates", _ON_CONTACT)
+        if "contact" in entry.dimensions or "sample" in study.dimensions:
+            drawn = [each.name for each in samples if set(each.entry.dimensions) <= set(dimensions)]
+            variable.setncattr("coordinates", " ".join(on_contact * ("contact" in entry.dimensions) + drawn))
     if not any("contact" in entry.dimensions for entry in variables.values()):
-        file.setncattr("coordinates", _ON_CONTACT)
+        file.setncattr("coordinates", " ".join(on_contact))
     for region, first, last in _slabs(shape, slab):
         _write_slab(file, region, variables, study.outputs.loops, _read_slab(completion, keys[first:last]))
 

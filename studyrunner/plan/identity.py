@@ -38,7 +38,8 @@ class Identities:
             # A time limit decides whether there is a result, not the values of the result.
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
             line = (branch.excitation_amplitude, branch.sweep, settings)
-            scene = (self._digests[branch.joint.scene], branch.joint.friction_coefficient, solver_digest())
+            joint = branch.joint
+            scene = (self._digests[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
             key = _digest("line", scene, line)
             self._lines[branch.number] = tuple(_digest("start", key, frequency) for frequency in branch.frequencies)
         return self._lines[branch.number]

@@ -27,6 +27,7 @@ from studyrunner.plan.sharing import (
     share_histories,
 )
 from studyrunner.plan.tasks import BranchTask, Joint, MarchTask, TaskPlan
+from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import Realisation, realise
 from studyrunner.study.sections import AUTO, SOLVER_AXES
@@ -58,15 +59,18 @@ class _Case:
     settings: SolverSettings
 
 
-def build_tasks(study: Study, n_displacements: int | Sequence[int]) -> TaskPlan:
+def build_tasks(
+    study: Study, n_displacements: int | Sequence[int], contacts: Sequence[ContactChange] | None = None
+) -> TaskPlan:
     """Tasks of a study.
 
     Points whose history is the same for a reason that the study itself shows share a task, see `sharing`. Points with a
     solution of their own never do. The order and the numbers of the tasks depend on the study alone.
 
     n_displacements: number of relative displacements of each scene of the study (`find_scenes`), or of all scenes.
+    contacts: what is drawn for the pairs of each part of the study (`contact_changes`); None where nothing is.
     """
-    return _Planner(study, n_displacements).plan()
+    return _Planner(study, n_displacements, contacts).plan()
 
 
 def march_variables(study: Study) -> tuple[str, ...]:
@@ -78,9 +82,12 @@ def march_variables(study: Study) -> tuple[str, ...]:
 class _Planner:
     """Builds the tasks of a study one after the other."""
 
-    def __init__(self, study: Study, n_displacements: int | Sequence[int]) -> None:
+    def __init__(
+        self, study: Study, n_displacements: int | Sequence[int], contacts: Sequence[ContactChange] | None
+    ) -> None:
         self._study = study
         self._parts = realise(study)
+        self._contacts: Sequence[ContactChange] = ((),) * len(self._parts) if contacts is None else contacts
         self._scenes = find_scenes(study)
         n_scenes = len(self._scenes.studies)
         self._n_displacements = (
@@ -117,7 +124,9 @@ class _Planner:
         cases: dict[_Case, list[_Start]] = {}
         for number, (part, scene) in enumerate(zip(self._parts, self._scenes.numbers, strict=True)):
             study = part.study
-            joint = Joint(scene, study.friction_coefficient)
+            contact = self._contacts[number]
+            of_pairs = any(name == "friction_coefficient" for name, _ in contact)
+            joint = Joint(scene, None if of_pairs else study.friction_coefficient, contact)
             for lines in _lines(study):
                 amplitude, sweep = study.axes.excitation_amplitude[lines[0][0]], study.axes.sweep[lines[0][1]]
                 case = _Case(joint, amplitude, sweep, _settings(study, lines[0]))

@@ -12,6 +12,7 @@ from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from studyrunner.plan.cost_model import CostKeys
 from studyrunner.plan.estimate import ITERATIONS_A_STATE, iterations_of_branch
 from studyrunner.plan.sharing import Index, LeftOut, ScaledHistory, march_counts
+from studyrunner.scene.drawn_contacts import ContactChange
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """Most general keys of tasks in the cost model."""
@@ -24,11 +25,13 @@ class Joint:
     """The joint that a task computes.
 
     scene: number of the scene (`studyrunner.scene.scene_set`).
-    friction_coefficient: of all pairs; None where each pair of the scene has its own.
+    friction_coefficient: of all pairs; None where each pair has its own.
+    contact: arrays of the contact interface that a sample draws, in place of those of the scene.
     """
 
     scene: int
     friction_coefficient: float | None
+    contact: ContactChange = ()
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
-from studyrunner.scene.scene_set import find_scenes
+from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.study import Study
 
 _MOST_BUILT = 8
@@ -17,10 +17,13 @@ _MOST_BUILT = 8
 class PlannedScenes:
     """Scenes of a study.
 
-    facts: of the scenes that were built, by number. nearest: for each scene the built scene that stands for it.
+    scenes: which there are.
+    facts: of the scenes that were built, by number.
+    nearest: for each scene the built scene that stands for it.
     seconds_left: estimated time for building the others, s.
     """
 
+    scenes: SceneSet
     facts: dict[int, SceneFacts]
     nearest: tuple[int, ...]
     seconds_left: float
@@ -41,7 +44,7 @@ class PlannedScenes:
             return ""
         pairs = sorted({len(self.facts[number].area) for number in self.nearest})
         of_pairs = f"{pairs[0]}" if len(pairs) == 1 else f"{pairs[0]} to {pairs[-1]}"
-        return f"{len(self.nearest)}, built once each, with {of_pairs} contact pairs"
+        return f"{len(self.nearest)}, built once each, with {of_pairs} contact pair{'' if of_pairs == '1' else 's'}"
 
 
 def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
@@ -68,4 +71,4 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         say(f"building scene {number + 1} of {len(scenes.studies)}")
         facts[number] = describe_scene(build_study_scene(scenes.studies[number], say))
     each_takes = (time.monotonic() - began) / len(facts)
-    return PlannedScenes(facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))
+    return PlannedScenes(scenes, facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))

@@ -37,6 +37,7 @@ class SceneFacts:
     digest: SHA-256 of all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: largest number of harmonics for this scene; None without limit.
     static_response: response to the harmonic load at rest; None where unknown or not requested.
+    gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
     edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
     """
 
@@ -49,6 +50,8 @@ class SceneFacts:
     largest_harmonics: int | None = None
     static_response: StaticResponse | None = None
     edge: NDArray[np.bool_] | None = None
+    gap: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    friction_coefficient: NDArray[np.float64] | None = None
 
 
 def _silent(_: str) -> None:
@@ -204,6 +207,8 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         digest=_digest(model),
         largest_harmonics=largest_harmonics(model),
         edge=edge_pairs(contact),
+        gap=contact.gap,
+        friction_coefficient=contact.friction_coefficient,
     )
 
 

@@ -1,19 +1,33 @@
-"""A study in parts that have one scene each: for each combination of the axes that are keys of [scene] or [wear]."""
+"""A study in parts that have one scene and one sample each: along the axes that are keys of [scene] or [wear], and
+along the samples of [scatter].
+"""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel
+
+from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
+from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.study import Study
+from studyrunner.user_error import UserError, WrongValueError
+
+_OF_AXES = ("frequency", "wear_coefficient", "excitation_amplitude")
+_NO_PAIRS = ScatteredPairs(("",), np.full((1, 3), np.nan))
 
 
 @dataclass(frozen=True)
 class Realisation:
     """A part of a study.
 
-    study: without axes that are keys of [scene] or [wear].
-    place: indices along these axes of the whole study, which are its last ones.
+    study: without axes that are keys of [scene] or [wear], and with the values that the sample draws.
+    place: indices along these axes and along the samples of the whole study, which are its last axes.
     """
 
     study: Study
@@ -21,6 +35,147 @@ class Realisation:
 
 
 def realise(study: Study) -> tuple[Realisation, ...]:
-    """The parts of a study, in the order of their places; the study itself where it has no such axes."""
+    """The parts of a study, in the order of their places; the study itself where it has no such axes and samples.
+
+    Values that differ between the pairs of a contact are not in the parts, see `draw_pairs`.
+
+    Raises
+    ------
+    UserError
+        Where a sample draws a value that is none.
+    """
     places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
-    return tuple(Realisation(part, place) for part, place in zip(study.variants or (study,), places, strict=True))
+    parts = []
+    for variant, place in zip(study.variants or (study,), places, strict=True):
+        samples = _samples(variant)
+        parts += [Realisation(part, (*place, *sample)) for part, sample in samples]
+    return tuple(parts)
+
+
+def draw_inputs(study: Study) -> dict[str, NDArray[np.float64]]:
+    """Values of the inputs that are the same for all pairs, (n_samples,), or (n_values, n_samples) of an axis.
+
+    study: without axes that are keys of [scene] or [wear]. Raises UserError.
+    """
+    section = study.scatter
+    if section is None:
+        return {}
+    own: dict[str, ArrayLike] = {name: _own_value(study, name) for name in section.inputs}
+    found = _draw(study, section, own, _NO_PAIRS)
+    return {
+        name: np.array([each.apply(value) for value in np.ravel(own[name])]).squeeze(axis=() if name in _OF_AXES else 0)
+        for name, each in found.items()
+        if not is_of_pairs(name, section.inputs[name])
+    }
+
+
+def draw_pairs(
+    study: Study, own_values: Mapping[str, NDArray[np.float64]], pairs: ScatteredPairs
+) -> dict[str, NDArray[np.float64]]:
+    """Values of the inputs that belong to contact pairs, (n_samples, n_pairs).
+
+    study: without axes that are keys of [scene] or [wear]. own_values: of the scene, (n_pairs,). Raises UserError.
+    """
+    section = study.scatter
+    if section is None:
+        return {}
+    own: dict[str, ArrayLike] = {name: _own_value(study, name) for name in section.inputs}
+    own |= {name: own_values[name] for name in own if name in own_values}
+    found = _draw(study, section, own, pairs)
+    of_pairs = [name for name in found if is_of_pairs(name, section.inputs[name])]
+    shape = (section.realisations, len(pairs.surface))
+    return {name: np.broadcast_to(found[name].apply(own_values[name]), shape) for name in of_pairs}
+
+
+def is_of_pairs(name: str, scattered: Scattered) -> bool:
+    """Whether an input belongs to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
+    return name in OF_PAIRS and (name != "friction_coefficient" or scattered.of != "all pairs")
+
+
+def check_scatter(study: Study) -> None:
+    """Raises UserError where an input of [scatter] is unknown or cannot scatter."""
+    section = study.scatter
+    if section is None:
+        return
+    numbers = [*_OF_AXES, *OF_PAIRS, *_numbers_of(study)]
+    for name, scattered in section.inputs.items():
+        if name not in numbers:
+            remedy = f"unknown input, give {nearest_name(name, dict.fromkeys(numbers))}"
+            raise UserError(study.source, f"scatter.{name}", None, remedy)
+        several = name in _OF_AXES and len(getattr(study.axes, name)) > 1
+        several = several or any(axis.key == (name,) for axis in study.scene_axes)
+        if several and scattered.distribution.kind == "value":
+            remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
+            raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
+    for variant in study.variants or (study,):
+        for name, values in draw_inputs(variant).items():
+            if name not in (*_OF_AXES, "threshold"):
+                # other parameters of the scene may not fit to one that is drawn
+                for extreme in (values.min(), values.max()):
+                    _with_parameters(variant, {name: float(extreme)})
+
+
+def _numbers_of(study: Study) -> list[str]:
+    """Keys of [scene] and [wear] that are numbers with fractions."""
+    parameters = study.scene.parameters
+    floats = [name for name, field in type(parameters).model_fields.items() if "float" in str(field.annotation)]
+    return [*floats, "threshold"]
+
+
+def _own_value(study: Study, name: str) -> ArrayLike:
+    """The study's own value of an input; 0 where a scene or its contact pairs have one."""
+    if name in _OF_AXES:
+        return np.array(getattr(study.axes, name))[:, None]
+    value = study.wear.threshold if name == "threshold" else dict(study.scene.parameters).get(name)
+    if isinstance(value, float | int):
+        return float(value)
+    assert study.scatter is not None
+    scattered = study.scatter.inputs[name]
+    if scattered.distribution.kind != "value" and not is_of_pairs(name, scattered):
+        remedy = "give the middle of the distribution as well: the study has no value of its own"
+        raise UserError(study.source, f"scatter.{name}", None, remedy)
+    return 1.0
+
+
+def _draw(
+    study: Study, section: ScatterSection, own: Mapping[str, ArrayLike], pairs: ScatteredPairs
+) -> dict[str, Drawn]:
+    try:
+        return drawn(section, own, pairs)
+    except WrongValueError as error:
+        raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
+
+
+def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
+    """The study in each sample, and the index of the sample; the study itself where nothing scatters."""
+    if study.scatter is None:
+        yield study, ()
+        return
+    values = draw_inputs(study)
+    axes = [name for name in values if name in _OF_AXES]
+    of_scene = [name for name in values if name not in (*_OF_AXES, "threshold")]
+    for sample in range(study.scatter.realisations):
+        update: dict[str, object] = {"scatter": None}
+        if axes:
+            drawn_axes = {name: tuple(values[name][:, sample].tolist()) for name in axes}
+            update["axes"] = study.axes.model_copy(update=drawn_axes)
+        if of_scene:
+            parameters = _with_parameters(study, {name: float(values[name][sample]) for name in of_scene})
+            update["scene"] = study.scene.model_copy(update={"parameters": parameters})
+        if "threshold" in values:
+            update["wear"] = study.wear.model_copy(update={"threshold": float(values["threshold"][sample])})
+        yield study.model_copy(update=update), (sample,)
+
+
+def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:
+    """Parameters of the scene with drawn values. Raises UserError where one of them is wrong."""
+    parameters = study.scene.parameters
+    if values.keys() == {"friction_coefficient"}:
+        # all that is asked of it was checked when it was drawn
+        return parameters.model_copy(update=dict(values))
+    try:
+        return type(parameters).model_validate({**dict(parameters), **values})
+    except ValueError as error:
+        name = next((each for each in values if each in str(error)), next(iter(values)))
+        remedy = "give less width: a sample draws a value that the scene cannot have"
+        raise UserError(study.source, f"scatter.{name}", values[name], remedy) from None

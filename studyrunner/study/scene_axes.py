@@ -74,7 +74,7 @@ def take_scene_axes(
         if table is None or (table == "wear" and name not in _IN_WEAR):
             known = [*own, *scene.model_fields, *_IN_WEAR]
             raise UserError(source, f"axes.{name}", value, f"unknown key, give {nearest_name(name, known)}")
-        units, meaning = _describe(dict(kinds)[table], name)
+        units, meaning = describe_key(dict(kinds)[table], name)
         each = value.items() if _is_table(value) else [(None, value)]
         for inner, values in each:
             key = (name,) if inner is None else (name, str(inner))
@@ -137,7 +137,7 @@ def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source:
     raise UserError(source, f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
 
 
-def _describe(kind: type[BaseModel], name: str) -> tuple[str, str]:
+def describe_key(kind: type[BaseModel], name: str) -> tuple[str, str]:
     """Unit and meaning in the description of a key: parts between commas, of which one is the unit."""
     text = kind.model_fields[name].description or ""
     units = next((part for part in reversed(re.split("[,;] ", text)) if part in _UNITS), "1")

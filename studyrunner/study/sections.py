@@ -28,7 +28,7 @@ from studyrunner.study.values import (
     whole,
 )
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, KEPT, SCENE
+from studyrunner.variables import ASKED, KEPT, SCENE, USUAL
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -155,7 +155,7 @@ class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
-        tuple(ASKED), description="names of result variables"
+        USUAL, description="names of result variables"
     )
     loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field(
         (), description="indices of the contact pairs whose fretting loops are kept"

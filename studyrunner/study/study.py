@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, WearTarget
+from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import (
     AUTO,
@@ -28,7 +29,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, COORDINATES
+from studyrunner.variables import COORDINATES, OF_SAMPLES, USUAL
 
 _MOST_POINTS = 1_000_000
 
@@ -52,6 +53,7 @@ class Study(Section):
     slow_time: SlowTimeSection = SlowTimeSection()
     solver: SolverSection = SolverSection()
     outputs: OutputsSection = OutputsSection()
+    scatter: ScatterSection | None = None
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     archived: Archived | None = Field(None, exclude=True)
@@ -70,7 +72,8 @@ class Study(Section):
         names = outputs.get("variables", [DEFAULT])
         if not isinstance(names, list) or names.count(DEFAULT) != 1:
             return table
-        cheap = [*ASKED, *(name for name in scene.offers if name == "mesh")]
+        usual = OF_SAMPLES if table.get("scatter") is not None else USUAL
+        cheap = [*usual, *(name for name in scene.offers if name == "mesh")]
         filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
         return {**table, "outputs": {**outputs, "variables": filled}}
 
@@ -202,7 +205,8 @@ class Study(Section):
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         own = {name: getattr(self.axes, name) for name in self.own_axes}
-        return {**own, **{axis.name: axis.values for axis in self.scene_axes}}
+        samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}
+        return {**own, **{axis.name: axis.values for axis in self.scene_axes}, **samples}
 
     def units(self, name: str) -> str:
         """Unit of an axis; "1" where it has none."""
@@ -211,7 +215,7 @@ class Study(Section):
 
     @property
     def own_axes(self) -> tuple[str, ...]:
-        """Names of the axes that are no keys of [scene] or [wear]."""
+        """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         return (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
+from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_axes import SceneAxis, as_checked, combinations, take_scene_axes
 from studyrunner.study.scene_errors import scene_errors
@@ -113,7 +114,9 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
         study = check_table(
             Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, ""
         )
-        return with_room_for_wear(study)
+        study = with_room_for_wear(study)
+        check_scatter(study)
+        return study
     except UserError as error:
         if error.key in moved:
             raise UserError(error.place, moved[error.key], error.value, error.remedy) from None
@@ -145,6 +148,7 @@ def _with_variants(
         check_n_points(study)
     except WrongValueError as error:
         raise UserError(source, error.key or "axes", error.value, error.remedy) from None
+    check_scatter(study)
     return study
 
 
@@ -164,6 +168,8 @@ def format_study(study: Study) -> str:
             del sections["solver"][key]
     lines = []
     for name, section in sections.items():
+        if section is None:
+            continue
         lines.append(f"[{name}]")
         lines.extend(f"{key} = {_toml_value(value)}" for key, value in section.items() if value is not None)
     return "\n".join(lines) + "\n"
