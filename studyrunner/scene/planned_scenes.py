@@ -58,10 +58,10 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         Where a scene is wrong.
     """
     scenes = find_scenes(study)
-    kinds: dict[tuple[object, ...], int] = {}
+    kinds: dict[str, int] = {}
     nearest = []
     for number, each in enumerate(scenes.studies):
-        sizes = tuple(value for _, value in each.scene.parameters if not isinstance(value, float))
+        sizes = str([value for _, value in each.scene.parameters if not isinstance(value, float)])
         if sizes not in kinds and len(kinds) < _MOST_BUILT:
             kinds[sizes] = number
         nearest.append(kinds.get(sizes, max(kinds.values())))

@@ -13,6 +13,7 @@ from studyrunner.netcdf.attributes import coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.results import MarchResult
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
@@ -51,7 +52,7 @@ def build_dataset(
     dataset = xr.Dataset(
         {name: ((*axes, *variables[name].dimensions), array) for name, array in arrays.items()},
         coords={
-            **coordinates(study, facts),
+            **coordinates(study, facts, pair_arrays(study, [facts])),
             **{scene.name: (scene.name, scene.values) for scene in of_scene if scene.coordinate},
         },
         attrs={**describe_run(study, facts), "certificate_summary": certificates, POINTS_LEFT: np.int32(0)},

@@ -18,6 +18,7 @@ from studyrunner.netcdf.output import progress_file
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import variables as scene_variables
 from studyrunner.scene.scene import build_study_scene
+from studyrunner.scene.scene_variables import exact_answers
 from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
@@ -36,7 +37,7 @@ def test_the_file_is_the_one_of_the_plain_twin(
 ) -> None:
     monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
     study = read_study("sdof_slider", GRID)
-    of_scene = build_scene_variables(study, build_study_scene(study))
+    of_scene = exact_answers(study)
     frequencies = read_study("two_masses", ["outputs.variables=['natural_frequency']"])
     of_scene += build_scene_variables(frequencies, build_study_scene(frequencies))
     mesh = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['mesh']"])
@@ -56,7 +57,7 @@ def test_the_file_is_the_one_of_the_plain_twin(
 
 def test_exact_answers_stand_at_their_points() -> None:
     study = read_study("sdof_slider", GRID)
-    found = {scene.name: scene for scene in build_scene_variables(study, build_study_scene(study))}
+    found = {scene.name: scene for scene in exact_answers(study)}
     assert set(found) == {"exact_worn_volume", "exact_response_amplitude"}
     volume, response = found["exact_worn_volume"].values, found["exact_response_amplitude"].values
     # frequency, wear coefficient, excitation amplitude; nothing depends on step, scheme, sweep, harmonics
@@ -119,7 +120,7 @@ def test_natural_frequencies_of_a_scene_file(tmp_path: Path, monkeypatch: pytest
     text = '[study]\nname = "s"\n[scene]\nmodel = "wave.h5"\nfriction_coefficient = 0.3\n[axes]\nfrequency = 200.0\n'
     (tmp_path / "s.toml").write_text(text + "[solver]\nharmonics = 2\n", encoding="utf-8")
     study = read_study("s.toml", ["outputs.variables=['natural_frequency']"])
-    found = {scene.name: scene.values for scene in build_scene_variables(study, build_study_scene(study))}
+    found = {scene.name: scene.values for scene in exact_answers(study)}
     # of 2 harmonics and of those up to 7, which show the error
     diameters = [0, 1, 2, 3, 5, 6, 8, 9]
     assert found["nodal_diameter"].tolist() == diameters

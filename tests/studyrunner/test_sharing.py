@@ -24,7 +24,7 @@ from studyrunner.evaluate import integrate
 from studyrunner.history_result import build_result
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
-from studyrunner.plan.sharing import ScaledHistory, march_counts, share_histories
+from studyrunner.plan.sharing import ScaledHistory, describe_left_out, march_counts, share_histories
 from studyrunner.plan.tasks import MarchTask
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -87,7 +87,7 @@ def test_histories_are_shared_where_they_are_the_same(
     exact = [[Fraction(text) for text in axis] for axis in (wears, steps)]
     for one, other in itertools.combinations(choices, 2):
         assert (march_of[one] == march_of[other]) == alike(study, *exact, one, other)
-    assert sum(item.n_points for item in sharing.left_out(1, len(choices))) == len(choices) - len(sharing.marches)
+    assert sum(item.n_points for item in describe_left_out(sharing.causes)) == len(choices) - len(sharing.marches)
     for found in sharing.marches:
         by_history = [{study.axes.wear_coefficient[wear] for wear, _, _ in scaled} for scaled in found.histories]
         assert all(len(of_one) == 1 for of_one in by_history)
@@ -185,7 +185,7 @@ def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(m
         choices = list(itertools.chain.from_iterable(found.histories))
         assert len({wear for wear, _, _ in choices}) == 1
         assert not found.held
-    left_out = {item.reason: item.n_points for item in sharing.left_out(1, 18)}
+    left_out = {item.reason: item.n_points for item in describe_left_out(sharing.causes)}
     assert list(left_out.values()) == [3]
     unworn = study_with(["0", "1e-12"], ["100", "200"], SCHEMES, "slow_time.cycles=0")
     assert all(found.held for found in share_histories(unworn).marches)
@@ -316,7 +316,7 @@ def integrated(
         return change(history(asked.cycles.tolist()), asked.wear_coefficient)
 
     monkeypatch.setattr("solver.wear.history.integrate_wear", fake)
-    return list(integrate(None, 0.5, shared_task(), no_keep)), calls  # type: ignore[arg-type]
+    return list(integrate(None, shared_task(), no_keep)), calls  # type: ignore[arg-type]
 
 
 def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
