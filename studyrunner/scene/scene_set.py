@@ -94,29 +94,27 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
     for number, each in enumerate(facts):
         own = slice(len(each.area))
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
-    places, numbers = axes_of_difference(study, find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b]))
-    kept = [study.scene_axes[place].name for place in places]
+    names, numbers = axes_of_difference(study, find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b]))
     exists = np.isfinite(area[numbers])
-    return PairArrays((*kept, "contact"), position[numbers], area[numbers], surface[numbers], exists)
+    return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
 
 def axes_of_difference(
     study: Study, scenes: SceneSet, are_equal: Callable[[int, int], bool]
-) -> tuple[tuple[int, ...], NDArray[np.intp]]:
-    """Axes of the scene along which something differs, as indices in `study.scene_axes`, and numbers of scenes along
-    these axes.
+) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of the axes along which something differs between the scenes, and numbers of scenes along these axes.
 
     are_equal: whether two scenes, given by number, are equal in it.
     """
-    numbers = np.array(scenes.numbers).reshape([len(axis.values) for axis in study.scene_axes])
-    places = []
-    for place in reversed(range(numbers.ndim)):
+    numbers = np.array(scenes.numbers).reshape([len(values) for values in study.axes_of_parts.values()])
+    names = []
+    for place, name in reversed(list(enumerate(study.axes_of_parts))):
         first = np.broadcast_to(numbers.take([0], axis=place), numbers.shape)
         if all(a == b or are_equal(a, b) for a, b in zip(first.flat, numbers.flat, strict=True)):
             numbers = numbers.take(0, axis=place)
         else:
-            places.append(place)
-    return tuple(reversed(places)), numbers
+            names.append(name)
+    return tuple(reversed(names)), numbers
 
 
 def _same_pairs(one: SceneFacts, other: SceneFacts) -> bool:

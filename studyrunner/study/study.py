@@ -204,9 +204,13 @@ class Study(Section):
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
-        own = {name: getattr(self.axes, name) for name in self.own_axes}
+        return {**{name: getattr(self.axes, name) for name in self.own_axes}, **self.axes_of_parts}
+
+    @property
+    def axes_of_parts(self) -> Mapping[str, tuple[float | str, ...]]:
+        """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
         samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}
-        return {**own, **{axis.name: axis.values for axis in self.scene_axes}, **samples}
+        return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}
 
     def units(self, name: str) -> str:
         """Unit of an axis; "1" where it has none."""
