@@ -16,7 +16,7 @@ from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
-from studyrunner.study.scene_axes import SceneAxis, as_checked, combinations, take_scene_axes
+from studyrunner.study.scene_axes import SceneAxis, as_checked, combinations, is_table, only_table, take_scene_axes
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.scene_table import check_scene, parameters_of
 from studyrunner.study.sections import SOLVER_AXES, AxesSection
@@ -160,7 +160,7 @@ def format_study(study: Study) -> str:
     for axis in study.scene_axes:
         given, axes = sections[axis.table], sections["axes"]
         for name in axis.key[:-1]:
-            given, axes = given[name], axes.setdefault(name, {})
+            given, axes = only_table(given[name]), axes.setdefault(name, {})
         del given[axis.key[-1]]
         axes[axis.key[-1]] = list(axis.values)
     for key in SOLVER_AXES:
@@ -212,9 +212,10 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
     place[names[-1]] = value
     # the last place where a key is given counts, here or under [axes]
     others = {"axes": ("solver", "scene", "wear"), **dict.fromkeys(("solver", "scene", "wear"), ("axes",))}
-    if len(names) == 2:
+    if len(names) == 2 and not is_table(place[names[1]]):
         for other in others.get(names[0], ()):
-            _section(table, other).pop(names[1], None)
+            if not is_table(_section(table, other).get(names[1])):
+                _section(table, other).pop(names[1], None)
 
 
 def _override_value(key: str, text: str) -> object:
