@@ -9,14 +9,13 @@ import pytest
 from scipy import linalg
 
 from solver.model import ReducedModel
-from studies.scene_answers import N_MODES, stuck_frequencies
+from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
 
-AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])  # Hz, 20-node elements, nodal diameter 0, glued
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
 CYCLES = np.array([0.0, 1e3, 3e4, 1e5])
 
@@ -52,7 +51,7 @@ def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frequency", [150.0, 160.0, 185.0, 230.0])
+@pytest.mark.parametrize("frequency", [160.0, 230.0])
 def test_the_slider_wears_by_its_differential_equation(frequency):
     found = answer(frequency)
     for row, wear in enumerate(WEAR):
@@ -126,18 +125,6 @@ def test_the_mesh_is_the_skin_of_blade_and_disk():
         box = whole.mesh.nodes[whole.mesh.elements[inside]]
         edges = np.stack([box[:, 1] - box[:, 0], box[:, 3] - box[:, 0], box[:, 4] - box[:, 0]], axis=1)
         assert volume == pytest.approx(np.linalg.det(edges).sum(), rel=0.1)
-
-
-@pytest.mark.slow
-def test_frequencies_of_the_glued_sector_at_rest():
-    parameters = scene_parameters("dovetail_sector")(stress_stiffening=False, n_sectors=47)
-    coarse = scene_frequencies("dovetail_sector", dovetail(stress_stiffening=False))
-    assert coarse.nodal_diameters == tuple(range(24))
-    assert coarse.frequencies.shape == (24, N_MODES)
-    assert (np.diff(coarse.frequencies, axis=1) > 0.0).all()
-    assert np.abs(coarse.frequencies[0] / AT_REST - 1.0).max() < 0.12
-    default = stuck_frequencies(build_scene("dovetail_sector", parameters, 0))
-    assert np.abs(default.frequencies[0] / AT_REST - 1.0).max() < 0.03
 
 
 def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector():

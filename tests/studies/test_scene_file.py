@@ -14,7 +14,6 @@ from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
-from studies.scenes import build_scene, scene_parameters
 from tests.studies.scene_models import changed, drop, general_model, linear_model, plain, put, sector
 
 
@@ -58,13 +57,6 @@ def test_round_trip_is_bitwise(tmp_path: Path, build: Callable[[], ReducedModel]
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
 
 
-@pytest.mark.parametrize("name", ["sdof_slider", "two_masses", "vibro_impact", "cylinder_on_flat", "sphere_on_flat"])
-def test_textbook_scenes_survive_the_round_trip(tmp_path: Path, name: str) -> None:
-    model = build_scene(name, scene_parameters(name)(), 3)
-    write_scene(model, tmp_path / "scene.h5")
-    assert_same_bits(read_scene(tmp_path / "scene.h5"), model)
-
-
 def test_a_sector_at_nodal_diameter_0_keeps_its_sectors(tmp_path: Path) -> None:
     model = general_model({0: linear_model(7, hermitian=False, seed=1)}, n_sectors=47)
     write_scene(model, tmp_path / "scene.h5")
@@ -106,11 +98,6 @@ def test_optional_datasets_have_defaults(tmp_path: Path) -> None:
     assert not model.contact.normal_load.any()
     assert np.isnan(model.contact.position).all()
     assert model.contact.surface == ("", "", "")
-
-
-def test_responses_can_be_indices(tmp_path: Path) -> None:
-    model = read_scene(changed(tmp_path, plain(), put("response/dofs", np.array([6, 2], dtype=np.int32))))
-    assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
 
 
 def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path: Path) -> None:

@@ -78,16 +78,6 @@ def test_dofs_eliminated(tmp_path):
 
 
 @needs_ccx
-def test_held_model_does_not_tell_its_speed(tmp_path):
-    deck, matrices = exported(tmp_path, changed("*BOUNDARY,OP=NEW\n", ""))
-    assert omega_squared_of(deck, matrices, AXIS) is None
-    rotation = check_speed(deck, matrices, MM)
-    assert (rotation.omega_squared, rotation.point.tolist()) == (250000.0, [0.0, 0.0, 0.0])
-    with pytest.raises(SceneError, match=r"BORE: 18 of 21 nodes have no dof in sector.dof"):
-        check_nodes_have_dofs(matrices, deck.node_sets["BORE"], "BORE")
-
-
-@needs_ccx
 def test_no_perturbation(tmp_path):
     deck, matrices = exported(tmp_path, changed("*STEP,PERTURBATION", "*STEP"))
     with pytest.raises(SceneError) as wrong:
@@ -95,13 +85,6 @@ def test_no_perturbation(tmp_path):
     assert str(wrong.value) == (
         "matrices: the deck spins at 500 rad/s, the stiffness holds 0; write *STEP,PERTURBATION."
     )
-
-
-@needs_ccx
-def test_another_speed(tmp_path, sector):
-    deck = read_deck(write(tmp_path, changed("250000.0", "160000.0")))
-    with pytest.raises(SceneError, match=r"spins at 400 rad/s, the stiffness holds 500; give the files of one run"):
-        check_speed(deck, sector[1], SI)
 
 
 CONTACT = """\

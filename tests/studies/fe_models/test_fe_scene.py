@@ -357,15 +357,6 @@ def test_more_modes_than_a_singular_mass_has(kind, small, monkeypatch):
     assert np.allclose(fewer.summary.glued_frequencies[2], frequencies[:3], rtol=1e-10)
 
 
-@pytest.mark.parametrize("small", [0, 900])
-def test_modes_by_dense_matrices_and_by_iteration(small, monkeypatch):
-    monkeypatch.setattr(reduction, "_SMALL", small)
-    sector = Sector("C3D20R", "C3D8", (1, 3, 2), (1, 2, 2))
-    prepared = prepare_model(sector.model(), sector.joint())
-    _, _, _, expected = dense_twin(sector, sector.joint(), prepared.pairs, prepared.reduction.forms, 2, 6)
-    assert np.allclose(prepared.reduction.frequencies(2, 6), expected, rtol=1e-8)
-
-
 def test_retainer_acts_on_the_mean_relative_displacement():
     model, joint = plates()
     direction = np.array([2.0, 0.0, 0.0])
