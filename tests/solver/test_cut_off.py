@@ -86,7 +86,6 @@ def test_the_unworn_contact_is_whole_by_default(name: str, pairs: dict[str, int]
     ("name", "narrow", "wide"),
     [
         ("cylinder_on_flat", {"strips": 12, "half_width": 1.5 * A_LINE}, {"strips": 20, "half_width": 2.5 * A_LINE}),
-        ("sphere_on_flat", {"patches": 4, "half_width": 1.4 * A_POINT}, {"patches": 7, "half_width": 2.45 * A_POINT}),
     ],
 )
 def test_a_scar_that_grows_out_of_its_pairs_is_no_result(

@@ -17,7 +17,7 @@ from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
-from solver.stability.floquet import find_instability, growing_exponents, moving, multipliers_of
+from solver.stability.floquet import find_instability, growing_exponents, multipliers_of
 from solver.stability.monodromy import build_monodromy, switching_pairs
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Case, Joint, build_case
@@ -98,20 +98,12 @@ def largest(multipliers: ComplexArray) -> float:
 @pytest.mark.parametrize(
     ("kind", "seed", "allowed"),
     [
-        ("slider", 1, 0.01),
-        ("slider", 7, 0.01),
         ("stopping slider", 5, 0.02),
         ("swinging slider", 5, 0.02),
-        ("swinging slider", 7, 0.01),
         ("two masses", 6, 0.05),
         ("impact", 2, 0.04),
-        ("impact", 6, 0.01),
         ("grazing", 2, 0.05),
-        ("grazing", 4, 0.01),
         ("jenkins", 2, 0.01),
-        ("jenkins", 6, 0.01),
-        ("slipping little", 3, 0.01),
-        ("inclined", 4, 0.01),
         ("inclined", 8, 0.01),
     ],
 )
@@ -122,8 +114,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("damping", [-0.3, -3.0])
-@pytest.mark.parametrize("kind", ["slider", "two masses", "jenkins"])
+@pytest.mark.parametrize(("kind", "damping"), [("slider", -3.0), ("two masses", -0.3), ("jenkins", -3.0)])
 def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
     """Friction holds some of these vibrations, and some not."""
     seen = 0
@@ -142,7 +133,7 @@ def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("seed", [1, 2, 5, 17, 29, 54])
+@pytest.mark.parametrize("seed", [1, 17, 29])
 def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
@@ -154,7 +145,7 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("omega", "n_harmonics", "n_samples"),
-    [(1.0, 3, 128), (1.0, 9, 256), (1.2, 5, 128), (1.2, 3, 256), (1.5, 9, 128), (1.5, 5, 256)],
+    [(1.0, 3, 128), (1.5, 9, 128)],
 )
 def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
     omega: float, n_harmonics: int, n_samples: int
@@ -231,14 +222,6 @@ def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
     assert "linear structure alone" in start.message
 
 
-def test_exponents_of_a_structure() -> None:
-    model = driven(-0.5)
-    joint = build_case(model, 0.5, 1.0, SolverSettings(1, 8)).joint(1.0, 1.0)
-    found = growing_exponents(model.linear[0], moving(joint, np.array([True])))
-    assert np.sort_complex(found) == pytest.approx(0.25 + np.sqrt(2.0 - 0.0625) * np.array([-1j, 1j]))
-    assert growing_exponents(bundled("two_masses").linear[0], np.ones(2, bool)).size == 0
-
-
 def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
     balance, predicted = random_balance(random_model(4, ("3d",) * 6, 12), SolverSettings(3, 24), 4, wear=False)
     at = balance.evaluate(predicted)
@@ -279,17 +262,3 @@ def test_it_is_not_looked_for_in_a_travelling_wave() -> None:
         find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Budget())
         is None
     )
-
-
-@pytest.mark.slow
-def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, settings = drawn("impact", 17), SolverSettings(27, 512)
-    frequency = scene.omega / (2.0 * np.pi)
-    assert start_of(scene.model, 0.0, scene.excitation, frequency, settings).outcome is Outcome.PERIOD_DOUBLED
-    with monkeypatch.context() as handed_out:
-        handed_out.setattr(frequency_sweep, "find_instability", lambda *_: None)
-        start = start_of(scene.model, 0.0, scene.excitation, frequency, settings)
-    assert start.outcome is Outcome.CONVERGED
-    history = march_wear(scene.model, 0.0, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
-    assert history.outcome is Outcome.PERIOD_DOUBLED
-    assert "in each period of the excitation" in history.message

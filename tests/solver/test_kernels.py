@@ -68,14 +68,6 @@ def test_every_sample_obeys_signorini_and_coulomb(
         assert moved @ force == pytest.approx(np.linalg.norm(moved) * np.linalg.norm(force), rel=1e-9, abs=1e-9)
 
 
-def test_the_three_states_of_a_sample() -> None:
-    assert contact_sample(-1.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
-    assert contact_sample(0.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
-    assert contact_sample(20.0, 4.0, 5.0, 0.5, 1.0, 1.0) == (20.0, 3.0, 4.0, 1.0, 1.0, STICK)
-    assert contact_sample(4.0, 4.0, 5.0, 0.5, 1.0, 1.0) == pytest.approx((4.0, 1.2, 1.6, 2.8, 3.4, SLIP))
-    assert contact_sample(4.0, 4.0, 5.0, 0.0, 1.0, 1.0) == (4.0, 0.0, 0.0, 4.0, 5.0, SLIP)
-
-
 @pytest.mark.parametrize("most_periods", [1, 2, 5])
 def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None:
     case = kernel_case(4, 24, seed=1)
@@ -88,28 +80,6 @@ def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None
         assert error[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
     assert periods.max() <= most_periods
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
-
-
-def test_a_period_is_marched_until_its_state_repeats() -> None:
-    # Separation forgets the history within one pass, slip under constant pressure within two.
-    case = kernel_case(6, 48, seed=3)
-    *_, periods, error = march_period(*marched(case), 1e-9, 50)
-    assert (error <= 1e-9).all()
-    assert (periods >= 2).all()
-    again = march_period(*marched(case), 1e-9, 60)
-    assert np.array_equal(again[3], periods)
-
-
-def test_a_stuck_pair_keeps_its_history_and_wears_exactly_zero() -> None:
-    case = kernel_case(3, 64, seed=4)
-    predicted = case.predicted_t.copy()
-    predicted[:, 0] = 1e3  # far above what the tangents need
-    force_t, state_t, status_t, periods, error = march_period(predicted, friction_of(predicted), case.start, 0.0, 8)
-    assert (status_t == STICK).all()
-    assert np.array_equal(integrate_slip_work(force_t, state_t), np.zeros(3))
-    assert np.array_equal(periods, np.ones(3))
-    assert not error.any()
-    assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
 
 
 def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() -> None:
@@ -126,30 +96,6 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
     work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
     assert work <= FRICTION * expected * (1 + 1e-12)
-
-
-def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_increment() -> None:
-    force_t = np.zeros((1, 3, 3))
-    force_t[:, 0] = [1.0, 3.0, 5.0]
-    state_t = np.zeros((1, 2, 4))
-    state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
-    state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
-    expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6]
-    assert integrate_slip_work(force_t, state_t) == pytest.approx(expected, rel=1e-15, abs=0.0)
-
-
-def test_a_pair_that_stays_pressed_keeps_its_samples_of_the_normal_force() -> None:
-    predicted_t = kernel_case(3, 24, seed=6).predicted_t
-    pressed = predicted_t - predicted_t[:, :1].min(axis=2, keepdims=True) + 1.0
-    assert np.array_equal(mean_normal_force(pressed), pressed[:, 0])
-    assert not mean_normal_force(-pressed).any()
-
-
-def test_a_sample_beside_an_opening_counts_by_the_closed_part_of_the_step() -> None:
-    predicted_t = np.zeros((1, 3, 4))
-    predicted_t[0, 0] = [4.0, -4.0, -1.0, 3.0]
-    # closed for 1/2 of the step behind sample 0 and 3/4 of the one before sample 3, each of half the weight
-    assert mean_normal_force(predicted_t)[0] == pytest.approx([4.0 * (0.5 + 0.25), 0.0, 0.0, 3.0 * (0.5 + 0.375)])
 
 
 def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples() -> None:
@@ -231,17 +177,6 @@ def test_tangents_are_those_of_central_differences(seed: int) -> None:
     assert wear_size > 1.0
 
 
-def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
-    # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
-    case = kernel_case(4, BASIS.n_samples, seed=10)
-    _, state_t, *_ = march_period(*marched(case), 1e-12, PERIODS)
-    arguments = (case.predicted_t, friction_of(case.predicted_t), case.start, state_t)
-    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
-    one, _ = march_tangent(*arguments, np.full(4, 1), both_tangents(4), *rest)
-    two, _ = march_tangent(*arguments, np.full(4, 2), both_tangents(4), *rest)
-    assert np.abs(one - two).max() > 1e-3
-
-
 @pytest.mark.parametrize("line", [0, 1])
 def test_a_pair_with_one_tangent_has_the_tangent_of_one_with_two_that_moves_along_it(line: int) -> None:
     m = BASIS.synthesis.shape[0]
@@ -301,25 +236,6 @@ def test_tangents_of_a_slow_closure_are_those_of_central_differences(seed: int) 
     force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_periods=400)
     assert force_error < 1e-6
     assert wear_error < 1e-6 * max(wear_size, 1.0)
-
-
-def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
-    basis = build_basis((), 1)
-    predicted_t = np.array([[[2.0], [0.5], [3.0]]])
-    start = np.zeros((1, 2))
-    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 1)
-    assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
-    everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
-    tangent, _ = march_tangent(
-        predicted_t, friction_of(predicted_t), start, state_t, np.array([1]), both_tangents(1), *everything
-    )
-    # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
-    along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
-    across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))
-    assert tangent[0, 1:] == pytest.approx(np.column_stack([FRICTION * along, across]), rel=1e-12)
-    assert mean_normal_tangent(predicted_t, *everything)[0, 0] == pytest.approx([1.0])
-    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 8)
-    assert integrate_slip_work(force_t, state_t)[0] == 0.0
 
 
 @pytest.mark.slow

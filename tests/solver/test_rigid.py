@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver.accuracy.harmonic_levels import reach, reaches
 from solver.accuracy.resolved_state import ResolvedState
-from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
 from solver.model import ReducedModel
 from solver.newton.solve_balance import Budget
@@ -23,19 +20,14 @@ from solver.structure.penalty import build_penalty
 from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact import NATURAL
-from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
+from tests.solver.models import branch_states, first_point, march_wear, scene
 
 SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
-CASES = [  # spring, force, N, frequency, rad/s
-    ("rigid", 3.0, 0.7),
-    ("rigid", 6.0, 0.7),
-    ("rigid", 3.0, 0.96),
-    ("rigid", 6.0, 1.6),
-    ("soft spring", 6.0, 0.7),
-    ("soft spring", 3.0, 1.0),
-    ("stiff spring", 6.0, 0.85),
-    ("stiff spring", 3.0, 0.96),
-    ("stiff spring", 6.0, 1.2),
+CASES = [  # spring, force, N, frequency, rad/s, rtol; `python -m tests.benchmarks.accuracy` has more
+    ("rigid", 6.0, 1.6, 1e-3),
+    ("rigid", 3.0, 0.7, 1e-2),
+    ("soft spring", 3.0, 1.0, 1e-3),
+    ("stiff spring", 6.0, 1.2, 1e-2),
 ]
 
 
@@ -57,9 +49,7 @@ def reported(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "force", "omega", "rtol"), [*((*case, 1e-3) for case in CASES), *((*case, 1e-2) for case in CASES[::4])]
-)
+@pytest.mark.parametrize(("name", "force", "omega", "rtol"), CASES)
 def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
     name: str, force: float, omega: float, rtol: float
 ) -> None:
@@ -94,17 +84,6 @@ def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
     assert build_penalty(sprung, 1.0, 1000).tangential[0] == pytest.approx(200.0, rel=1e-2)
 
 
-def test_how_many_harmonics_reach_beyond_the_structure() -> None:
-    slider = scene("sdof_slider", normal_stiffness=0.0)
-    # k / (k + m s^2) of a mass on a spring is a quarter at sqrt(3) times its natural frequency
-    assert not reaches(slider, NATURAL / 10.0, 15)
-    assert reaches(slider, NATURAL / 10.0, 17)
-    assert reach(slider, NATURAL, 1) == 1
-    # the modes of the beam end at 57 rad/s
-    assert 27 <= reach(Cantilever().model(), 1.0, 3) <= 79
-    assert reach(Cantilever().model(), 1.0, 115) == 115
-
-
 def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
     omega, settings = 0.62 * NATURAL, SolverSettings(harmonics=9, samples=512)
     model = scene("sdof_slider", normal_stiffness=0.0)
@@ -121,13 +100,8 @@ def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
     assert tail_orders(joint) == tuple(range(10, 28))
 
 
-def test_an_elastic_joint_has_no_tail() -> None:
-    model = random_model(4, ("constant_load",))
-    assert tail_orders(build_case(model, 0.4, OMEGA, SolverSettings()).joint(OMEGA, 1.0)) == ()
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("first", "second"), [(27, 79), (79, 27)])
+@pytest.mark.parametrize(("first", "second"), [(79, 27)])
 def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, second: int) -> None:
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))
@@ -140,19 +114,3 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, 
     level = ResolvedState(case, case.joint(omega, force), point)
     for each in (level, other):
         assert abs(each.response()[0] / exact("stiff spring", force, omega)[0] - 1.0) < 0.02
-
-
-def test_what_a_state_carries_into_the_terms_of_another_penalty() -> None:
-    omega, force = 0.85, 6.0
-    case = build_case(Cantilever(spring=200.0).model(), FRICTION, omega, SolverSettings(), Resolution((1, 3, 5), 64))
-    joint = case.joint(omega, force)
-    at = first_point(case, omega, force, np.zeros(1)).evaluation
-    marched = case.penalty.inertial
-    assert marched.tolist() == [True]
-    assert np.array_equal(carried_history(at, (1, 3, 5), marched, joint), at.history)
-    elastic = replace(joint, penalty=replace(joint.penalty, inertial=~marched))
-    carried = carried_history(at, (1, 3, 5), marched, elastic)
-    last = at.displacement_h[0, 1:] @ synthesis((1, 3, 5), np.array([2.0 * np.pi * 63 / 64]))
-    assert carried[0] == pytest.approx(last[:, 0], rel=1e-12)
-    back = carried_history(at, (1, 3, 5), ~marched, joint)
-    assert np.array_equal(back, at.displacement_h[:, 1:, 0])

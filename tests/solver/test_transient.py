@@ -14,7 +14,6 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.loading_history.sweep_start import find_origin
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
@@ -95,20 +94,6 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
     assert budget.iterations < 500
 
 
-def test_before_the_fold_the_mass_stays_where_it_is() -> None:
-    settings = SolverSettings(21, 256)
-    # with the penalty of the sweep that finds the start: what the motion is at the samples depends on it
-    penalty = 2.0 * np.pi * find_origin(scene("vibro_impact"), 1.4 / (2.0 * np.pi), "up").penalty
-    case = build_case(scene("vibro_impact"), 0.0, penalty, settings)
-    start, joint = upper_state(case, 1.4), case.joint(1.4, FORCE)
-    _, found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), Budget()
-    )
-    assert found is not None
-    size = np.abs(start.evaluation.displacement_h).max()
-    assert found.evaluation.displacement_h == pytest.approx(start.evaluation.displacement_h, abs=1e-6 * size)
-
-
 def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
     case = build_case(random_model(1, ("3d", "one_tangent")), 0.4, OMEGA, SolverSettings(3, 64, 1e-10))
     idle = np.zeros(2)
@@ -155,20 +140,6 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
         errors.append(abs(np.real(motion.displacement[:, 1] @ phases) - exact))
     assert errors[1] < 0.02 * abs(exact)
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
-
-
-@pytest.mark.slow
-def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> None:
-    case = build_case(scene("vibro_impact"), 0.0, 1.2, SolverSettings(5, 64))
-    start, joint = upper_state(case, 1.2), case.joint(1.2, FORCE)
-    unreachable = replace(case, settings=replace(case.settings, tolerance=0.0))
-    budget = Budget()
-    _, found = relax_to_periodic(
-        unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), budget
-    )
-    assert found is None
-    # steps are halved from one period to the shortest one
-    assert budget.iterations < 8 * CONTINUATION.near_iterations
 
 
 def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
