@@ -18,8 +18,6 @@ import studies
 import studyrunner
 from solver import FrequencyResponse, Outcome, SolverSettings, build_model, frequency_response, march_wear
 from studies import SceneError, build_scene, read_scene
-from studies.scene_file import write_scene
-from studies.scenes import sdof_slider
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studyrunner import Study, UserError, open_result, read_study, run, run_study
 from studyrunner.cli import main
@@ -224,16 +222,6 @@ def test_what_is_no_result_is_said_in_one_line(tmp_path: Path) -> None:
 # --- scenes ---
 
 
-def test_scenes_are_those_of_studies(tmp_path: Path) -> None:
-    model = build_scene("sdof_slider", normal_load=np.float64(12.0))
-    own = sdof_slider.build(sdof_slider.Parameters(normal_load=12.0), 1)
-    np.testing.assert_array_equal(model.linear[0].load_static, own.linear[0].load_static)
-    write_scene(model, tmp_path / "slider.h5")
-    read = read_scene(tmp_path / "slider.h5")
-    np.testing.assert_array_equal(read.linear[0].stiffness, model.linear[0].stiffness)
-    assert read.response_names == model.response_names
-
-
 def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path: Path) -> None:
     for name, parameters, message in (
         ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
@@ -310,14 +298,6 @@ def test_one_joint_gives_the_bits_of_a_study(result: xr.Dataset) -> None:
     for name in ("worn_volume", "wear_rate", "worn_volume_error", "residual"):
         np.testing.assert_array_equal(getattr(history, name), at[name])
     np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
-
-
-def test_wear_is_that_of_the_closed_form() -> None:
-    counts = np.linspace(0.0, 1e5, 5)
-    history = march_wear(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1.1e-11, counts)
-    exact = sdof_slider.exact_answer(sdof_slider.Parameters(), 160.0, 10.0, np.array([1.1e-11]), counts)
-    np.testing.assert_allclose(history.worn_volume, exact.worn_volume[0], rtol=1e-2)
-    assert history.outcome is Outcome.CONVERGED
 
 
 def test_a_point_that_fails_is_one_point() -> None:

@@ -108,14 +108,6 @@ def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega: fl
     assert end == pytest.approx(start, rel=1e-7)
 
 
-def test_vibro_impact_with_interference_oscillates_about_its_static_state() -> None:
-    # Wall pressed by 0.02 m; the force is too small to open it: k x + k_w (x + 0.02) = 0 in the mean.
-    orbit = vibro_impact_orbit(2.0, 0.1, 3.0, 0.05, 500.0, -0.02, 1.7, sweep_start=1.6)
-    assert phases(orbit) == {"closed"}
-    assert orbit.harmonic(0, 0).real == pytest.approx(-500 * 0.02 / 503, rel=1e-10)
-    assert abs(orbit.harmonic(0)) == pytest.approx(0.05 / abs(503 - 2 * 1.7**2 + 0.17j), rel=1e-10, abs=0)
-
-
 def test_wear_with_den_hartog_has_its_closed_solution() -> None:
     # X = A sqrt(1 - b^2 N^2) makes N' = -c N sqrt(1 - b^2 N^2): artanh(sqrt(1 - b^2 N^2)) grows linearly in cycles.
     mass, stiffness, force, friction = 0.1, 1.6e5, 10.0, 0.5

@@ -71,26 +71,6 @@ def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter:
     assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
 
 
-def test_input_work_is_that_of_the_load_on_the_full_motion() -> None:
-    model = random_model(11, KINDS)
-    linear = model.linear[0]
-    structure = build_structure(model, OMEGA, AMPLITUDE, (1, 3))
-    relative, _ = relative_indices(model.contact)
-    amplitude = np.random.default_rng(12).normal(size=(relative.size, 2)) @ np.array([1.0, 1.0j])
-    matrix = linear.stiffness + 1j * OMEGA * linear.damping - OMEGA**2 * linear.mass
-    moved = np.zeros(matrix.shape[0], complex)
-    moved[relative] = amplitude
-    inner = np.setdiff1d(np.arange(moved.size), relative)
-    load = AMPLITUDE * linear.load_harmonic
-    moved[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ moved)[inner])
-    phase = 2 * np.pi * np.arange(64) / 64
-    rate_t = np.real(1j * OMEGA * moved[:, None] * np.exp(1j * phase))
-    work = float((np.real(load[:, None] * np.exp(1j * phase)) * rate_t).sum() * 2 * np.pi / OMEGA / 64)
-    displacement_h = np.zeros((relative.size, 5))
-    displacement_h[:, 1], displacement_h[:, 2] = amplitude.real, -amplitude.imag
-    assert structure.input_work(displacement_h) == pytest.approx(work, rel=1e-10)
-
-
 def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
     # Two masses a sector, tied to each other and, unevenly, to the next sector; the ring is assembled directly, and
     # forces that travel with the wave act on the contact displacement 0 of every sector.

@@ -14,7 +14,7 @@ from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear import output as output_module
 from solver.wear.options import WEAR
-from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput, no_output
+from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput
 
 AREA = np.array([1.0, 3.0])
 LOOP = np.ones((1, 128, 3))
@@ -98,17 +98,6 @@ def test_steps_that_nothing_is_read_of_are_not_kept() -> None:
         assert np.array_equal(values, other[name]), name
     # the course is that of all steps
     assert output.taken.course.ends == whole.taken.course.ends == tuple(np.arange(10) * 10.0)
-
-
-def test_what_is_not_reached_is_nan_or_0() -> None:
-    found = taken([0.0, 30.0, 31.0]).read(np.array([0.0, 30.0, 31.0]))
-    nothing = no_output(3, 2, 1, 1)
-    assert found.keys() == nothing.keys()
-    for name, values in found.items():
-        assert values.dtype == nothing[name].dtype, name
-        assert values.shape == nothing[name].shape, name
-        assert np.isnan(values[2]).all() if values.dtype.kind in "fc" else not values[2], name
-        assert np.isfinite(values[:2]).all(), name
 
 
 @pytest.mark.parametrize("smooth", [False, True])

@@ -103,15 +103,6 @@ def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscil
     assert not followed.oscillate(10.0)
 
 
-@pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
-def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, oscillates: bool) -> None:
-    followed = WearRates.none(3)
-    for step in range(8):
-        pair = share * (1.0 + step % 2)
-        followed = followed.after(np.array([pair, 2.0, 2.0 + pair]))
-    assert followed.oscillate() is oscillates
-
-
 @settings(max_examples=200)
 @given(st.lists(st.sampled_from([0.0, 1.0, 1.0005, 1.5, 1.99, 2.0, 3.0, 1e4]), max_size=14), st.integers(0, 14))
 def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates: list[float], cut: int) -> None:

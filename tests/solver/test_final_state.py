@@ -39,7 +39,6 @@ CASES: dict[str, tuple[str, dict[str, float], float, float, float, float]] = {
     "sphere": ("sphere_on_flat", {"patches": 8}, 0.6, 20.0, 1.0, 1e-13),
     "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
     "constant load": ("sdof_slider", {"normal_stiffness": 0.0}, 0.5, 160.0, 10.0, 1.1e-11),
-    "at rest": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
     "some slip": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
     "beside resonance": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
 }
@@ -118,13 +117,6 @@ def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
     direct = found(case)
     limit = limit_depth(unworn(case)[0], direct.slip_range[-1] == 0.0)
     assert np.abs(direct.wear_depth[-1] - limit).max() < 1e-6 * limit.max()
-
-
-def test_a_joint_at_rest_is_in_its_final_state() -> None:
-    still = found("at rest")
-    assert still.final_method == "active_set"
-    assert not still.wear_depth[-1].any()
-    assert marched("at rest").worn_volume[-1] == 0.0
 
 
 @pytest.mark.slow

@@ -17,11 +17,10 @@ from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
-from solver.stability.floquet import find_instability, growing_exponents, multipliers_of
+from solver.stability.floquet import find_instability, multipliers_of
 from solver.stability.monodromy import build_monodromy, switching_pairs
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Case, Joint, build_case
-from tests import references
 from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 from tests.solver.random_orbits import Scene, drawn
@@ -197,29 +196,6 @@ def test_a_growing_vibration_is_no_result(
     history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SolverSettings())
     assert (history.outcome, history.message) == (start.outcome, start.message)
     assert np.isnan(history.response).all()
-
-
-@pytest.mark.slow
-def test_friction_bounds_a_vibration_with_little_negative_damping() -> None:
-    """The structure alone is unstable, the state is not: it is an exact periodic motion that attracts."""
-    model = driven(-0.02)
-    case, joint, at = state_at(model, 0.5, 20.0, 0.05)
-    linear = model.linear[0]
-    orbit = references.coulomb_orbit(
-        linear.mass, linear.damping, linear.stiffness, [20.0, 0.0], 1, 7.2, 2.0 * np.pi * 0.05
-    )
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-    assert np.abs(response) == pytest.approx([abs(orbit.harmonic(0)), abs(orbit.harmonic(1))], rel=2e-3)
-    assert growing_exponents(linear, np.ones(2, bool)).size > 0
-    assert find_instability(case, joint, at, Budget()) is None
-
-
-def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
-    start = start_of(driven(-0.5), 50.0, 20.0, 0.05, SolverSettings())
-    assert start.outcome is Outcome.UNSTABLE
-    # the first mass alone: x'' - 0.5 x' + 2 x = 0 for 20 s
-    assert f"{np.exp(0.25 * 20.0):.3g}" in start.message
-    assert "linear structure alone" in start.message
 
 
 def test_the_largest_multiplier_by_products_is_that_of_all() -> None:

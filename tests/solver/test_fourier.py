@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.structure.fourier import build_basis, change_orders, derivative, from_complex, to_complex
+from solver.structure.fourier import build_basis, change_orders, from_complex, to_complex
 
 OMEGA = 37.0
 
@@ -31,26 +31,10 @@ def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards() -> None:
     assert np.array_equal(values_h[:, 0], static)
 
 
-def test_derivative_multiplies_the_amplitude_of_harmonic_n_by_i_n_omega() -> None:
-    values_h = np.random.default_rng(1).normal(size=(2, 3, 9))
-    rate_h = derivative(values_h, OMEGA * np.arange(1, 5))
-    assert to_complex(rate_h) == pytest.approx(1j * OMEGA * np.arange(1, 5) * to_complex(values_h), abs=1e-12)
-    assert not rate_h[..., 0].any()
-
-
 @pytest.mark.parametrize(("orders", "samples"), [((1,), 2), ((1, 2, 3), 6), ((1, 3, 5), 10), ((7,), 4), ((), 0)])
 def test_samples_that_alias_are_refused(orders: tuple[int, ...], samples: int) -> None:
     with pytest.raises(ValueError, match="samples"):
         build_basis(orders, samples)
-
-
-def test_harmonics_above_the_basis_alias_only_from_samples_minus_harmonics_on() -> None:
-    basis = build_basis((1, 2, 3), 16)
-    phase = 2 * np.pi * np.arange(16) / 16
-    for order in range(4, 13):
-        assert np.cos(order * phase) @ basis.analysis == pytest.approx(np.zeros(7), abs=1e-14)
-    # the error of a truncated series: harmonic N - 3 comes back as harmonic 3
-    assert (np.cos(13 * phase) @ basis.analysis)[5] == pytest.approx(1.0, abs=1e-14)
 
 
 @given(orders=st.sets(st.integers(1, 30), max_size=8), extra=st.integers(1, 20), seed=st.integers(0, 2**31))

@@ -209,16 +209,6 @@ def test_the_plane_is_that_of_a_plain_twin_with_tiny_steps(seed: int) -> None:
 # -------------------------------------------------------------------------------------------------------------- limits
 
 
-def test_a_period_is_marched_until_its_velocity_repeats() -> None:
-    case = mass_case(12, 3)
-    _, velocity_t, place_t, status_t, _, error = run_masses(case, case.predicted_h)
-    assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
-    largest = np.abs(velocity_t).max(axis=(1, 2))
-    assert (np.abs(velocity_t[:, :, -1] - velocity_t[:, :, 0]).max(axis=1) <= 1e-11 * largest).all()
-    assert (error <= 1e-9 * np.abs(case.predicted_h).max()).all()
-    assert not place_t[:, :, 0].any()
-
-
 def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
     case = mass_case(6, 5)
     held = case.predicted_h.copy()
@@ -229,34 +219,6 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
     for exactly_zero in (velocity_t, place_t, slip_work, error):
         assert not exactly_zero.any()
     assert force_t == pytest.approx(case.predicted_t(held), rel=1e-14)
-
-
-@pytest.mark.parametrize("how", ["open", "frictionless"])
-def test_without_a_friction_force_the_motion_is_linear(how: str) -> None:
-    case = mass_case(6, 6)
-    free_h = case.predicted_h.copy()
-    if how == "open":
-        free_h[:, 0] = 0.0
-        free_h[:, 0, 0] = -5.0
-    else:
-        free_h[:, 0] = 0.0
-    force_t, velocity_t, _, status_t, slip_work, _ = run_masses(case, free_h)
-    assert (status_t == SEPARATED).all()
-    assert not slip_work.any()
-    assert not force_t.any()
-    # the trapezoidal rule harmonic by harmonic, in the plane in parts of the step under a force constant over it
-    amplitude = to_complex(free_h[:, 1:] * case.step_share)
-    angle = np.pi * np.array(case.basis.orders) / case.basis.n_samples
-    mass, drag = case.mass[:, None, None], case.drag[:, None, None]
-    velocity = amplitude / (2j * mass * np.sin(angle) / case.step + drag * np.cos(angle))
-    # the velocity after step n is half a step behind its sample
-    phase = 2.0 * np.pi * (np.arange(case.basis.n_samples) + 0.5) / case.basis.n_samples
-    turning = np.exp(1j * np.array(case.basis.orders)[:, None] * phase)
-    expected = free_h[:, 1:, 0, None] / drag + np.real(velocity @ turning)
-    straight = case.line >= 0
-    assert velocity_t[straight][:, :, 1:] == pytest.approx(expected[straight], abs=1e-11 * np.abs(expected).max())
-    # (drag dt / m)^2 / 12 over the parts is all that sets the two apart
-    assert velocity_t[:, :, 1:] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
 # ---------------------------------------------------------------------------------------------------------- derivative

@@ -177,26 +177,6 @@ def test_tangents_are_those_of_central_differences(seed: int) -> None:
     assert wear_size > 1.0
 
 
-@pytest.mark.parametrize("line", [0, 1])
-def test_a_pair_with_one_tangent_has_the_tangent_of_one_with_two_that_moves_along_it(line: int) -> None:
-    m = BASIS.synthesis.shape[0]
-    case = kernel_case(4, BASIS.n_samples, seed=10)
-    predicted_t, start = case.predicted_t.copy(), case.start.copy()
-    predicted_t[:, 2 - line] = start[:, 1 - line] = 0.0
-    _, state_t, status_t, periods, _ = march_period(predicted_t, friction_of(predicted_t), start, 1e-12, PERIODS)
-    assert len(np.unique(status_t)) == 3
-    arguments = (predicted_t, friction_of(predicted_t), start, state_t, periods)
-    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
-    two, two_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, both_tangents(4), *rest))
-    one, one_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, np.full(4, line), *rest))
-    there = np.array([0, 1 + line])
-    rows = slice((1 + line) * m, (2 + line) * m)
-    assert one[:, rows][:, :, there] == pytest.approx(two[:, rows][:, :, there], abs=1e-12)
-    assert one_wear[:, :, there] == pytest.approx(two_wear[:, :, there], abs=1e-12)
-    missing = one.reshape(4, 3 * m, 3 * m)[:, (2 - line) * m : (3 - line) * m]
-    assert np.array_equal(missing, np.broadcast_to(np.eye(3 * m)[(2 - line) * m : (3 - line) * m], missing.shape))
-
-
 def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
     """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
     case = kernel_case(n_contact, BASIS.n_samples, seed=seed)

@@ -12,7 +12,7 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
 from solver.settings import Scheme, SolverSettings
-from tests.solver.models import branch_states, march_wear, random_model, scene
+from tests.solver.models import branch_states, march_wear, scene
 
 FRICTION = 0.5
 AREA = 1e-4
@@ -148,20 +148,3 @@ def test_between_steps_loops_are_interpolated_like_all_else(scheme: Scheme) -> N
         assert inner[[0, 2, 4]] == pytest.approx(whole, rel=0.0, abs=1e-14 * scale)
         assert inner[1] == pytest.approx(0.75 * whole[0] + 0.25 * whole[1], rel=0.0, abs=1e-12 * scale)
         assert inner[3] == pytest.approx(0.25 * whole[1] + 0.75 * whole[2], rel=0.0, abs=1e-12 * scale)
-
-
-def test_what_a_pair_does_not_have_is_zero() -> None:
-    model = random_model(1, ("3d", "one_tangent", "second_tangent", "normal_only", "constant_load"))
-    settings = SolverSettings(3, 64)
-    (start,) = branch_states(model, 0.3, 100.0, [300.0], settings)
-    history = march_wear(
-        model, 0.3, start, 0.0, 1.0, "implicit", np.array([0.0]), settings, loops=tuple(range(model.contact.n_contact))
-    )
-    motion, force = history.loop_displacement[0], history.loop_force[0]
-    missing = model.contact.dofs < 0
-    for pair, component in np.argwhere(missing):
-        assert not motion[pair, :, component].any()
-        constant = model.contact.normal_load[pair] if component == 0 else 0.0
-        assert np.array_equal(force[pair, :, component], np.full(LOOP_PHASES, constant))
-    for pair, component in np.argwhere(~missing):
-        assert np.ptp(motion[pair, :, component]) > 0.0 or np.ptp(force[pair, :, component]) > 0.0

@@ -89,13 +89,3 @@ def test_history_is_handed_on_or_kept() -> None:
             assert not np.array_equal(point.history, start.history)
             balance = balance_at(80.0, point.evaluation.history)
             assert np.array_equal(point.history, final_history(balance, point.evaluation))
-
-
-def test_the_history_is_the_corrected_slip_at_the_end_of_the_period() -> None:
-    model = random_model(2, ("3d", "constant_load"))
-    case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
-    joint = case.joint(OMEGA, 60.0)
-    balance = Balance.frozen(joint, np.full((2, 2), 1e-6), np.zeros(2))
-    at = balance.evaluate(np.random.default_rng(3).normal(size=(joint.component_index.size, 7)) * 100.0)
-    expected = at.state_t[:, :, -1] / joint.penalty.tangential[:, None]
-    assert final_history(balance, at) == pytest.approx(expected, rel=1e-15, abs=0.0)

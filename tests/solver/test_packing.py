@@ -140,17 +140,6 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-def test_a_start_state_comes_back() -> None:
-    (start,) = branch_states(dovetail(3), 0.5, 0.5, [2 * np.pi * 212.0], SolverSettings(3, 64))
-    found = unpack(pack(start))
-    assert_same(replace(found, state=None, coarse=None), replace(start, state=None, coarse=None))
-    assert_same(found.state, start.state)
-    assert_same(found.coarse, start.coarse)
-    failed = replace(start, state=None, coarse=None, outcome=Outcome.BRANCH_LOST)
-    assert_same(unpack(pack(failed)), failed)
-
-
-@pytest.mark.slow
 def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers() -> None:
     model, frequencies = scene("vibro_impact"), np.array([0.2, 0.255])
     kept: list[tuple[frozenset[int], Packed]] = []

@@ -48,18 +48,6 @@ def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_ha
     assert (penalty.normal > largest * 1e-3).all()
 
 
-@pytest.mark.parametrize(("name", "mass"), [("sdof_slider", 0.1), ("two_masses", 1.0)])
-@pytest.mark.parametrize("highest", [1, 5, 21])
-def test_the_mass_of_a_slider_is_its_own(name: str, mass: float, highest: int) -> None:
-    omega = {"sdof_slider": 2 * np.pi * 160, "two_masses": 0.5}[name]
-    penalty = build_penalty(scene(name), omega, highest)
-    # seen through the spring to the other mass: of the order (w_0 / s)^4 for two masses, exact for one
-    rate = (highest + 1) * omega
-    slack = 1e-12 if name == "sdof_slider" else 4.0 / rate**4 + 1e-12
-    assert penalty.mass == pytest.approx([mass], rel=slack, abs=0.0)
-    assert penalty.drag == pytest.approx(0.1 * penalty.mass * omega, rel=1e-12, abs=0.0)
-
-
 @pytest.mark.parametrize("orders", [(1, 2, 3), (1, 3, 5), (1,)])
 @pytest.mark.parametrize("free", [[], [0, 2], [0, 1, 2]])
 def test_motion_and_surplus_of_a_joint_are_inverse(free: list[int], orders: tuple[int, ...]) -> None:

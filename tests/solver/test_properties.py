@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from random import Random
 
 import numpy as np
 import pytest
@@ -192,32 +191,6 @@ def test_loads_gaps_and_motion_scale_together(seed: int, scale: float) -> None:
     )
     assert residual <= 2.0 * SETTINGS.tolerance
     assert np.abs(other.slip_work - scale**2 * at.slip_work).max() <= 1e-6 * scale**2 * at.slip_work.max()
-
-
-@profile
-@given(seeds, st.randoms(use_true_random=False))
-def test_the_order_of_the_pairs_means_nothing(seed: int, random: Random) -> None:
-    scene, _, at = state(seed)
-    contact = scene.model.contact
-    order = np.arange(contact.n_contact)
-    random.shuffle(order)
-    permuted = replace(
-        contact,
-        dofs=contact.dofs[order],
-        area=contact.area[order],
-        gap=contact.gap[order],
-        normal_load=contact.normal_load[order],
-    )
-    moved = replace(
-        at,
-        displacement_h=at.displacement_h[order],
-        force_h=at.force_h[order],
-        history=at.history[order],
-        wear_depth=at.wear_depth[order],
-    )
-    residual, other = residual_of(replace(scene.model, contact=permuted), scene, moved)
-    assert residual <= 2.0 * SETTINGS.tolerance
-    assert np.abs(other.slip_work - at.slip_work[order]).max() <= 1e-6 * at.slip_work.max()
 
 
 @profile

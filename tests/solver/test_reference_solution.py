@@ -197,15 +197,6 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing() -> None:
     assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.history_safety])
 
 
-def test_a_volume_is_known_no_better_than_the_wear_rates_of_the_start_state() -> None:
-    other = read(DEPTH, rate=((1.3, 0.9), (1.0, 1.0), (1.0, 1.0)))
-    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "adaptive")
-    # pair by pair, though later states are the same
-    assert (found.worn_volume[1:] >= 0.5 / 3.0).all()
-    # the state itself is known by states with more harmonics
-    assert found.wear_rate == pytest.approx([0.0, 0.0, 0.0])
-
-
 def test_what_nothing_confirms_is_not_known() -> None:
     lost = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]])
     found = history_error(COUNTS, read(DEPTH), lost, NOWHERE, AREA, "explicit")
@@ -220,10 +211,3 @@ def test_what_nothing_confirms_is_not_known() -> None:
     still = history_error(COUNTS, read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), NOWHERE, AREA, "explicit")
     assert not still.worn_volume.any()
     assert not still.wear_depth.any()
-
-
-def test_response_and_wear_rate_are_known_no_better_than_the_reference_solution_says() -> None:
-    other = read(DEPTH, 1.25 * np.ones((3, 2)), response_peak=[[1.0], [1.5], [1.0]], response=[[1.0], [1.0], [1.0j]])
-    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "implicit")
-    assert found.response == pytest.approx([1e-3, 0.5, np.sqrt(2.0)])
-    assert found.wear_rate == pytest.approx([0.0, 0.25, 0.25])

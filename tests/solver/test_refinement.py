@@ -112,29 +112,6 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
     )
 
 
-def test_fixed_settings_return_only_an_estimate() -> None:
-    case, point = slider(SolverSettings(3, 64))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
-    assert refined.case is case
-    assert refined.point is point
-    assert refined.accurate
-    assert 1e-4 < refined.estimate.response < 0.1
-    assert 1e-4 < refined.estimate.wear_rate < 0.1
-
-
-@pytest.mark.parametrize("settings", [SolverSettings(harmonics=9, rtol=1e-3), SolverSettings(samples=256, rtol=1e-3)])
-def test_what_the_settings_fix_is_not_changed(settings: SolverSettings) -> None:
-    case, point = slider(settings)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
-    if settings.harmonics != "auto":
-        assert refined.case.resolution.orders == all_orders(9)
-        assert refined.case.resolution.samples >= case.resolution.samples
-    else:
-        assert refined.case.resolution.samples == 256
-        assert refined.case.resolution.highest > case.resolution.highest
-    assert refined.accurate == (refined.estimate.largest <= 1e-3)
-
-
 @pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("few_pairs_unknowns", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     name: str, most: int, monkeypatch: pytest.MonkeyPatch

@@ -64,17 +64,6 @@ def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
     assert 0.5 * max(error, peak_error) < start.response_error <= rtol
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
-@pytest.mark.parametrize("ratio", [0.62, 0.9])
-def test_the_peak_of_den_hartogs_slider(ratio: float, rtol: float) -> None:
-    model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(rtol=rtol)
-    (start,) = branch_states(model, 0.5, 10.0, [ratio * NATURAL], settings)
-    largest = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, ratio * NATURAL)
-    error = abs(reported(model, 0.5, start, settings)[1] / largest - 1.0)
-    assert error < rtol
-    assert 0.5 * error < start.response_error <= rtol
-
-
 def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
     # the spring of 200 N/m and the tip's 0.05 kg are in resonance at 63 rad/s
     sprung, rigid = Cantilever(spring=200.0).model(), Cantilever().model()

@@ -50,18 +50,6 @@ def test_a_sweep_up_stays_on_the_branch_with_impacts() -> None:
 
 
 @pytest.mark.slow
-def test_a_sweep_down_falls_on_the_branch_with_impacts_where_the_other_one_ends() -> None:
-    # without the wall the mass reaches it at 1.0935 rad/s
-    starts = branch_states(scene("vibro_impact"), 0.0, 0.02, [1.05, 1.15], SolverSettings(9, 128), "down")
-    assert starts[0].state is not None
-    rising, _ = branch_states(scene("vibro_impact"), 0.0, 0.02, [1.05, 1.15], SolverSettings(9, 128), "up")
-    assert rising.state is not None
-    assert np.abs(rising.state.contact_force_h).max() > 1e-3
-    expected = first_harmonic("vibro_impact", rising.state)[1]
-    assert first_harmonic("vibro_impact", starts[0].state)[1] == pytest.approx(expected, rel=1e-6, abs=0.0)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.5])
 def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: float) -> None:
     # both branches exist from 1.0919 to 1.5576 rad/s

@@ -156,11 +156,6 @@ def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds: str, seed
         assert np.array_equal(at.status_t[pair], expected)
 
 
-def test_the_random_states_stick_slip_and_open() -> None:
-    seen = {int(s) for kinds in KINDS for seed in (1, 2) for s in periodic(kinds, seed)[1].evaluation.status_t.ravel()}
-    assert seen == {0, 1, 2}
-
-
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     joint, point, state = periodic(kinds, 1)
@@ -185,18 +180,6 @@ def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
         pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
         assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
     assert np.array_equal(report.wear_depth, state.wear_depth)
-
-
-def test_without_excitation_the_periodic_state_is_the_static_one() -> None:
-    case = case_of("mixed", 3)
-    idle = np.zeros(6)
-    point = first_point(case, OMEGA, 0.0, idle)
-    still = static_point(case, idle).evaluation
-    size = np.abs(still.force_h).max()
-    assert point.evaluation.force_h[:, :, 1:] == pytest.approx(
-        0.0 * point.evaluation.force_h[:, :, 1:], abs=1e-8 * size
-    )
-    assert point.evaluation.force_h[:, :, 0] == pytest.approx(still.force_h[:, :, 0], abs=1e-8 * size)
 
 
 def test_a_structure_that_only_friction_holds_slides_until_its_weak_springs_carry_the_rest() -> None:

@@ -84,11 +84,3 @@ def test_the_step_that_is_advised_is_none_too_long() -> None:
     assert 1e-4 < advised < 1e-2
     outcome, _, message = last_volume(1.1e-5, "explicit", advised, 20.0 * advised * np.array([0.0, 1.0]))
     assert outcome is Outcome.CONVERGED, message
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
-def test_usual_steps_are_none_too_long(scheme: Scheme) -> None:
-    outcome, volume, _ = last_volume(1.1e-11, scheme, 2000.0, np.array([0.0, 2e4]))
-    assert outcome is Outcome.CONVERGED
-    assert volume > 1e-11

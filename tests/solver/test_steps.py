@@ -67,14 +67,6 @@ def test_a_given_step_follows_its_own_equation(scheme: Scheme) -> None:
     assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_last_given_step_is_shortened_and_a_remainder_of_round_off_is_none() -> None:
-    states, steps = steps_of(GivenSteps("implicit", 3000.0, 7000.0), 3)
-    assert counts(states).tolist() == [0.0, 3000.0, 6000.0, 7000.0]
-    assert [step.length for step in steps] == [3000.0, 3000.0, 1000.0]
-    almost = 6000.0 * (1.0 + 1e-13)
-    assert steps_of(GivenSteps("implicit", 3000.0, almost), 2)[0][-1].cycle == almost
-
-
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth() -> None:
     # Eq. (22): one pair, so each step wears just that depth
     states, _ = steps_of(GivenSteps("explicit", 1.0, END, 2e-6), 4)

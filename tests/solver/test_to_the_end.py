@@ -56,16 +56,6 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> N
     assert (np.diff(found.cycles) > 0.0).all()
 
 
-def test_straight_lines_between_the_outputs_are_the_history() -> None:
-    """Neither the burst of wear nor the long calm behind it falls between two outputs."""
-    few, many = worn(ToTheEnd(11)), worn(ToTheEnd(201))
-    whole = many.worn_volume[-1]
-    between = np.interp(many.cycles, few.cycles, few.worn_volume)
-    assert np.abs(between - many.worn_volume).max() < 0.02 * whole
-    assert np.diff(few.cycles).max() < 0.21 * few.cycles[-1]
-    assert np.diff(few.worn_volume).max() < 0.21 * whole
-
-
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
 def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR, iterations_per_save=30))

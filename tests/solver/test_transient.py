@@ -23,7 +23,7 @@ from solver.settings import SolverSettings
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, build_case
 from tests.references import coulomb_orbit, slider_orbit
-from tests.solver.models import OMEGA, converged_state, first_point, random_model, scene
+from tests.solver.models import converged_state, first_point, scene
 from tests.solver.reconstruction import full_motion
 
 FORCE = 0.02
@@ -92,23 +92,6 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
     assert budget.iterations < 500
-
-
-def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
-    case = build_case(random_model(1, ("3d", "one_tangent")), 0.4, OMEGA, SolverSettings(3, 64, 1e-10))
-    idle = np.zeros(2)
-    point = first_point(case, OMEGA, 60.0, idle)
-    joint = case.joint(OMEGA, 60.0)
-    transient = Transient(case, joint)
-    motion = transient.periodic(point.evaluation)
-    for inverse in (1e-6 * OMEGA, 0.01 * OMEGA, OMEGA):
-        stepped = Balance.frozen(transient.step(motion, inverse), point.evaluation.history, idle)
-        at = stepped.evaluate(point.evaluation.predicted_h)
-        assert at.scaled_residual() < 1e-9
-        after = transient.after(at, motion, inverse)
-        size = np.abs(motion.displacement).max()
-        assert after.displacement == pytest.approx(motion.displacement, abs=1e-8 * size)
-        assert after.velocity == pytest.approx(motion.velocity, abs=1e-8 * np.abs(motion.velocity).max())
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ import pytest
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings, first_resolution
-from solver.structure.joint import build_case
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
@@ -168,18 +167,3 @@ def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
         one, other = getattr(slow, name), getattr(fast, name)
         assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
     assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9, abs=0.0)
-
-
-def test_a_history_starts_from_the_state_it_is_given() -> None:
-    model, start = slider_start(COARSE)
-    state = start.state
-    assert state is not None
-    history = march(1000.0, "implicit", np.array([0.0, 1.0]))
-    response_h = (
-        build_case(model, FRICTION, start.penalty_omega, COARSE)
-        .joint(OMEGA, FORCE)
-        .structure.response_h(state.displacement_h[0, :2])
-    )
-    assert history.response[0] == pytest.approx(response_h[:, 1] - 1j * response_h[:, 2], rel=1e-12, abs=0.0)
-    assert history.newton_iterations >= start.newton_iterations
-    assert history.run_time >= start.run_time

@@ -16,7 +16,6 @@ from tests.studies.static_contact import solve_static_contact
 
 # Glued, nodal diameter 0, Hz: 20-node elements without, 8-node ones with the effects of 3000 rpm.
 AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])
-TURNING = np.array([210.65, 394.3, 808.0, 1296.0])
 N_PAIRS = 48
 N_RELATIVE = 3 * N_PAIRS
 
@@ -40,18 +39,6 @@ def test_frequencies_of_the_glued_sector_at_rest(at_rest):
     assert np.abs(frequencies(at_rest.linear[0])[:6] / AT_REST - 1.0).max() < 0.03
 
 
-@pytest.mark.slow
-def test_frequencies_of_the_glued_turning_sector(default):
-    assert np.abs(frequencies(default.linear[0])[:3] / TURNING[:3] - 1.0).max() < 0.02
-
-
-def test_a_coarse_mesh_has_fewer_pairs():
-    coarse = build(Parameters(mesh=1), 0)
-    assert coarse.contact.n_contact == 2 * 4 * 2
-    assert coarse.linear[0].mass.shape == (3 * 16 + 20,) * 2
-    assert coarse.contact.area.sum() == pytest.approx(560e-6)
-
-
 def test_contact_pairs(default):
     contact = default.contact
     assert np.array_equal(contact.dofs, np.arange(N_RELATIVE).reshape(N_PAIRS, 3))
@@ -64,13 +51,6 @@ def test_contact_pairs(default):
     assert np.all(np.diff(intrados[..., 2], axis=0) > 0.0)
     assert np.all(np.diff(intrados[..., 0], axis=1) > 0.0)
     assert intrados[:, -1, 0] == pytest.approx(0.245)
-
-
-def test_frames_close_outwards_and_mirror_each_other():
-    frames = define_sector(Parameters())[1].pairs.frames
-    half = np.sqrt(0.5)
-    assert np.allclose(frames[:24], [[half, half, 0.0], [0.0, 0.0, 1.0], [half, -half, 0.0]], atol=1e-9)
-    assert np.allclose(frames[24:], frames[:24] * [1.0, -1.0, 1.0], atol=1e-9)
 
 
 def blade_alone(parameters):

@@ -26,7 +26,7 @@ from studies.scenes.closed_forms.hertz import (
     point_worn_depth,
 )
 from studies.scenes.half_space.influence import composite_modulus, patch_compliance, strip_compliance
-from tests.studies.half_space_twin import compliances, limit_depth, pressed
+from tests.studies.half_space_twin import limit_depth, pressed
 
 MU, E, NU = 0.6, 200e9, 0.3
 MODULUS = composite_modulus(E, NU)
@@ -183,21 +183,6 @@ def test_the_limit_state_of_strips_is_that_of_the_half_plane() -> None:
         assert max(np.abs(errors)) < 0.01
 
 
-def test_the_limit_state_of_patches_is_that_of_the_half_space() -> None:
-    for share, patches in ((0.5, 12), (0.5, 20), (0.8, 12), (0.8, 20)):
-        c = point_stick_radius(A_POINT, share)
-        r = np.linspace(c, 2.5 * A_POINT, 40001)
-        exact = point_worn_depth(r, POINT["R"], A_POINT, c)
-        model = build_scene("sphere_on_flat", patches=patches, Q=share * MU * POINT["P"])
-        sticks, _ = pressed(model, (1.0 - share) * POINT["P"])
-        depth = limit_depth(model, sticks > 0.0)
-        assert depth.max() == pytest.approx(exact.max(), rel=0.04 if patches == 12 else 0.03)
-        volume = float(np.trapezoid(2.0 * np.pi * r * exact, r))
-        assert depth @ model.contact.area == pytest.approx(volume, rel=0.03 if patches == 12 else 0.01)
-        # nothing wears at the edge of the patches
-        assert not depth[np.linalg.norm(model.contact.position, axis=1) > 0.95 * model.contact.position.max()].any()
-
-
 def test_the_closed_forms_have_their_published_values() -> None:
     for ratio, edge, deepest, area in (
         (0.9, 1.0524, 0.0429, 0.0045),
@@ -217,18 +202,6 @@ def test_the_closed_forms_have_their_published_values() -> None:
         assert r[depth > 0.0].max() == pytest.approx(edge, abs=6e-5)
         assert np.trapezoid(2.0 * np.pi * r * depth, r) * 0.5 == pytest.approx(volume, abs=6e-5)
     assert not line_worn_depth(np.array([0.0, 0.5]), 0.5, 1.0, 0.7).any()
-
-
-@pytest.mark.slow
-def test_a_stroke_that_slides_moves_every_pair_by_what_the_bodies_leave_of_it() -> None:
-    stroke = 5e-6
-    model, history = worn("cylinder_on_flat", 0.0, 15, 1e-2, strips=24, stroke=stroke)
-    force, _ = pressed(model, LINE["P"] * 0.01)
-    bent = compliances(model)[1] @ (MU * force)
-    touching = force > 0.0
-    assert history.slip_range[0][touching] == pytest.approx(2.0 * (stroke - bent[touching]), rel=1e-2)
-    # Archard's volume does not depend on where it slips
-    assert history.wear_rate[0] == pytest.approx(1e-13 * 4.0 * force @ (stroke - bent), rel=1e-2)
 
 
 def test_the_frequency_has_no_influence() -> None:

@@ -78,13 +78,6 @@ def test_a_constant_force_wears_at_a_constant_rate():
     assert np.ptp(found.response_amplitude) == 0.0
 
 
-def test_all_that_the_spring_presses_is_worn_away_in_the_end():
-    found = answer(wear=np.array([1e-3]), cycles=np.array([0.0, 1e5, 1e9]))
-    assert found.worn_volume[0] == pytest.approx([0.0, 1e-8, 1e-8], rel=1e-12, abs=0.0)
-    free = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
-    assert found.response_amplitude[0, 1:, 0] == pytest.approx([free, free], rel=1e-9, abs=0.0)
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -101,13 +94,6 @@ def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
     assert found.response_amplitude.shape == (3, 4, 1)
     assert np.isnan(found.worn_volume).all()
     assert np.isnan(found.response_amplitude).all()
-
-
-def test_without_friction_the_response_is_that_of_the_spring():
-    found = answer(friction_coefficient=0.0)
-    amplitude = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
-    assert found.response_amplitude == pytest.approx(np.full((3, 4, 1), amplitude), rel=1e-12, abs=0.0)
-    assert found.worn_volume[0, 1] > 0.0
 
 
 def test_the_mesh_is_the_skin_of_blade_and_disk():
@@ -134,14 +120,6 @@ def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector(
     assert whole.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
     assert own.nodal_diameters == tuple(model.linear) == (0, 4)
     assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)
-
-
-def test_the_frequencies_of_a_small_model():
-    model = build_scene("two_masses", scene_parameters("two_masses")(stiffness_1=3.0, mass_1=2.0), 1)
-    found = stuck_frequencies(model)
-    assert found.nodal_diameters == (0,)
-    assert found.frequencies[0, 0] == pytest.approx(np.sqrt(4.0 / 2.0) / (2 * np.pi), rel=1e-12, abs=0.0)
-    assert np.isnan(found.frequencies[0, 1:]).all()
 
 
 def chain(mass: np.ndarray, stiffness: np.ndarray) -> ReducedModel:

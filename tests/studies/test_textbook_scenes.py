@@ -94,16 +94,6 @@ def test_listing_the_scenes_imports_nothing_heavy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_the_slider_can_be_pressed_by_a_constant_force() -> None:
-    model = build("sdof_slider", normal_stiffness=0.0, mass=2.0, damping=3.0, stiffness=4.0, normal_load=5.0)
-    linear = model.linear[0]
-    assert [linear.mass.tolist(), linear.damping.tolist(), linear.stiffness.tolist()] == [[[2.0]], [[3.0]], [[4.0]]]
-    assert model.contact.dofs.tolist() == [[-1, 0, -1]]
-    assert model.contact.normal_load.tolist() == [5.0]
-    assert linear.load_static.tolist() == [0.0]
-    check_model(model)
-
-
 def test_the_slider_on_a_spring_has_the_normal_force_of_the_wear_equation() -> None:
     model = build("sdof_slider", normal_load=8.0, normal_stiffness=2e4)
     linear, depth = model.linear[0], 1e-4

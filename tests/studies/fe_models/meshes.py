@@ -83,7 +83,6 @@ $EndElements
 
 # corners of elements of SOLID185 as ANSYS collapses them: a brick, a wedge and a tetrahedron
 BRICKS = {1: (1, 2, 3, 4, 5, 6, 7, 8), 2: (5, 6, 7, 7, 9, 10, 11, 11), 3: (9, 10, 11, 11, 12, 12, 12, 12)}
-PYRAMID = (5, 6, 7, 8, 9, 9, 9, 9)
 
 
 def write_cdb(folder: Path, elements: dict[int, tuple[int, ...]] = BRICKS, turned: float = 0.0) -> Path:

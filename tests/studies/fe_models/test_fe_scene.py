@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 from scipy import linalg, sparse
 
-from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.assembly import (
     assemble_mass,
     assemble_stiffness,
-    assemble_tangent_stiffness,
-    centrifugal_load,
     spin_softening,
 )
 from studies.finite_element.elements.solid_mesh import Rotation
@@ -29,12 +26,12 @@ from studies.finite_element.joint_model import (
     Retainer,
     SetMotion,
 )
-from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scenes import dovetail_sector
 from studies.scenes.dovetail_sector import Parameters
-from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z, faces_where, wedge_shape
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
 
@@ -142,37 +139,6 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
     assert np.array_equal(present, np.arange(len(present)))
     assert (contact.dofs[:, 0] >= 0).all()
     check_model(scene.model)
-
-
-def test_prestress_is_that_of_the_glued_sector():
-    sector = Sector("C3D10", "C3D10", (1, 2, 2), (1, 2, 1))
-    joint = sector.joint()
-    prepared = prepare_model(sector.model(), joint)
-    stiffness, mass = assemble_stiffness(sector.mesh), assemble_mass(sector.mesh)
-    rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
-    load = centrifugal_load(mass, sector.mesh.coordinates, rotation)
-    forms = {"stiffness": stiffness, "mass": mass}
-    n_nodes = sector.mesh.n_nodes
-    pairs = prepared.pairs
-    rows = [
-        [(moving, np.eye(3)), *((node, -weights[node] * np.eye(3)) for node in np.flatnonzero(weights))]
-        for moving, weights in zip(pairs.moving, pairs.opposite.toarray(), strict=True)
-    ]
-    images = zip(joint.cut.left, joint.cut.right, strict=True)
-    cut = [[(right, np.eye(3)), (left, -joint.cut.rotation)] for left, right in images]
-    held = np.eye(3 * n_nodes)[joint.held.ravel()]
-    free = linalg.null_space(np.concatenate([node_blocks(n_nodes, rows + cut).real, held]))
-    glued = free @ np.linalg.solve(free.T @ (stiffness @ free), free.T @ load)
-    expected = assemble_tangent_stiffness(sector.mesh, glued) + spin_softening(mass, rotation)
-    own = prepared.reduction.forms["stiffness"]
-    assert np.abs(own - expected).max() < 1e-10 * np.abs(expected).max()
-    assert prepared.at_rest is not None
-    told = natural_frequencies(prepared)
-    assert told.nodal_diameters == tuple(range(N_SECTORS // 2 + 1))
-    own_first = prepared.reduction.reduce(2, 3, load[:, None]).frequencies / (2.0 * np.pi)
-    assert np.allclose(told.frequencies[2, :3], own_first, rtol=1e-9)
-    assert np.allclose(prepared.at_rest.solve_static(load), glued, rtol=0.0, atol=1e-9 * np.abs(glued).max())
-    assert forms.keys() <= prepared.reduction.forms.keys()
 
 
 def as_foreign_model(parameters):
@@ -313,29 +279,6 @@ def test_matrices_with_nodes_that_have_no_place():
     assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
     assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
     assert np.isfinite(ours.model.linear[0].load_static).all()
-
-
-def test_matrices_are_put_in_the_order_of_the_nodes():
-    model, _ = plates()
-    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    n = model.mesh.n_nodes
-    rows = np.random.default_rng(5).permutation(3 * n)
-    left_out = rows == 17
-    rows = rows[~left_out]
-    # and a node that the mesh does not have
-    more = sparse.block_diag([stiffness[rows][:, rows], sparse.eye(3)], format="csr")
-    node = np.append(model.numbers[rows // 3], [-4, -4, -4])
-    direction = np.append(rows % 3, [2, 0, 1])
-    heavy = sparse.block_diag([mass[rows][:, rows], sparse.diags([1.0, 2.0, 3.0])], format="csr")
-    ordered = order_by_nodes(more, heavy, node, direction, model.numbers, model.coordinates)
-    assert np.array_equal(np.argwhere(ordered.missing), [[17 // 3, 17 % 3]])
-    assert ordered.numbers[-1] == -4
-    assert np.isnan(ordered.coordinates[-1]).all()
-    kept = np.setdiff1d(np.arange(3 * n), [17])
-    assert np.abs(ordered.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
-    assert np.array_equal(ordered.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
-    with pytest.raises(SceneError, match=r"displacement 2 of node -4 has more than one row"):
-        order_by_nodes(more, heavy, node, np.append(rows % 3, [1, 1, 0]), model.numbers, model.coordinates)
 
 
 @pytest.mark.parametrize("small", [0, 900])

@@ -16,7 +16,6 @@ from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import (
     chain,
-    entries,
     needs_ccx,
     run_ccx,
     write_abaqus,
@@ -175,12 +174,3 @@ def test_large_fields_are_read_in_arrays(tmp_path, monkeypatch):
         job.with_suffix(".pch").write_text(text[:last] + new + text[last + len(old) :])
         with pytest.raises(SceneError, match=r"job.pch: (line \d+ |\d entries are given twice)"):
             read_matrices(job)
-
-
-def test_many_entries_are_read_in_parts(tmp_path, monkeypatch):
-    job = write_calculix(tmp_path)
-    monkeypatch.setattr("studies.fe_models.matrices.columns._ROWS_AT_ONCE", 7)
-    monkeypatch.setattr("studies.fe_models.matrices.nastran._AT_ONCE", 7)
-    assert len(entries(chain()[0])) > 14
-    check(read_matrices(job), (1, 2, 10), 1e-13)
-    check(read_matrices(write_nastran(tmp_path, "other")), (1, 2, 10), 1e-9)
