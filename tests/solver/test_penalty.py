@@ -1,4 +1,4 @@
-"""Which formulation the scene leads to, and that units do not matter."""
+"""Which formulation the scene leads to, and the motion that belongs to a force in each of them."""
 
 from __future__ import annotations
 

@@ -60,12 +60,6 @@ def response(case: Case, omega: float, amplitude: float, point: PathPoint) -> np
     return to_complex(joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h)))[:, 0]
 
 
-# ---------------------------------------------------------------------------------------------------------- resolution
-
-
-# -------------------------------------------------------------------------------------------------------------- states
-
-
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> None:
     case, point = slider(SolverSettings())
     assert case.resolution.orders == (1, 2, 3)

@@ -1,4 +1,4 @@
-"""Rigid friction at the tip of a cantilever, and the peak of a slider, against exact motions."""
+"""Rigid friction at the tip of a cantilever, and the peak of a response, against exact motions."""
 
 from __future__ import annotations
 

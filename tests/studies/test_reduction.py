@@ -11,9 +11,10 @@ from studies.finite_element.condensation.modes import lowest_modes
 from studies.scenes.dovetail_sector import Parameters, build, natural_frequencies
 
 
+@pytest.mark.slow
 def test_combined_shapes_give_what_condensed_forms_give(monkeypatch):
     nodal_diameter = 3
-    parameters = Parameters(mesh=1, nodal_diameter=nodal_diameter)
+    parameters = Parameters(mesh=2, nodal_diameter=nodal_diameter)
     condensed = build(parameters, 1).linear[nodal_diameter]
     # As if every boundary were a large one.
     monkeypatch.setattr(projection, "_LARGE", 0)

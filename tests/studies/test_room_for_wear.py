@@ -14,11 +14,12 @@ from studies.scenes import scene_parameters, scene_with_room
 from studies.scenes.closed_forms.hertz import (
     line_half_width,
     line_stick_under_stroke,
+    line_worn_edge,
     point_radius,
     point_stick_under_stroke,
 )
 from studies.scenes.half_space.influence import composite_modulus
-from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar
+from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 from tests.studies.half_space_twin import compliances, limit_depth, pressed
 
 MODULUS = composite_modulus(200e9, 0.3)
@@ -115,6 +116,17 @@ def test_what_needs_no_room_stays_as_it_is(name: str) -> None:
     assert room(name, much, stroke=1e-5, half_width=2e-4) == 2e-4
     slider = scene_parameters("sdof_slider")()
     assert scene_with_room("sdof_slider", slider, much) is slider
+
+
+def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears() -> None:
+    stroke = 2.15e-6
+    stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
+    assert 0.0 < stick < 0.3 * A_LINE
+    found = room("cylinder_on_flat", ExpectedWear(1.0, 1e-3), stroke=stroke)
+    assert found == round_up(1.1 * line_worn_edge(A_LINE, stick) * 100 / 99)
+    # a wrong unit is no reason not to build
+    assert room("cylinder_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 2.7e-3
+    assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3
 
 
 @pytest.mark.slow

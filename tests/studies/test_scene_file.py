@@ -92,6 +92,11 @@ def test_optional_datasets_have_defaults(tmp_path: Path) -> None:
     assert model.contact.surface == ("", "", "")
 
 
+def test_responses_can_be_indices(tmp_path: Path) -> None:
+    model = read_scene(changed(tmp_path, plain(), put("response/dofs", np.array([6, 2], dtype=np.int32))))
+    assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
+
+
 def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path: Path) -> None:
     linear = read_scene(changed(tmp_path, plain(), put("damping", np.array([3.0, 1e-5])))).linear[0]
     assert np.array_equal(linear.damping, 3.0 * plain().linear[0].mass + 1e-5 * plain().linear[0].stiffness)

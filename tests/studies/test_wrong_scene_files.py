@@ -40,6 +40,11 @@ def rank_deficient(file: h5py.File) -> None:
         file[key][...] = (matrix + matrix.T) / 2
 
 
+def free_where_no_contact_is(file: h5py.File) -> None:
+    file["stiffness"][6, :] = 0
+    file["stiffness"][:, 6] = 0
+
+
 def external(file: h5py.File) -> None:
     del file["mass"]
     file["mass"] = h5py.ExternalLink("other.h5", "/mass")
@@ -101,6 +106,7 @@ WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (poke("mass", (6, 6), -5.0), "mass", "negative eigenvalue"),
     (without_stiffness_and_mass, "stiffness", "row of zeros"),
     (rank_deficient, "stiffness", "rank"),
+    (free_where_no_contact_is, "stiffness", "row of zeros"),
     (poke("contact/area", 1, -1e-4), "contact/area", "-0.0001 at index 1"),
     (put("contact/area", np.ones(4)), "contact/area", "shape (4,)"),
     (put(FRICTION, np.full(2, 0.5)), FRICTION, "shape (2,)"),
@@ -117,6 +123,7 @@ WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (poke("contact/dofs", (2, 0), -1), "contact/dofs", "pair 2 has no direction"),
     (poke("contact/normal_load", 1, -3.0), "contact/normal_load", "-3.0 at index 1"),
     (put("contact/surface", ["a", "b"]), "contact/surface", "2 labels"),
+    (put("contact/surface", np.arange(3)), "contact/surface", "type"),
     (put("contact/surface", np.array([b"\xff\xfe", b"a", b"b"])), "contact/surface", "UTF-8"),
     (put("response/names", ["a", "b", "c"]), "response/dofs", "shape (2, 7)"),
     (put("response/names", ["a", "a"]), "response/names", "more than once"),
@@ -155,6 +162,7 @@ WRONG_SECTOR: list[tuple[Change, str, str]] = [
     (attribute("n_sectors", None), "n_sectors", "missing"),
     (attribute("nodal_diameter", None), "nodal_diameter", "missing"),
     (attribute("n_sectors", -6), "n_sectors", "-6"),
+    (attribute("n_sectors", "six"), "n_sectors", "six"),
     (attribute("nodal_diameter", 1), "nd/1", "missing"),
 ]
 

@@ -77,6 +77,16 @@ def test_dofs_eliminated(tmp_path):
     assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
 
 
+@needs_ccx
+def test_held_model_does_not_tell_its_speed(tmp_path):
+    deck, matrices = exported(tmp_path, changed("*BOUNDARY,OP=NEW\n", ""))
+    assert omega_squared_of(deck, matrices, AXIS) is None
+    rotation = check_speed(deck, matrices, MM)
+    assert (rotation.omega_squared, rotation.point.tolist()) == (250000.0, [0.0, 0.0, 0.0])
+    with pytest.raises(SceneError, match=r"BORE: 18 of 21 nodes have no dof in sector.dof"):
+        check_nodes_have_dofs(matrices, deck.node_sets["BORE"], "BORE")
+
+
 CONTACT = """\
 *SURFACE INTERACTION,NAME=ROOT
 *SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED

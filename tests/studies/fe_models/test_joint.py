@@ -116,6 +116,17 @@ def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
     assert np.allclose(pairs.opposite @ field, field[pairs.moving], rtol=0.0, atol=1e-10)
 
 
+def test_a_coarse_surface_inside_a_finer_one_moves():
+    first, a = block("C3D8", (8, 8, 1))
+    second, b = block("C3D8", (2, 2, 1), lambda points: 0.5 * points + [0.3, 0.2, 1.0])
+    mesh = joined(first, second)
+    low = surface_of_nodes(mesh, "LOW", np.flatnonzero(a[:, 2] == 1.0))
+    up = surface_of_nodes(mesh, "UP", first.n_nodes + np.flatnonzero(b[:, 2] == 0.0))
+    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up)], Z)
+    assert pairs.moving_name == ("UP",)
+    assert pairs.area.sum() == pytest.approx(0.25)
+
+
 def test_wrong_surfaces_are_named():
     mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
     with pytest.raises(SceneError, match=r"16 of 16 nodes of UP are farther than 0\.01 m from LOW"):

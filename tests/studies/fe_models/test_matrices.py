@@ -107,6 +107,7 @@ def test_twice_the_size(tmp_path):
     [
         (r"^1,1, 1,1, .*", "1,1, 1,1, 1e36", "1 entries of the diagonal are 1e36: boundary conditions were active"),
         (r"^1,1, 1,1,", "1,4, 1,4,", "node 1 has the dof 4"),
+        (r"^1,1, 1,1,", "0,1, 0,1,", "a node with the number 0"),
         (r"^1,1, 1,1,", "9999999999999,1, 1,1,", "job_STIF1.mtx: node 9999999999999"),
     ],
 )
