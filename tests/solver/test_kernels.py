@@ -13,17 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force
 from solver.contact.period_march import integrate_slip_work, march_period
-from solver.contact.tangent import march_tangent
 from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
 from tests.solver.kernel_cases import (
     BASIS,
     FRICTION,
-    PERIODS,
     KernelCase,
-    both_tangents,
     friction_of,
     kernel_case,
     kernel_results,
@@ -115,68 +112,6 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
     )
 
 
-def derivative_error(
-    case: KernelCase, n_contact: int, closure: float = 0.0, most_periods: int = PERIODS
-) -> tuple[float, float, float]:
-    """Largest error of the tangents against central differences relative to their size, and the switches' distance."""
-    basis = BASIS
-    m = basis.synthesis.shape[0]
-
-    def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, *_ = march_period(
-            predicted_t, friction_of(case.start), case.start, closure, most_periods
-        )
-        force_h = force_t @ basis.analysis
-        force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
-        return force_h, integrate_slip_work(force_t, state_t), status_t
-
-    predicted_t = case.predicted_h @ basis.synthesis
-    _, state_t, _, periods, _ = march_period(predicted_t, friction_of(case.start), case.start, closure, most_periods)
-    force_tangent, wear_tangent = march_tangent(
-        predicted_t,
-        friction_of(predicted_t),
-        case.start,
-        state_t,
-        periods,
-        both_tangents(n_contact),
-        basis.synthesis,
-        basis.analysis,
-        case.has_normal,
-    )
-    assert not force_tangent[:, :m].any()
-    force_tangent[:, :m, :m] = mean_normal_tangent(predicted_t, basis.synthesis, basis.analysis, case.has_normal)
-    force_error, wear_error, same = 0.0, 0.0, True
-    _, _, status = run(case.predicted_h)
-    step = 1e-4
-    for component in range(3):
-        for k in range(m):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = case.predicted_h.copy()
-                moved[case.has_normal | (component > 0), component, k] += sign * step
-                ends.append(run(moved))
-            same = same and all(np.array_equal(end[2], status) for end in ends)
-            force_difference = (ends[0][0] - ends[1][0]) / (2 * step)
-            column = force_tangent[:, :, component * m + k].reshape(n_contact, 3, m)
-            force_error = max(force_error, np.abs(column - force_difference).max())
-            wear_difference = (ends[0][1] - ends[1][1]) / (2 * step)
-            wear_error = max(wear_error, np.abs(wear_tangent[:, component * m + k] - wear_difference).max())
-    assert same, "a sample changes its state within the differences: another seed is needed"
-    return force_error, wear_error, float(np.abs(wear_tangent).max())
-
-
-@pytest.mark.parametrize("seed", [10, 12, 13])
-def test_tangents_are_those_of_central_differences(seed: int) -> None:
-    case = kernel_case(4, BASIS.n_samples, seed=seed)
-    assert not case.has_normal.all()
-    force_error, wear_error, wear_size = derivative_error(case, 4)
-    # truncation: step^2 / pull^2 with pulls above 0.1 N; round-off: 1e-16 * 100 N / step
-    assert force_error < 1e-7
-    assert wear_error < 1e-7 * max(wear_size, 1.0)
-    assert wear_size > 1.0
-
-
 def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
     """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
     case = kernel_case(n_contact, BASIS.n_samples, seed=seed)
@@ -209,13 +144,6 @@ def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int)
         assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
     assert slowest > 40
     assert periods.max() < 20
-
-
-@pytest.mark.parametrize("seed", [31, 33])
-def test_tangents_of_a_slow_closure_are_those_of_central_differences(seed: int) -> None:
-    force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_periods=400)
-    assert force_error < 1e-6
-    assert wear_error < 1e-6 * max(wear_size, 1.0)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED, SLIP, sample_tangents
+from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
 from solver.newton import linear_solver, period_preconditioner, preconditioner
@@ -15,7 +15,6 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import (
     PeriodFactor,
-    build_march,
     build_period_factor,
     stiffness_of_most,
 )
@@ -42,45 +41,6 @@ def factor_of(tangent: Linearisation) -> PeriodFactor:
     found = build_period_factor(tangent)
     assert found is not None
     return found
-
-
-@pytest.mark.slow
-def test_the_march_solves_what_it_says_sample_by_sample() -> None:
-    balance, predicted = case(3)
-    tangent = tangent_of(balance, predicted)
-    found, joint = build_march(tangent), balance.joint
-    n_samples, size = len(found.own), 3 * joint.contact.n_contact
-    own, carried = sample_tangents(
-        tangent.at.predicted_t,
-        joint.friction_coefficient,
-        tangent.at.state_t,
-        tangent.at.status_t,
-        joint.has_normal,
-        joint.basis.n_samples // n_samples,
-    )
-    coupling = np.zeros((size, size))
-    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
-    coupling[joint.component_index, joint.component_index] -= 1.0
-    right = np.random.default_rng(4).normal(size=(joint.component_index.size, joint.basis.synthesis.shape[0]))
-    right_t = (joint.to_pairs(right).reshape(size, -1) @ found.basis.synthesis).T
-    state = np.zeros((size // 3, 3))
-    slow = np.empty((2, n_samples, size))
-    for _ in range(NEWTON.march_periods):
-        for n in range(n_samples):
-            # step and state as two unknowns, nothing eliminated, no pair left out
-            whole = np.eye(2 * size)
-            whole[:size, size:] = coupling
-            held = np.zeros((size // 3, 3))
-            for pair in range(size // 3):
-                here = slice(3 * pair, 3 * pair + 3)
-                whole[size:, :size][here, here] = -own[n, pair]
-                held[pair, 1:] = carried[n, pair] @ state[pair, 1:]
-            slow[:, n] = np.linalg.solve(whole, np.concatenate([right_t[n], held.ravel()])).reshape(2, size)
-            state = slow[1, n].reshape(size // 3, 3)
-    expected = [(part.T @ found.basis.analysis)[joint.component_index] for part in slow]
-    for ours, theirs in zip(found.solve(right), expected, strict=True):
-        # small systems are solved in single precision
-        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-5 * np.abs(theirs).max())
 
 
 def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.MonkeyPatch) -> None:

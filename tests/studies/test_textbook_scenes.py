@@ -57,20 +57,6 @@ def test_parameters_are_frozen_strict_and_have_units(model: str) -> None:
             parameters(**wrong)
 
 
-@pytest.mark.parametrize(
-    ("model", "wrong"),
-    [
-        ("sdof_slider", {"mass": 0.0}),
-        ("sdof_slider", {"normal_load": 0.0}),
-        ("two_masses", {"mass_2": -1.0}),
-        ("vibro_impact", {"gap": float("-inf")}),
-    ],
-)
-def test_impossible_parameters_are_refused(model: str, wrong: dict[str, float]) -> None:
-    with pytest.raises(ValidationError):
-        scene_parameters(model)(**wrong)
-
-
 def test_an_unknown_scene_is_named_with_the_known_ones() -> None:
     with pytest.raises(SceneError, match="bladeless") as caught:
         scene_parameters("bladeless")

@@ -14,14 +14,10 @@ from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.guards import limited_process
 from studies.scene_error import SceneError
-from tests.studies.fe_models.meshes import BRICKS, GMSH_22, GMSH_41, write_cdb
+from tests.studies.fe_models.meshes import GMSH_22, GMSH_41
 from tests.studies.fe_models.mutations import mutate
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
-needs_ansys = pytest.mark.skipif(
-    importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None,
-    reason="ansys-mapdl-reader is not installed",
-)
 
 
 def write(folder: Path, text: str) -> Path:
@@ -86,21 +82,6 @@ def test_mutated_gmsh(tmp_path, seed: int):
     else:
         said = deck.path
     assert said.isprintable()
-
-
-@needs_ansys
-def test_cdb(tmp_path):
-    """Written by the test: a brick, and bricks collapsed to a wedge and a tetrahedron."""
-    deck = read_library_mesh(write_cdb(tmp_path))
-    blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
-    assert blocks == {
-        "C3D8I": ([1], [list(BRICKS[1])]),
-        "C3D6": ([2], [[5, 6, 7, 9, 10, 11]]),
-        "C3D4": ([3], [[9, 10, 11, 12]]),
-    }
-    assert deck.node_sets["UNDER"].tolist() == [1, 2, 3, 4]
-    assert deck.element_sets["FIRST"].tolist() == [1]
-    assert deck.coordinates[11].tolist() == [0.5, 0.5, 3]
 
 
 def test_meshes_by_their_ending(tmp_path):
