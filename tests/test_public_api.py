@@ -283,6 +283,7 @@ def test_the_response_without_friction_is_linear() -> None:
         np.testing.assert_allclose(curve.response[place], [exact.sum(), 2.0 * exact[1]], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_one_joint_gives_the_bits_of_a_study(result: xr.Dataset) -> None:
     """In tests BLAS has one thread, as in a run."""
     model = build_scene("sdof_slider")
@@ -344,6 +345,7 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change: dict[str, Any],
     ("change", "message"),
     [
         ({"frequency": 0.0}, "frequency: give values above 0 instead of 0"),
+        ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
         ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
         ({"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
         ({"friction_coefficient": [0.5, 0.4]}, "friction_coefficient has shape (2,): give a number or shape (1,)"),

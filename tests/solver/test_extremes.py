@@ -202,7 +202,7 @@ def test_amplitude(base: Case, factor: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.0, 5.0])
+@pytest.mark.parametrize("factor", [1.0, 50.0])
 def test_a_block_that_bounces(factor: float) -> None:
     # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
     base = block(lift=0.2)
@@ -248,7 +248,7 @@ def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [1])
+@pytest.mark.parametrize("number", [0])
 def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) -> None:
     case = elastic()
     linear = case.model.linear[0]

@@ -120,6 +120,21 @@ def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
 
 
 @pytest.mark.slow
+def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing() -> None:
+    """Worn volume and outcome say the same, and no harmonics are added to find out what round-off wears."""
+    model = build_scene("cylinder_on_flat", strips=60)
+    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", SolverSettings())
+    direct = directly(model, start, 0.6, 1e-13, settings=SolverSettings())
+    assert direct.outcome is Outcome.CONVERGED
+    assert direct.message == ""
+    assert direct.wear_rate[-1] < 1e-9 * direct.wear_rate[0]
+    assert direct.wear_rate_error[-1] <= 1e-2
+    assert direct.harmonics_used[-1] <= direct.harmonics_used[0]
+    # no better than the states are solved
+    assert SolverSettings().tolerance <= direct.error_estimate < 1e-3
+
+
+@pytest.mark.slow
 def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
     direct, march = found("beside resonance"), marched("beside resonance")
     assert direct.final_method == "march"

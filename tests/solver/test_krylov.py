@@ -56,6 +56,14 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends() -> None:
     assert solve_gmres(lambda x: matrix @ x, reached, 1e-6, 60, 1)[1]
 
 
+def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends() -> None:
+    zero = np.zeros(5)
+    found, converged = solve_gmres(lambda x: x, zero, 1e-3, 5, 2)
+    assert converged
+    assert np.array_equal(found, zero)
+    assert not solve_gmres(lambda x: x * np.nan, np.ones(5), 1e-3, 5, 2)[1]
+
+
 def test_products_that_are_rounded_are_refined_by_exact_ones() -> None:
     random = np.random.default_rng(3)
     # a direction that moves far under a small force

@@ -130,6 +130,7 @@ def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
     assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
 
 
+@pytest.mark.slow
 def test_a_loop_does_not_depend_on_the_others_that_are_asked_for() -> None:
     every, some, none = (dovetail_march(loops=loops) for loops in (tuple(range(16)), (3, 7), ()))
     for name in ("loop_displacement", "loop_force"):

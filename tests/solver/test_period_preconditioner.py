@@ -22,7 +22,7 @@ from solver.newton.preconditioner import SlipFactor, build_factor
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import build_case
-from tests.solver.models import dovetail, random_balance, random_model
+from tests.solver.models import OMEGA, dovetail, random_balance, random_model, with_free_masses
 
 SETTINGS = SolverSettings(3, 24)
 KINDS = ("3d", "constant_load", "normal_only", "3d", "one_tangent", "second_tangent", "3d", "3d")
@@ -137,3 +137,12 @@ def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeyp
         dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
         assert solver.determinant_sign(tangent) == np.linalg.slogdet(dense)[0]
         predicted = predicted * 1.05
+
+
+def test_masses_on_sliders_are_left_to_the_slip_space() -> None:
+    model = with_free_masses(random_model(10, ("3d", "3d"), 4), [0])
+    balance, predicted = random_balance(model, SETTINGS, 10, wear=False)
+    assert balance.joint.penalty.inertial.any()
+    assert balance.joint.omega == OMEGA
+    assert build_period_factor(tangent_of(balance, predicted)) is None
+    assert isinstance(build_factor(tangent_of(balance, predicted)), SlipFactor)

@@ -70,6 +70,17 @@ def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
+def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert started(seed).outcome is Outcome.CONVERGED
+    if seed != SHAKEN_DOWN:
+        # without shakedown it tries all harmonics in vain, for minutes
+        return
+    monkeypatch.setattr(ResolvedState, "at_rest", lambda level, _: level)
+    assert started(seed).outcome is Outcome.CERTIFICATE_FAILED
+
+
+@pytest.mark.slow
 def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position() -> None:
     # shaken down with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     start = started(710)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from solver.accuracy.resolved_state import ResolvedState
+from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
 from solver.model import ReducedModel
 from solver.newton.solve_balance import Budget
@@ -103,3 +105,19 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, 
     level = ResolvedState(case, case.joint(omega, force), point)
     for each in (level, other):
         assert abs(each.response()[0] / exact("stiff spring", force, omega)[0] - 1.0) < 0.02
+
+
+def test_what_a_state_carries_into_the_terms_of_another_penalty() -> None:
+    omega, force = 0.85, 6.0
+    case = build_case(Cantilever(spring=200.0).model(), FRICTION, omega, SolverSettings(), Resolution((1, 3, 5), 64))
+    joint = case.joint(omega, force)
+    at = first_point(case, omega, force, np.zeros(1)).evaluation
+    marched = case.penalty.inertial
+    assert marched.tolist() == [True]
+    assert np.array_equal(carried_history(at, (1, 3, 5), marched, joint), at.history)
+    elastic = replace(joint, penalty=replace(joint.penalty, inertial=~marched))
+    carried = carried_history(at, (1, 3, 5), marched, elastic)
+    last = at.displacement_h[0, 1:] @ synthesis((1, 3, 5), np.array([2.0 * np.pi * 63 / 64]))
+    assert carried[0] == pytest.approx(last[:, 0], rel=1e-12)
+    back = carried_history(at, (1, 3, 5), ~marched, joint)
+    assert np.array_equal(back, at.displacement_h[:, 1:, 0])

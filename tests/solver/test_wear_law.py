@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
 from solver import march_wear as march_model
+from solver.contact.archard import slip_work_rate, slip_work_slopes
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
@@ -26,6 +27,13 @@ CYCLES = np.linspace(0.0, END, 9)
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
 TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
+
+
+def test_the_slopes_are_the_derivatives_of_the_slip_work() -> None:
+    normal, speed, step = 12.0, 0.3, 1e-4
+    by_normal = (slip_work_rate(normal + step, speed) - slip_work_rate(normal - step, speed)) / (2 * step)
+    by_speed = (slip_work_rate(normal, speed + step) - slip_work_rate(normal, speed - step)) / (2 * step)
+    assert slip_work_slopes(normal, speed) == pytest.approx((by_normal, by_speed), rel=1e-9)
 
 
 def random_work(seed: int, n_contact: int, n_pressures: int = 4, n_depths: int = 5) -> WearingWork:

@@ -1,4 +1,4 @@
-"""Meshes for Gmsh's and ANSYS' formats, written after their manuals. A helper of the tests."""
+"""Meshes in Gmsh's formats, written after its manual. A helper of the tests."""
 
 from __future__ import annotations
 
