@@ -198,6 +198,14 @@ def test_a_growing_vibration_is_no_result(
     assert np.isnan(history.response).all()
 
 
+def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
+    start = start_of(driven(-0.5), 50.0, 20.0, 0.05, SolverSettings())
+    assert start.outcome is Outcome.UNSTABLE
+    # the first mass alone: x'' - 0.5 x' + 2 x = 0 for 20 s
+    assert f"{np.exp(0.25 * 20.0):.3g}" in start.message
+    assert "linear structure alone" in start.message
+
+
 def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
     balance, predicted = random_balance(random_model(4, ("3d",) * 6, 12), SolverSettings(3, 24), 4, wear=False)
     at = balance.evaluate(predicted)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.structure.fourier import build_basis, change_orders, from_complex, to_complex
+from solver.structure.fourier import build_basis, change_orders, derivative, from_complex, to_complex
 
 OMEGA = 37.0
 
@@ -29,6 +29,13 @@ def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards() -> None:
     assert values_h @ build_basis((1, 2), 16).synthesis == pytest.approx(expected, abs=1e-14)
     assert np.array_equal(to_complex(values_h), amplitudes)
     assert np.array_equal(values_h[:, 0], static)
+
+
+def test_derivative_multiplies_the_amplitude_of_harmonic_n_by_i_n_omega() -> None:
+    values_h = np.random.default_rng(1).normal(size=(2, 3, 9))
+    rate_h = derivative(values_h, OMEGA * np.arange(1, 5))
+    assert to_complex(rate_h) == pytest.approx(1j * OMEGA * np.arange(1, 5) * to_complex(values_h), abs=1e-12)
+    assert not rate_h[..., 0].any()
 
 
 @pytest.mark.parametrize(("orders", "samples"), [((1,), 2), ((1, 2, 3), 6), ((1, 3, 5), 10), ((7,), 4), ((), 0)])

@@ -141,7 +141,7 @@ def test_sets_that_grow(tmp_path, monkeypatch):
 def test_damaged_decks(tmp_path):
     """A deck that is damaged anywhere is read, or refused in a sentence: nothing else is ever raised."""
     said: list[str] = []
-    for seed in range(90):
+    for seed in range(300):
         good = (CUBES, PART, SECTOR.read_text())[seed % 3].encode()
         path = tmp_path / "deck.inp"
         path.write_bytes(mutate(good, seed))
@@ -151,5 +151,5 @@ def test_damaged_decks(tmp_path):
         except SceneError as error:
             said.append(str(error))
         assert time.process_time() - began < 2
-    assert len(said) > 20
+    assert len(said) > 60
     assert all(sentence.isprintable() for sentence in said)

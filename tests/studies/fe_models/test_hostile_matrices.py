@@ -31,7 +31,7 @@ def test_damaged_matrices(tmp_path, monkeypatch, name: str):
     job = WRITERS[name](tmp_path)
     good = (tmp_path / name).read_bytes()
     said: list[str] = []
-    for seed in range(20):
+    for seed in range(60):
         (tmp_path / name).write_bytes(mutate(good, seed))
         began = time.process_time()
         try:
@@ -46,7 +46,7 @@ def test_damaged_matrices(tmp_path, monkeypatch, name: str):
             assert np.isfinite(matrix.data).all()
             assert abs(matrix - matrix.T).max() == 0
         assert set(read.direction) <= {0, 1, 2}
-    assert len(said) > 2
+    assert len(said) > 5
     assert all(sentence.startswith("matrices: job") and sentence.isprintable() for sentence in said)
 
 
