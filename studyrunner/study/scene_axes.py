@@ -7,7 +7,7 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel
 
@@ -27,7 +27,8 @@ _UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N s/m", "kg
 class SceneAxis:
     """An axis of a study whose values belong to a key of [scene] or [wear].
 
-    name: of the dimension. table, key: the key whose values these are; a second name in `key` is that of a surface.
+    name: of the dimension. table, key: the key whose values these are. A second name in `key` is that of a surface or
+        of a key in a table.
     values: in the order of the study file. units, meaning: as in the description of the key.
     """
 
@@ -74,8 +75,7 @@ def take_scene_axes(
         if table is None or (table == "wear" and name not in _IN_WEAR):
             known = [*own, *scene.model_fields, *_IN_WEAR]
             raise UserError(source, f"axes.{name}", value, f"unknown key, give {nearest_name(name, known)}")
-        units, meaning = describe_key(dict(kinds)[table], name)
-        each = value.items() if _is_table(value) else [(None, value)]
+        each = value.items() if is_table(value) else [(None, value)]
         for inner, values in each:
             key = (name,) if inner is None else (name, str(inner))
             dotted = ".".join(key)
@@ -87,6 +87,7 @@ def take_scene_axes(
                 of_axis = read_axis(values)
             except WrongValueError as error:
                 raise UserError(source, f"axes.{dotted}", error.value, error.remedy) from None
+            units, meaning = describe_key(dict(kinds)[table], *key)
             found.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
     return tuple(found)
 
@@ -100,10 +101,12 @@ def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -
         tables["axes"] = axes
         for axis, value in zip(scene_axes, values, strict=True):
             table = tables.setdefault(axis.table, {})
-            if len(axis.key) == 1:
-                table[axis.key[0]] = value
-            else:
-                table[axis.key[0]] = {**table.get(axis.key[0], {}), axis.key[1]: value}
+            if axis.key == ("worn",):
+                # one state of several
+                states, place = table["worn"], axis.values.index(value)
+                table["worn"] = {"depth": [states["depth"][place]], "result": states.get("result", "")}
+                continue
+            table[axis.key[0]] = value if len(axis.key) == 1 else _with(table.get(axis.key[0], {}), axis.key[1], value)
         yield tables
 
 
@@ -112,17 +115,30 @@ def as_checked(scene_axes: Sequence[SceneAxis], variants: Sequence[Any]) -> tupl
     checked, apart = [], len(variants)
     for axis in scene_axes:
         apart //= len(axis.values)
+        if axis.key == ("worn",):
+            checked.append(axis)
+            continue
         values = []
         for variant in variants[::apart][: len(axis.values)]:
             table = variant.scene.parameters if axis.table == "scene" else variant.wear
-            value = getattr(table, axis.key[0])
-            values.append(value if len(axis.key) == 1 else value[axis.key[1]])
+            value = only_table(getattr(table, axis.key[0]))
+            values.append(value if len(axis.key) == 1 else dict(value)[axis.key[1]])
         checked.append(replace(axis, values=tuple(values)))
     return tuple(checked)
 
 
-def _is_table(value: object) -> bool:
-    """Whether a value holds values by surface, and no range."""
+def _with(given: Any, key: str, value: AxisValue) -> Any:
+    """A table, or a list of one table, with a value."""
+    return [{**given[0], key: value}] if only_table(given) is not given else {**given, key: value}
+
+
+def only_table(value: Any) -> Any:
+    """The table in a list of one table, as `preload` is; any other value as it is."""
+    return value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
+
+
+def is_table(value: object) -> bool:
+    """Whether a value under [axes] holds values by name of a surface or of a key, and no range."""
     return isinstance(value, dict) and not {"start", "stop", "num"} & value.keys()
 
 
@@ -130,6 +146,7 @@ def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source:
     """Raises UserError where the table has the key of an axis."""
     given: Any = table
     for part in key:
+        given = only_table(given)
         if not isinstance(given, Mapping) or part not in given:
             return
         given = given[part]
@@ -137,9 +154,26 @@ def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source:
     raise UserError(source, f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
 
 
-def describe_key(kind: type[BaseModel], name: str) -> tuple[str, str]:
-    """Unit and meaning in the description of a key: parts between commas, of which one is the unit."""
-    text = kind.model_fields[name].description or ""
+def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str, str]:
+    """Unit and meaning in the description of a key: parts between commas, of which one is the unit.
+
+    inner: key in the table that the key holds, or a surface.
+    """
+    field = kind.model_fields[name]
+    for table in _tables_in(field.annotation):
+        if inner in table.model_fields:
+            units, _ = describe_key(table, inner)
+            return units, f"{inner.replace('_', ' ')} of {name.replace('_', ' ')}"
+    text = field.description or ""
     units = next((part for part in reversed(re.split("[,;] ", text)) if part in _UNITS), "1")
     parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
-    return _UNITS.get(units) or units, ", ".join(parts) or name.replace("_", " ")
+    meaning = ", ".join(parts) or name.replace("_", " ")
+    return _UNITS.get(units) or units, f"{meaning}, {inner}" if inner else meaning
+
+
+def _tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Classes of tables in the type of a key."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables_in(part)

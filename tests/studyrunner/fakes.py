@@ -76,7 +76,7 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
             pairs = 1e3 * np.array(task.loops, dtype=float)[:, None, None] + (name == "loop_force")
             values[name] = fingerprint + pairs + 1e-3 * np.arange(float(np.prod(shape))).reshape(shape)
             continue
-        shape = (len(task.cycles), *(sizes[dimension] for dimension in ASKED[name].dimensions[1:]))
+        shape = tuple({"cycle": len(task.cycles), **sizes}[dimension] for dimension in ASKED[name].dimensions)
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
         if ASKED[name].flags:
             values[name] = values[name] >= 0.0

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, SCENE
+from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, SCENE, USUAL
 
 CHECK = str(Path(__file__).with_name("run_compliance_checker.py"))
 
@@ -108,7 +108,7 @@ def test_the_header_reads_like_documentation(result: Path) -> None:
             assert len(variable.long_name) > 3
             assert variable.long_name != name
             assert variable.coverage_content_type
-        for name in (*ASKED, *LOOPS, "jump_cycle", "run_time", "contact_area", "phase", "wear_coefficient"):
+        for name in (*USUAL, *LOOPS, "jump_cycle", "run_time", "contact_area", "phase", "wear_coefficient"):
             if file[name].dtype is not str and not hasattr(file[name], "flag_values"):
                 assert file[name].comment.endswith("."), name
         outcome = file["outcome"]

@@ -24,7 +24,7 @@ from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import format_seconds
-from studyrunner.variables import ASKED
+from studyrunner.variables import ASKED, USUAL
 from tests.studyrunner.fakes import changed, fake_evaluate, totals_of, without_values
 from tests.studyrunner.histories import history
 
@@ -173,7 +173,7 @@ def test_what_was_computed_of_a_point_that_failed_is_kept() -> None:
     failed = ended_at(50.0, history([0.0, 40.0, 80.0, 1e5]))
     result = build_result(march_task("slow_time.outputs=[0, 40, 80, 20000]"), failed)
     assert totals_of(result, "outcome", "last_cycle", "error_estimate") == [7, 50.0, 0.03]
-    for name in ASKED.keys() - {"wear_rate_error"}:
+    for name in set(USUAL) - {"wear_rate_error"}:
         values = result.values[name]
         there = np.isfinite(values) if ASKED[name].dtype == "float64" else values != 0
         assert there[:2].all() or name == "stable", name
@@ -199,7 +199,7 @@ def test_a_point_without_a_state_holds_no_numbers() -> None:
     result = build_result(march_task("slow_time.outputs=2"), replace(nothing, last_cycle=np.nan))
     assert result.outcome == 2
     assert np.isnan(totals_of(result, "last_cycle", "error_estimate", "largest_wear_depth")).all()
-    for name in ASKED:
+    for name in USUAL:
         values = result.values[name]
         empty = np.isnan(values) if ASKED[name].dtype == "float64" else values == 0
         assert empty.all(), name

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studyrunner.study.study_file import bundled_studies, format_study, read_study
-from studyrunner.variables import ASKED
+from studyrunner.variables import USUAL
 
 SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
 
@@ -40,7 +40,7 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables
-    assert study.outputs.variables == tuple(ASKED)
+    assert study.outputs.variables == USUAL
     assert study.outputs.loops == ()
 
 
@@ -51,7 +51,7 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
 def test_by_default_the_scene_tells_what_costs_little(name: str, of_scene: tuple[str, ...] | None) -> None:
     study = read_study(name)
     if of_scene is not None:
-        assert study.outputs.variables == (*ASKED, *of_scene)
+        assert study.outputs.variables == (*USUAL, *of_scene)
     # the default study asks for it
     assert ("natural_frequency" in study.outputs.variables) == (name == "dovetail")
 
@@ -59,9 +59,9 @@ def test_by_default_the_scene_tells_what_costs_little(name: str, of_scene: tuple
 @pytest.mark.parametrize(
     ("name", "asked", "found"),
     [
-        ("dovetail", "['default']", (*ASKED, "mesh")),
-        ("dovetail", "['natural_frequency', 'default']", (*ASKED, "mesh", "natural_frequency")),
-        ("sdof_slider", "['default', 'exact', 'worn_volume']", (*ASKED, "exact")),
+        ("dovetail", "['default']", (*USUAL, "mesh")),
+        ("dovetail", "['natural_frequency', 'default']", (*USUAL, "mesh", "natural_frequency")),
+        ("sdof_slider", "['default', 'exact', 'worn_volume']", (*USUAL, "exact")),
     ],
 )
 def test_one_word_stands_for_the_default_variables(name: str, asked: str, found: tuple[str, ...]) -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.result import Result, open_for_report
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.variables import ASKED, COORDINATES, KEPT, USUAL
 
 FAILED = 4
 SENTENCES = ("The point was computed to the end.", "one", "two", "three", "A step did not converge: <b>use</b> less.")
@@ -40,7 +40,7 @@ def build_file(
     positions: NDArray[np.float64] | None = None,
     surfaces: Sequence[str] = (),
     responses: Sequence[str] = ("tip",),
-    variables: Sequence[str] = tuple(ASKED),
+    variables: Sequence[str] = USUAL,
     loops: Sequence[int] = (),
     seed: int = 1,
     **attributes: str,
