@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from studyrunner.scene.computed import scene_parameters_of
 from studyrunner.scene.scene import SceneFacts, harmonics_to_build
-from studyrunner.study.realisation import realise
+from studyrunner.study.realisation import Realisation, realise
 from studyrunner.study.study import Study
+from studyrunner.user_error import UserError
 
 
 @dataclass(frozen=True)
@@ -21,25 +22,33 @@ class SceneSet:
     """The different scenes of a study.
 
     studies: for each scene a study without axes of the scene, from which the scene is built.
-    numbers: number of the scene of each part of the study (`realise`).
+    parts: of the study (`realise`). numbers: number of the scene of each part.
     """
 
     studies: tuple[Study, ...]
+    parts: tuple[Realisation, ...]
     numbers: tuple[int, ...]
 
 
 def find_scenes(study: Study) -> SceneSet:
-    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it."""
+    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it.
+
+    Raises UserError where a result file is to keep the scene, and there are several.
+    """
     numbers: dict[str, int] = {}
     studies: list[Study] = []
     of_parts = []
-    for part in realise(study):
+    parts = realise(study)
+    for part in parts:
         key = _key(part.study)
         if key not in numbers:
             numbers[key] = len(numbers)
             studies.append(part.study)
         of_parts.append(numbers[key])
-    return SceneSet(tuple(studies), tuple(of_parts))
+    if study.outputs.scene and len(studies) > 1:
+        remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
+        raise UserError(study.source, "outputs.scene", True, remedy)
+    return SceneSet(tuple(studies), parts, tuple(of_parts))
 
 
 def _key(study: Study) -> str:
@@ -82,7 +91,7 @@ class PairArrays:
     exists: NDArray[np.bool_] | None
 
 
-def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
+def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
     """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
     one = facts[0]
     if all(_same_pairs(one, each) for each in facts[1:]):
@@ -94,7 +103,9 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
     for number, each in enumerate(facts):
         own = slice(len(each.area))
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
-    names, numbers = axes_of_difference(study, find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b]))
+    names, numbers = axes_of_difference(
+        study, scenes or find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b])
+    )
     exists = np.isfinite(area[numbers])
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
