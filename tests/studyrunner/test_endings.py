@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from studyrunner.system import endings
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending, take_endings, uninterrupted
 
 ROOT = Path(__file__).parents[2]
@@ -89,22 +88,6 @@ def test_an_ending_that_a_library_has_lost_is_raised_again(end: Callable[[], Non
     assert not is_ending(AssertionError())
     with uninterrupted():
         raise_ending()
-
-
-def test_one_more_ends_the_process_at_once_after_a_while(
-    end: Callable[[], None], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    ended: list[int] = []
-    monkeypatch.setattr(endings.os, "_exit", ended.append)
-    endings.say_at_last("the last words")
-    with pytest.raises(KeyboardInterrupt):
-        end()
-    end()
-    assert not ended
-    monkeypatch.setattr(endings, "SECONDS_OF_GRACE", 0.0)
-    end()
-    assert ended == [130]
-    assert capfd.readouterr().err == "the last words\n"
 
 
 def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[], None]) -> None:

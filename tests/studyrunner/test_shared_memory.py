@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import queue
 import signal
 import subprocess
 import sys
 import threading
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,17 +91,6 @@ def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed() -> N
             assert float(other.stdout.readline()) == 99999.0 * 50000.0
         with pytest.raises(FileNotFoundError):
             open_shared(pickle.loads(address))
-
-
-def test_a_number_that_has_become_another_file_is_no_shared_object(tmp_path: Path) -> None:
-    shared = SharedObject({"a": np.arange(4.0)})
-    with pytest.raises(OSError, match="another file"):
-        open_shared(replace(shared.address, inode=shared.address.inode + 1))
-    with (tmp_path / "else").open("wb") as other:
-        os.dup2(other.fileno(), shared.address.descriptor)
-        with pytest.raises(OSError, match="another file"):
-            open_shared(shared.address)
-    shared.close()
 
 
 class Threads:
