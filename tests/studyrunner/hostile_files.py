@@ -136,6 +136,8 @@ def long_texts(file: h5py.File) -> None:
 
 
 SCENES: dict[str, Change] = {
+    "bomb within the limit": replaced("stiffness", (2800, 2800), chunks=(1000, 1000), compression="gzip"),
+    "denormal area": values("contact/area", [-5e-324]),
     "huge matrix": replaced("mass", (10**7, 10**7), chunks=(100, 100)),
     "bomb of zeros": replaced("stiffness", (40000, 40000), chunks=(1000, 1000), compression="gzip"),
     "64 bit overflow": replaced("mass", (2**33, 2**33), chunks=(64, 64)),
@@ -170,6 +172,9 @@ ALLOWED = {"next to the largest"}
 _S = STUDY.encode()
 
 TEXTS: dict[str, bytes] = {
+    "scene with a long name": _S.replace(b"scene.h5", b"x" * 5000 + b".h5"),
+    "huge hexadecimal": _S.replace(b"[150.0]", b"0x" + b"f" * 1_000_000),
+    "escape sequence in a key": _S + b'"\\u001b]0;owned\\u0007" = 1\n',
     "nested arrays": b"a = " + b"[" * 100_000,
     "nested arrays as a value": _S + b"step = " + b"[" * 400 + b"]" * 400,
     "dotted key": b".".join([b"a"] * 200_000) + b" = 1",

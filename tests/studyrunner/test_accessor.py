@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from solver.outcome import Outcome
 from studyrunner.accessor import find_grid, join_results
 
 SURFACES = ("pressure side", "back")
@@ -255,3 +256,13 @@ def test_a_study_that_was_made_to_do_harm(study):
     result.attrs["study"] = study
     with pytest.raises(ValueError, match="study"):
         join_results([result], dim="friction_coefficient")
+
+
+def test_points_of_no_result_are_marked(result):
+    joined = join_results([result.isel(frequency=[0], scheme=[0]), result.isel(frequency=[2], scheme=[1])])
+    assert joined.outcome.values.tolist() == [[0, Outcome.NOT_COMPUTED], [Outcome.NOT_COMPUTED, 0]]
+    assert joined.newton_iterations.values.tolist() == [[0, 0], [0, 5]]
+    assert joined.worn_volume.isnull().sum() == 4
+    assert joined.outcome.attrs["flag_values"].tolist() == [0, 1, Outcome.NOT_COMPUTED]
+    assert joined.outcome.attrs["flag_meanings"].split() == ["converged", "singular", "not_computed"]
+    assert len(joined.outcome.attrs["sentences"].splitlines()) == 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import h5py
@@ -23,6 +24,13 @@ harmonics = 5
 """
 
 WRONG_KEYS = {
+    "key in place of a table": ("slow_time=3", "slow_time", "3", "table"),
+    "variables in one word": ("outputs.variables=default", "outputs.variables", '"default"', "list of names"),
+    "target 0": ("slow_time.until={wear_depth = 0.0}", "slow_time.until", "0.0", "above 0"),
+    "half a harmonic in a list": ("solver.harmonics=[1, 1.5]", "solver.harmonics", "1.5", "whole"),
+    "half a harmonic in a list of one": ("solver.harmonics=[1.5]", "solver.harmonics", "1.5", "whole"),
+    "descending pressures": ("wear.pressure=[2.0, 1.0]", "wear.pressure", "[2.0, 1.0]", "ascending"),
+    "negative factor": ("wear.factor=[[-1.0]]", "wear.factor", "-1.0", "0 or more"),
     "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
     "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
     "a name of the literature": ("axes.k_w=1", "axes.k_w", "1", "unknown key, give wear_coefficient"),
@@ -179,3 +187,10 @@ def test_command_line(
     line = line_of(arguments, capsys)
     for word in words:
         assert word in line
+
+
+def test_write_protected_output(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "write-protected" in line_of(["s.toml"], capsys)

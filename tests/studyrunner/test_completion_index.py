@@ -210,3 +210,21 @@ def test_a_person_can_read_the_file(finished: Path) -> None:
     with contextlib.closing(sqlite3.connect(finished)) as database:
         for query, expected in queries.items():
             assert set(database.execute(query)) == expected
+
+
+def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder: Path) -> None:
+    """What comes behind it on its branch does not depend on it."""
+    with completion_of(folder) as completion:
+        down = completion.plan.branches[1]
+        for branch in completion.plan.branches:
+            for start in fake_branch(branch):
+                failed = branch is down and start.position == 1
+                completion.add_start(branch, replace(start, n_unknowns=0) if failed else start)
+        completion.keep(down, Packed("progress", (np.zeros(1),)))
+        compute(completion)
+        assert completion.n_points_finished == 12
+        completion.forget_failed(COMPLETE)
+        assert completion.n_points_finished == 10
+        (left,) = completion.branches_left()
+        assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
+        assert compute(completion) == (1, 2)

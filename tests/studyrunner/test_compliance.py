@@ -97,7 +97,6 @@ def test_compliance_checker_passes(result: Path) -> None:
     assert all("'str'" in message for message in as_it_is["broken"].values())
 
 
-@pytest.mark.slow
 def test_the_header_reads_like_documentation(result: Path) -> None:
     with netCDF4.Dataset(result) as file:
         known = {**ASKED, **KEPT, **LOOPS, **COORDINATES}

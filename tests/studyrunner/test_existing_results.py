@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from studyrunner import UserError, run_study
 from studyrunner.cli import main
 from tests.studyrunner.faked_runs import SMALL, Solver
 
@@ -135,3 +136,32 @@ def test_a_folder_of_an_older_version_is_named_and_left_alone(
     assert capsys.readouterr().err.count(said) == 1
     assert (older / "00000001.npy").read_bytes() == b"of version 0.4.0"
     assert solver.n_results == 6
+
+
+@pytest.mark.slow
+def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: Solver) -> None:
+    assert main(SMALL) == 0
+    end_at_once(solver)
+    assert main([*OTHER, "--overwrite"]) == 130
+    assert name_in("out.nc") == "sdof_slider"
+    solver.begin_again()
+    assert main([*OTHER, "--overwrite"]) == 0
+    assert name_in("out.nc") == "two_masses"
+
+
+def test_progress_that_is_damaged_belongs_to_no_study(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+    killed(solver)
+    solver.begin_again()
+    Path("out.nc.progress").write_bytes(b"x" * 5000)
+    assert main(OTHER) == 0
+    assert "out.nc.progress is no file of a run: it is kept as out.nc.progress.damaged" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_in_python(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(SMALL) == 0
+    overrides = {"axes.scheme": "implicit", "axes.frequency": 0.05}
+    with pytest.raises(UserError, match=r'run_study: output = .*overwrite=True.*"two_masses"'):
+        run_study("two_masses", "out.nc", overrides=overrides, progress=False)
+    with run_study("two_masses", "out.nc", overrides=overrides, progress=False, overwrite=True) as result:
+        assert 'name = "two_masses"' in result.attrs["study"]

@@ -162,7 +162,6 @@ def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
     assert read_study(str(tmp_path / "again.toml")).model_dump() == read_study("sdof_slider", OVERRIDES).model_dump()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
 def test_the_file_is_the_one_of_the_plain_twin(
     overrides: tuple[str, ...], bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -236,3 +235,17 @@ def test_readme_and_ci_have_the_same_test_command() -> None:
     readme, script = (root.joinpath(name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
     (command,) = [line for line in readme.splitlines() if line.endswith("-m pytest -n auto")]
     assert [part for part in command.split(" && ") if part not in script] == []
+
+
+def test_coordinates(opened: xr.Dataset) -> None:
+    assert opened.frequency.values.tolist() == [160.0, 150.0]
+    assert opened.scheme.values.tolist() == ["implicit", "explicit"]
+    assert opened.sweep.values.tolist() == ["up"]
+    assert opened.harmonics.dtype == np.int32
+    assert opened.cycle.values.tolist() == [0.0, 100.0, 1000.0]
+    assert opened.contact.dtype == np.int32
+    assert opened.response.values.tolist() == ["tip"]
+    assert opened.contact_surface.values.tolist() == ["intrados", "extrados"]
+    assert opened.contact_area.values.tolist() == [1e-4, 2e-4]
+    assert opened.contact_z.values.tolist() == [0.3, 0.6]
+    assert all("_FillValue" not in opened[name].encoding for name in opened.coords)

@@ -18,7 +18,7 @@ from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import MarchTask
+from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.mpi.launching import count_rows
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 from tests.studyrunner.fakes import fake_branch
@@ -189,7 +189,6 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     assert count_rows("under_way") == 0
 
 
-@pytest.mark.slow
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """Start states may be damaged while the progress of their branch is not."""
     expected = whole(solver)
@@ -259,3 +258,24 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(load(), load("whole.nc"))
     assert count_rows("under_way") == 0
+
+
+def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> None:
+    expected = whole(solver)
+
+    def fail(task: Task, _: int) -> None:
+        # the second state of the sweep upwards
+        if isinstance(task, BranchTask) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
+            seen[id(task)] = place + 1
+            if place == 1:
+                raise ZeroDivisionError("a bug")
+
+    seen: dict[int, int] = {}
+    solver.disturb = fail
+    assert main(TWO_WAYS) in (0, 3)
+    assert len(solver.tasks) == 2 + 8
+    solver.begin_again()
+    assert main([*TWO_WAYS, "--retry-failed"]) == 0
+    assert [type(task) for task in solver.tasks][:1] == [BranchTask]
+    assert solver.n_results == 1 + 2 or solver.n_results == 1
+    xr.testing.assert_identical(load(), expected)

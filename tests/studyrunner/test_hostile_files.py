@@ -26,11 +26,16 @@ pytestmark = pytest.mark.usefixtures("reader")
 IN_A_RESULT = (*("huge matrix", "inflating chunk", "external link", "many objects", "not a number"),)
 """One of each kind of harm: behind this door is the same reader of scenes."""
 
-"""The same for texts of studies."""
-
 VALUES_ONLY = {
     *("huge matrix", "bomb of zeros", "64 bit overflow", "label with an escape sequence", "not a number"),
-    *("next to the largest", "wrong byte order", "huge number of sectors", "long texts"),
+    *(
+        "bomb within the limit",
+        "denormal area",
+        "next to the largest",
+        "wrong byte order",
+        "huge number of sectors",
+        "long texts",
+    ),
     *("objects", "attribute of text", "circle of groups", "name with an escape sequence"),
 }
 """No harm to a program that reads parts of what it knows."""
@@ -100,7 +105,6 @@ def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refus
     return run
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
 def test_scene_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -118,7 +122,6 @@ def put_scene_into_result() -> None:
             pytest.skip("the library cannot copy it")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", IN_A_RESULT)
 def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -127,7 +130,6 @@ def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
     assert not line or "result: " in line
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
 def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     check_result_file(folder / "result", "result")
@@ -200,3 +202,12 @@ def test_the_command_alone(case: str, folder: Path) -> None:
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) == (status == 2)
     assert 1024 * largest < LARGEST
+
+
+@pytest.mark.parametrize("case", ["nested arrays", "escape sequence in a key"])
+def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
+    with h5py.File("result", "r+", libver="latest") as result:
+        del result.attrs["study"]
+        result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))
+    (folder / "scene.h5").unlink()
+    refused(["result", "--plan"])

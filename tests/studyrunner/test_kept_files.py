@@ -100,3 +100,14 @@ def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Pat
     left = {path.name for path in folder.iterdir()}
     foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
     assert left == {"out.nc", "out.nc.progress", *foreign}
+
+
+@pytest.mark.slow
+def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
+    assert main(APART) == 0
+    assert main([*VARIANT, "--fresh"]) == 0
+    solver.begin_again()
+    assert main(APART) == 0
+    assert solver.tasks == []
+    assert main([*APART, "--fresh"]) == 0
+    assert len(solver.tasks) > N_POINTS

@@ -123,7 +123,6 @@ def test_the_policy_allows_the_scripts_of_the_page_only(found: Reader) -> None:
     assert "default-src 'none'" in policy
 
 
-@pytest.mark.slow
 def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
     axes = {**AXES, "scheme": (EVIL, "explicit")}
     surfaces = [EVIL] * 12 + ["other"] * 12
@@ -167,7 +166,6 @@ def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
     assert "most worn of 2500 points" in read(tmp_path / "index.html").text
 
 
-@pytest.mark.slow
 def test_too_many_points_leave_a_page_without_scripts(tmp_path: Path) -> None:
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, MOST_POINTS).tolist()}
     dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))

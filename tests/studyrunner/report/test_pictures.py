@@ -41,7 +41,6 @@ def line_of(stored: dict[str, Any], figure: str, label: str) -> dict[float, floa
     return dict(zip(x, y, strict=True))
 
 
-@pytest.mark.slow
 def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> None:
     """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
 

@@ -28,7 +28,6 @@ def items_of(precision: Precision) -> dict[str, Drawing | Missing | Table]:
     return dict(zip(names, items, strict=True))
 
 
-@pytest.mark.slow
 def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
     precision = precision_of(finest_file(estimate=lambda _: 1e-4))
     items = items_of(precision)

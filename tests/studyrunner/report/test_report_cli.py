@@ -32,7 +32,6 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
 def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["results/worn.x.nc"]) == WRITTEN
     said = capsys.readouterr()
@@ -43,7 +42,6 @@ def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: p
     assert said.err == ""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [

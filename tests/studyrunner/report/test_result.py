@@ -14,7 +14,6 @@ from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result
 
 
-@pytest.mark.slow
 def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     path = tmp_path / "made.nc"
     made = make_result()
@@ -28,7 +27,6 @@ def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     result.close()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [

@@ -134,7 +134,6 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -
     assert len(surface.faces) == 16
 
 
-@pytest.mark.slow
 def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None:
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     assert surface is not None
@@ -163,3 +162,11 @@ def test_the_figures_of_the_dovetail(dovetail: Result) -> None:
     assert sorted(int(text) for text in written if text.isdigit()) == list(range(16))
     assert written.count("leading edge") == 2
     assert "47 sectors" in disk.caption
+
+
+def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path: Path) -> None:
+    positions = np.column_stack([np.linspace(-2e-4, 2e-4, 9), np.zeros(9), np.zeros(9)])
+    surface = read_root(as_result(build_file(positions=positions, surfaces=["line"] * 9), tmp_path / "line.nc"))
+    assert surface is not None
+    assert np.ptp(surface.nodes[:, 0]) == pytest.approx(9 * 5e-5)
+    np.testing.assert_allclose(surface.nodes[:, 2], 0.0, atol=1e-15)

@@ -106,6 +106,7 @@ def other_kind(name: str, content: object) -> Callable[[h5py.File], None]:
 
 
 REFUSED = {
+    "a frequency that is none": values("frequency", 0, np.nan),
     "study of a hundred thousand parts": study(".".join(["a"] * 100_000) + " = 1"),
     "study that is nested deeply": study("a = " + "[" * 50_000),
     "dimension list of a number": dimension_list(1),
@@ -120,7 +121,6 @@ REFUSED = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", REFUSED)
 def test_refused_in_a_sentence(
     case: str, folder: Path, capsys: pytest.CaptureFixture[str], reader: ReadingProcess
