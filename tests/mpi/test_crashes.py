@@ -73,7 +73,7 @@ def test_one_crash_says_nothing_of_the_task(whole: xr.Dataset, tmp_path: Path) -
 
 def test_crashes_are_counted_until_the_run_starts_over(tmp_path: Path) -> None:
     crash = {"FAKE_CRASH": "abort"}
-    for arguments in ([], ["--fresh"]):
+    for arguments in ([], ["--fresh"], []):
         assert run_to_end(0, [*STUDY, *arguments], tmp_path, crash).status == -signal.SIGABRT
     assert run_to_end(0, STUDY, tmp_path, crash).status == 3
     assert (results(tmp_path / "out.nc").outcome == Outcome.CRASHED).sum() == 1

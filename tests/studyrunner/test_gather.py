@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import re
 from collections.abc import Sequence
@@ -182,17 +181,6 @@ def test_the_file_is_the_one_of_the_plain_twin(
             expected, found = ({k: v for k, v in at[name].encoding.items() if k not in own} for at in (twin, opened))
             np.testing.assert_equal(found, expected)
         assert opened.encoding["unlimited_dims"] == twin.encoding["unlimited_dims"]
-
-
-@pytest.mark.parametrize("shape", [(7,), (3, 1, 5, 2)])
-@pytest.mark.parametrize("n_points", [1, 6, 1000])
-def test_slabs_are_all_points_in_the_order_of_the_file(shape: tuple[int, ...], n_points: int) -> None:
-    slab = gather._slab_shape(shape, int(gather._BYTES_A_SLAB // n_points))
-    assert np.prod(slab) <= n_points
-    points = np.arange(np.prod(shape)).reshape(shape)
-    found = [(points[region].ravel().tolist(), first, last) for region, first, last in gather._slabs(shape, slab)]
-    assert all(inside == list(range(first, last)) for inside, first, last in found)
-    assert list(itertools.chain.from_iterable(inside for inside, *_ in found)) == points.ravel().tolist()
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,37 +94,6 @@ def test_from_deck_to_worn_volume(folder, capsys):
     assert "scene.nodal_diameter = 2: leave it out" in capsys.readouterr().err
 
 
-def test_lengths_in_millimetres(folder):
-    """The same model in mm, t and s is the same scene."""
-    lines, factors = [], None
-    keyword = ""
-    for line in SECTOR.read_text().splitlines():
-        if line.startswith("*"):
-            keyword = line.split(",")[0].upper()
-            tolerance = line.replace("TOLERANCE=1e-4", "TOLERANCE=1e-1")
-            lines.append(tolerance)
-            continue
-        factors = {"*NODE": (1, 1e3, 1e3, 1e3), "*ELASTIC": (1e-6, 1), "*DENSITY": (1e-12,)}.get(keyword)
-        if factors is None:
-            lines.append(line)
-            continue
-        parts = line.split(",")
-        first = parts[0] if keyword == "*NODE" else repr(float(parts[0]) * factors[0])
-        rest = [repr(float(part) * factor) for part, factor in zip(parts[1:], factors[1:], strict=True)]
-        lines.append(",".join([first, *rest]))
-    expected = scene_of()
-    (folder / "sector.inp").write_text("\n".join(lines) + "\n")
-    found = scene_of("scene.units=mm-t-s")
-    for k, linear in expected.linear.items():
-        for name in ("stiffness", "mass", "load_static", "load_harmonic"):
-            ours, theirs = getattr(found.linear[k], name), getattr(linear, name)
-            n = 27
-            ours, theirs = (each[(slice(n),) * each.ndim] for each in (ours, theirs))
-            assert np.abs(ours - theirs).max() <= 1e-8 * np.abs(theirs).max()
-    assert found.contact.area == pytest.approx(expected.contact.area, rel=1e-9)
-    assert "density 7.8e+03" in message("scene.units=SI") or "not SI" in message("scene.units=SI")
-
-
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [

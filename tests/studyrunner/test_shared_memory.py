@@ -188,16 +188,6 @@ def test_every_rank_gets_it_and_those_of_a_machine_share(
         np.testing.assert_array_equal(value["a"], np.arange(5.0))
 
 
-def test_without_shared_memory_every_rank_has_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: object) -> None:
-        raise OSError("no space left")
-
-    monkeypatch.setattr(broadcast, "SharedObject", refuse)
-    got, mapped = hand_to_all(monkeypatch, "aabb")
-    assert mapped == 0
-    assert len(got) == 4
-
-
 def test_a_lost_rank_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     got, mapped = hand_to_all(monkeypatch, "aaabbb", lost=frozenset({1, 3}))
     assert mapped == 2

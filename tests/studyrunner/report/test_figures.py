@@ -6,9 +6,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_rgb
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, Table, line_style
+from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import (
@@ -180,13 +179,6 @@ def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
         assert not dataset["wear_depth"].variable._in_memory
         assert not dataset["mean_pressure"].variable._in_memory
         assert dataset["worn_volume"].variable._in_memory
-
-
-def test_lines_differ_without_their_colours() -> None:
-    looks = [line_style(number) for number in range(6)]
-    assert len({(str(look["linestyle"]), look["marker"]) for look in looks}) == 6
-    lightness = [np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) for colour in COLOURS[:3]]
-    assert np.min(np.diff(np.sort(lightness))) > 0.02
 
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one() -> None:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.contour import ContourSet
 
 from studyrunner.report.drawing import new_panels, style
 from studyrunner.report.isolines import add_colour_bar, add_isolines, find_levels
-from tests.studyrunner.report.figure_cases import make_result
-from tests.studyrunner.report.figure_numbers import draw_figure
 
 
 def _contours(panel: Axes) -> list[ContourSet]:
@@ -35,13 +32,3 @@ def test_lines_run_where_a_plane_has_their_level_and_tell_it() -> None:
     bar = figure.axes[-1]
     assert [text.get_text() for text in bar.get_yticklabels()] == ["0", "2", "4", "6", "8"]
     assert [float(line.get_ydata()[0]) for line in bar.get_lines()] == [2.0, 4.0, 6.0, 8.0]
-
-
-@pytest.mark.parametrize("name", ["worn_volume_map", "worn_profile"])
-def test_maps_of_results_have_isolines_in_four_digits(name: str) -> None:
-    figure = draw_figure(make_result(failed=[0]), name).figure
-    found = [lines for panel in figure.axes for lines in _contours(panel)]
-    assert len(found) >= 2
-    told = [text.get_text() for panel in figure.axes for text in panel.texts]
-    assert told
-    assert all(len(text.replace(".", "").lstrip("0")) <= 4 for text in told)
