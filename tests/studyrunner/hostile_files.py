@@ -182,7 +182,6 @@ TEXTS: dict[str, bytes] = {
     "huge integer": _S + b"x = " + b"9" * 100_000,
     "huge exponent": _S.replace(b"[150.0]", b"1e999999999"),
     "long string": b'[study]\nname = "' + b"x" * 3_000_000 + b'"',
-    "many keys": b"[study]\n" + b"".join(b"k%d = 1\n" % n for n in range(200_000)),
     "array of tables": b"[[study]]\n" * 300_000,
     "too long": b"#" * 200_000_000,
     "random bytes": np.random.default_rng(0).bytes(100_000),

@@ -497,3 +497,27 @@ def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store)
     assert shutil.which("sqlite3") is None or b"two_masses" in subprocess.check_output(
         ["sqlite3", str(path), "SELECT * FROM study"]
     )
+
+
+def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
+    fill(path)
+    change_tables(path, "UPDATE results SET size=900000000", "UPDATE start_states SET size=NULL")
+    with contextlib.closing(Store(path)) as store:
+        assert (store.read(RESULTS, key(1)), store.read(STARTS, key(1))) == (None, None)
+        assert not store.has(RESULTS, key(1))
+
+
+def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
+    opened: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store_module, "LARGEST", 10)
+    opened.keep_computed("scene", kept(1))
+    opened.keep_progress(key(1), kept(1))
+    assert (opened.read_computed("scene"), opened.read_progress(key(1))) == (None, None)
+    with pytest.raises(StorageError, match="bytes in one entry: use a smaller model"):
+        put(opened, RESULTS, 1)
+
+
+def test_objects_are_not_kept() -> None:
+    with pytest.raises(TypeError, match="arrays of object are not kept"):
+        contents.compress(Packed("", (np.array([{}], dtype=object),)), 1)
