@@ -105,6 +105,7 @@ def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refus
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
 def test_scene_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -157,6 +158,7 @@ def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> 
     refused(["result" if place == "result" else "study", "--plan"], allowed=place == "study" and share > 0.99)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
 def test_sparse_terabyte(place: str, folder: Path, refused: Refused) -> None:
     sparse_file(folder / place)
@@ -204,6 +206,7 @@ def test_the_command_alone(case: str, folder: Path) -> None:
     assert 1024 * largest < LARGEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["nested arrays", "escape sequence in a key"])
 def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     with h5py.File("result", "r+", libver="latest") as result:
