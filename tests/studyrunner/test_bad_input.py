@@ -34,17 +34,6 @@ WRONG_KEYS = {
     "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
     "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
     "a name of the literature": ("axes.k_w=1", "axes.k_w", "1", "unknown key, give wear_coefficient"),
-<<<<<<< HEAD
-    "a short name": ("axes.amplitude=1", "axes.amplitude", "1", "unknown key, give excitation_amplitude"),
-    "mu": ("scene.mu=0.4", "scene.mu", "0.4", "unknown key, give friction_coefficient"),
-    "a scene key as an axis": (
-        "axes.friction_coeff=1",
-        "axes.friction_coeff",
-        "1",
-        "give friction_coefficient",
-    ),
-=======
->>>>>>> main
     "values for a key that is no axis": (
         "scene.mass=[1.0, 2.0]",
         "scene.mass",

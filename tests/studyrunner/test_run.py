@@ -20,12 +20,7 @@ from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
-<<<<<<< HEAD
-from studyrunner.system.progress import format_seconds
 from studyrunner.variables import ASKED, USUAL
-=======
-from studyrunner.variables import ASKED
->>>>>>> main
 from tests.studyrunner.fakes import changed, fake_evaluate, totals_of, without_values
 from tests.studyrunner.histories import history
 

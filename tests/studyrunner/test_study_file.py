@@ -44,21 +44,6 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-<<<<<<< HEAD
-    ("name", "of_scene"),
-    [("dovetail", ("mesh", "natural_frequency")), ("sdof_slider", ()), ("two_masses", ()), ("extremes", None)],
-)
-def test_by_default_the_scene_tells_what_costs_little(name: str, of_scene: tuple[str, ...] | None) -> None:
-    study = read_study(name)
-    if of_scene is not None:
-        assert study.outputs.variables == (*USUAL, *of_scene)
-    # the default study asks for it
-    assert ("natural_frequency" in study.outputs.variables) == (name == "dovetail")
-
-
-@pytest.mark.parametrize(
-=======
->>>>>>> main
     ("name", "asked", "found"),
     [
         ("dovetail", "['default']", (*USUAL, "mesh")),

@@ -9,11 +9,7 @@ from collections.abc import Sequence
 import pytest
 
 from studyrunner.cli import main
-<<<<<<< HEAD
-from studyrunner.plan.estimate import AUTOMATIC_HARMONICS, largest_memory, memory_a_rank
 from studyrunner.plan.planning import build_tasks
-=======
->>>>>>> main
 from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import TaskPlan
 from studyrunner.study.study import Study

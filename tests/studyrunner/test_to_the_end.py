@@ -11,14 +11,7 @@ import xarray as xr
 
 from studyrunner import UserError, open_result, run_study
 from studyrunner.accessor import join_results
-<<<<<<< HEAD
-from studyrunner.netcdf.attributes import attributes, coordinate_entry
-from studyrunner.plan.identity import Identities
-from studyrunner.plan.plan_text import format_plan
 from studyrunner.plan.planning import build_tasks
-=======
-from studyrunner.plan.planning import build_tasks
->>>>>>> main
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_numbers
 from studyrunner.study.study import Study
@@ -64,30 +57,6 @@ def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remed
     assert remedy in caught.value.remedy
 
 
-<<<<<<< HEAD
-def test_the_plan_says_how_far_it_goes() -> None:
-    study = study_with()
-    text = format_plan(study, FACTS, build_tasks(study, FACTS.n_displacements), 0.0)
-    assert "until the wear rate of every pair is below 0.0001 of its largest; 6 states are kept" in text
-
-
-def test_a_history_is_known_by_how_it_ends() -> None:
-    keys = []
-    for overrides in ((), ("slow_time.final_share=1e-3",), ("slow_time.outputs=7",), ("slow_time.cycles=5",)):
-        study = study_with(*overrides)
-        plan, of = build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
-        keys.append(of.of_histories(plan.branches[0], plan.marches[0][0]))
-    assert len(set(keys)) == 4
-
-
-def test_the_coordinate_is_a_number_of_outputs_there_only() -> None:
-    ended, counted = study_with(), read_study("sdof_slider")
-    assert "number of the output" in attributes("cycle", coordinate_entry(ended, "cycle"))["long_name"]  # type: ignore[operator]
-    assert "vibration cycles" in attributes("cycle", coordinate_entry(counted, "cycle"))["long_name"]  # type: ignore[operator]
-
-
-=======
->>>>>>> main
 @pytest.mark.slow
 def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Path) -> None:
     wears = "axes.wear_coefficient=[1.1e-11, 2.2e-12, 0.0]"
