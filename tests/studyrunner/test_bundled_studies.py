@@ -40,6 +40,13 @@ SMALL = {
         "solver.harmonics=3",
         "solver.samples=64",
     ],
+    "scatter": [
+        "scatter.samples=4",
+        "slow_time.cycles=3000",
+        "slow_time.outputs=3",
+        "solver.harmonics=3",
+        "solver.samples=64",
+    ],
     "sdof_slider": ["axes.frequency=160.0", "slow_time.cycles=4000", "slow_time.outputs=5"],
     "two_masses": ["axes.frequency=0.0954929658551372"],
     "vibro_impact": ["axes.frequency=[0.17, 0.19, 0.21, 0.22]"],
@@ -96,7 +103,14 @@ def agrees_better_with_smaller_steps(result: xr.Dataset) -> None:
         assert fine < 0.7 * coarse
 
 
+def wears_in_each_sample_another_volume(result: xr.Dataset) -> None:
+    worn = result.worn_volume.isel(cycle=-1).squeeze()
+    assert len(set(worn.values.tolist())) == result.sizes["sample"] == 4
+    assert (result.sample_gap.std("sample") > 0.0).all()
+
+
 SHOWN: dict[str, Callable[[xr.Dataset], None]] = {
+    "scatter": wears_in_each_sample_another_volume,
     "dovetail": wears_near_its_resonance_only,
     "vibro_impact": has_two_branches,
     "work_precision": agrees_better_with_smaller_steps,

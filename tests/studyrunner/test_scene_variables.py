@@ -75,7 +75,7 @@ def test_exact_answers_stand_at_their_points() -> None:
             }
             own = [f"axes.{name}={value}" for name, value in axes.items()]
             alone = read_study("sdof_slider", [*own, "slow_time.outputs=3", EXACT])
-            one, other = build_scene_variables(alone, build_study_scene(alone))
+            one, other = exact_answers(alone)
             assert np.array_equal(one.values.ravel(), volume[frequency, 0, amplitude].ravel())
             assert np.array_equal(other.values.ravel(), response[frequency, 0, amplitude].ravel())
 
