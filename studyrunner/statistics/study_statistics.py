@@ -169,7 +169,7 @@ def _index_arrays(
     if layout is None:
         columns = np.array([is_column(dataset, name) for name in inputs])
         indices = plain_indices(table, values, confidence, columns)
-        comment = 'NaN for an input with a draw for each pair: the method "saltelli" tells what all of them decide.'
+        comment = "NaN for an input with a draw for each pair: the method saltelli tells what all of them decide."
     else:
         indices = saltelli_indices(layout, table, values, confidence)
         comment = "Of an input with a draw for each pair: what all of them decide together."
