@@ -83,6 +83,10 @@ def take_scene_axes(
             key = (name,) if inner is None else (name, str(inner))
             dotted = ".".join(key)
             _check_once(sections.get(table, {}), table, key, source)
+            given = only_table(sections.get(table, {}).get(name, {}))
+            if inner is not None and not isinstance(given, Mapping):
+                remedy = f"leave it out, or give a table of the other keys: axes.{dotted} gives one of them"
+                raise UserError(source, f"{table}.{name}", given, remedy)
             if not "_".join(key).isidentifier():
                 remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
                 raise UserError(source, f"axes.{dotted}", values, remedy)

@@ -37,10 +37,7 @@ def no_keep(progress: Packed) -> None:
 
 
 def fake_evaluate(
-    task: BranchTask | MarchTask,
-    keep: Keep = no_keep,
-    facts: SceneFacts = FACTS,
-    seconds: float = 0.0,
+    task: BranchTask | MarchTask, keep: Keep = no_keep, facts: SceneFacts = FACTS, seconds: float = 0.0
 ) -> Iterator[StartResult | MarchResult]:
     """Results that depend on everything in the task but its cost; a march takes up to `seconds`, unevenly."""
     if isinstance(task, BranchTask):
