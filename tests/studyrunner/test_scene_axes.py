@@ -220,7 +220,7 @@ def refused(study: str, overrides: Sequence[str], capsys: pytest.CaptureFixture[
         (["axes.threshold=[1, 2]"], 'axes.threshold = 1.0: leave it out: only the law "threshold" takes it'),
         (["wear.law=threshold", "axes.threshold=[-1, 2]"], "axes.threshold = -1"),
         (["axes.surfaces=[1, 2]"], "axes.surfaces = 1"),
-        (["axes.surfaces={nosuch=[1, 2]}"], "axes.surfaces = {'nosuch': 1.0}"),
+        (["axes.surfaces={nosuch=[1, 2]}"], "axes.surfaces = {nosuch = 1.0}"),
         (["axes.surfaces={'a b'=[1, 2]}"], "a dimension has the name"),
         (["axes.surfaces={'<b>'=[1, 2]}"], "a dimension has the name"),
         (["axes.surfaces={support=[-1, 2]}"], "axes.surfaces = -1"),
