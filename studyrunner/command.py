@@ -190,7 +190,7 @@ def _show_plan(study: Study) -> int:
     planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
     contacts = contact_changes(study, planned.scenes, [planned.facts[number] for number in planned.nearest])
-    plan = build_tasks(study, planned.n_displacements, contacts)
+    plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
     print(*lines, *(f"note       {doubt}" for doubt in doubts_of_study(study)), sep="\n", flush=True)
