@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -121,8 +122,8 @@ def check_scatter(study: Study) -> None:
 
 def _numbers_of(study: Study) -> list[str]:
     """Keys of [scene] and [wear] that are numbers with fractions."""
-    parameters = study.scene.parameters
-    floats = [name for name, field in type(parameters).model_fields.items() if "float" in str(field.annotation)]
+    fields = type(study.scene.parameters).model_fields
+    floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     return [*floats, "threshold"] if study.wear.law == "threshold" else floats
 
 
