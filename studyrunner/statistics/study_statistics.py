@@ -1,0 +1,224 @@
+"""Statistics of the worn volumes of a result with samples, as a labelled dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from studyrunner.scatter.design import SaltelliLayout
+from studyrunner.statistics.bands import Array, Band, SampleValues
+from studyrunner.statistics.indices import Indices, plain_indices, saltelli_indices
+from studyrunner.statistics.quantiles import exceedance, mean, quantile
+from studyrunner.statistics.samples_of_result import (
+    CYCLE,
+    SAMPLE,
+    counted,
+    depth_samples,
+    inputs_of,
+    is_column,
+    scatter_of,
+    volume_samples,
+)
+from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
+
+_N_THRESHOLDS = 41
+_N_DENSITY = 101
+_BOUND = "bound"
+_BOUNDS = ("lowest", "highest")
+
+
+def worn_volume_statistics(
+    dataset: xr.Dataset,
+    quantiles: Sequence[float] = (0.05, 0.5, 0.95),
+    confidence: float = 0.95,
+    exceed: ArrayLike | None = None,
+    depth: ArrayLike | None = None,
+) -> xr.Dataset:
+    """What the samples of a result say of worn volume and depth, over all its other dimensions.
+
+    Each statistic comes with a dimension `bound`: its lowest and highest value over all that samples without a value
+    may have, which are equal where all have one. Beside it stand NAME_interval, the confidence interval, and
+    NAME_error, its ends with every value less or more its numerical error. Indices and groups are of the samples
+    themselves: with saltelli, indices are of the whole design, all others of its independent rows.
+
+    Parameters
+    ----------
+    dataset
+        Result with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`.
+    quantiles
+        Probabilities between 0 and 1, ascending.
+    confidence
+        Of the intervals, between 0 and 1.
+    exceed
+        m3, worn volumes whose probability of exceedance is told; 41 up to the largest volume where left out.
+    depth
+        m, depths whose probability to be exceeded before a cycle count is told; chosen likewise.
+
+    Returns
+    -------
+    xr.Dataset
+        worn_volume_quantile, worn_volume_mean (m3), worn_volume_exceedance, wear_depth_exceedance, first_index,
+        total_index (1), each with _interval and _error; n_samples, n_without_value; of the last count
+        worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one
+        group), deciding_contact (-1: none), deciding_depth (m).
+
+    Raises
+    ------
+    ValueError
+        Where the result has no samples or no worn volume, or a probability is not between 0 and 1.
+    """
+    for name in ("worn_volume", "outcome"):
+        if name not in dataset or SAMPLE not in dataset[name].dims:
+            raise ValueError(f"The result holds no {name} of samples: run a study with [scatter].")
+    if not all(0.0 < each < 1.0 for each in (*quantiles, confidence)):
+        raise ValueError(f"Give probabilities between 0 and 1, not {tuple(quantiles)} and {confidence}.")
+    dataset = counted(dataset)
+    everything, dims = volume_samples(dataset)
+    section, inputs = scatter_of(dataset), inputs_of(dataset)
+    layout = SaltelliLayout(len(inputs)) if section is not None and section.method == "saltelli" else None
+    independent = _independent(dataset.sizes[SAMPLE], layout)
+    values = everything.at((..., independent))
+
+    found = _band_arrays(
+        "worn_volume_quantile",
+        _stacked(values, quantiles, confidence),
+        [*dims, "quantile"],
+        "m3",
+        "quantile of worn volume",
+    )
+    found |= _band_arrays("worn_volume_mean", mean(values, confidence), list(dims), "m3", "mean worn volume")
+    coordinates: dict[Hashable, object] = {
+        "quantile": ("quantile", list(quantiles), {"units": "1", "long_name": "probability"})
+    }
+
+    thresholds = _thresholds(exceed, values)
+    band = exceedance(values, thresholds, confidence)
+    long_name = "probability of a larger worn volume"
+    found |= _band_arrays("worn_volume_exceedance", band, [*dims, "exceeded_volume"], "1", long_name)
+    coordinates["exceeded_volume"] = ("exceeded_volume", thresholds, {"units": "m3", "long_name": "worn volume"})
+
+    depths = depth_samples(dataset)
+    if depths is not None:
+        depth_values, depth_dims = depths[0].at((..., independent)), depths[1]
+        thresholds = _thresholds(depth, depth_values)
+        band = exceedance(depth_values, thresholds, confidence)
+        long_name = "probability that a pair is worn deeper before this cycle"
+        found |= _band_arrays("wear_depth_exceedance", band, [*depth_dims, "exceeded_depth"], "1", long_name)
+        coordinates["exceeded_depth"] = ("exceeded_depth", thresholds, {"units": "m", "long_name": "wear depth"})
+
+    if inputs:
+        table = np.stack(list(inputs.values()), axis=1)
+        if layout is None:
+            balanced = np.array([is_column(dataset, name) for name in inputs])
+            indices = plain_indices(table, everything, confidence, balanced)
+        else:
+            indices = saltelli_indices(layout, table, everything, confidence)
+        found |= _index_arrays(indices, list(dims))
+        coordinates["input"] = ("input", list(inputs), {"units": "1", "long_name": "input that scatters"})
+
+    n_without = (~values.is_known).sum(axis=-1)
+    found["n_samples"] = xr.DataArray(values.n_samples, attrs={"units": "1", "long_name": "samples"})
+    found["n_without_value"] = xr.DataArray(
+        n_without, dims=list(dims), attrs={"units": "1", "long_name": "samples without a value to be trusted"}
+    )
+    found |= _group_arrays(dataset, values, independent, dims)
+    coordinates[_BOUND] = (_BOUND, list(_BOUNDS), {"long_name": "over what samples without a value may have"})
+    kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(dims) and array.dims}
+    title = f"Statistics of {values.n_samples} samples"
+    attributes = {"title": title, "confidence": confidence}
+    return xr.Dataset(found, {**kept, **coordinates}, attributes)
+
+
+def _independent(n_rows: int, layout: SaltelliLayout | None) -> NDArray[np.intp]:
+    """Rows that are independent samples: all, or A and B of a Saltelli design."""
+    rows = np.arange(n_rows)
+    return rows if layout is None else rows[rows % layout.rows_per_base < 2]
+
+
+def _stacked(values: SampleValues, probabilities: Sequence[float], confidence: float) -> Band:
+    """Quantiles (..., n_probabilities)."""
+    bands = [quantile(values, each, confidence) for each in probabilities]
+    return Band(*(np.stack([getattr(band, each.name) for band in bands], axis=-1) for each in fields(Band)))
+
+
+def _thresholds(given: ArrayLike | None, values: SampleValues) -> Array:
+    if given is not None:
+        return np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
+    return np.linspace(0.0, float(values.low.max()) or 1.0, _N_THRESHOLDS)
+
+
+def _band_arrays(name: str, band: Band, dims: list[Hashable], units: str, long_name: str) -> dict[str, xr.DataArray]:
+    """NAME, NAME_interval and NAME_error; none of the quantities here is below 0."""
+    ends = {
+        "": (band.lowest, band.highest, ""),
+        "_interval": (band.interval_low, band.interval_high, ", confidence interval"),
+        "_error": (band.error_low, band.error_high, ", with numerical error"),
+    }
+    return {
+        name + suffix: xr.DataArray(
+            np.maximum(np.stack([low, high], axis=-1), 0.0),
+            dims=[*dims, _BOUND],
+            attrs={"units": units, "long_name": long_name + words},
+        )
+        for suffix, (low, high, words) in ends.items()
+    }
+
+
+def _index_arrays(indices: Indices, dims: list[Hashable]) -> dict[str, xr.DataArray]:
+    first, total = "share of the variance that the input decides alone", "share that it decides with the others"
+    found = _band_arrays("first_index", indices.first, [*dims, "input"], "1", first)
+    found |= _band_arrays("total_index", indices.total, [*dims, "input"], "1", total)
+    for name, array in found.items():
+        array.attrs["method"] = indices.first_method if name.startswith("first") else indices.total_method
+        array.attrs["comment"] = (
+            "From plain samples, of an input with a draw for each pair: what its mean over the pairs decides."
+        )
+    return found
+
+
+def _group_arrays(
+    dataset: xr.Dataset, values: SampleValues, rows: NDArray[np.intp], dims: Mapping[Hashable, int]
+) -> dict[str, xr.DataArray]:
+    """Density and groups at the last count."""
+    axes = [name for name in dims if name != CYCLE]
+    shape = tuple(dims[name] for name in axes)
+    place = tuple(-1 if name == CYCLE else slice(None) for name in dims)
+    at_last = values.at(place)
+    depths = None
+    if "wear_depth" in dataset:
+        depths = dataset["wear_depth"].isel({CYCLE: -1}, missing_dims="ignore").isel({SAMPLE: rows})
+        depths = depths.transpose(*axes, SAMPLE, "contact")
+    grid, curve = np.full((*shape, _N_DENSITY), np.nan), np.full((*shape, _N_DENSITY), np.nan)
+    sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)
+    contact, threshold = np.full(shape, -1, dtype=np.int32), np.full(shape, np.nan)
+    for point in np.ndindex(shape):
+        samples = at_last.at(point)
+        groups = two_groups(samples)
+        known = samples.low[samples.is_known]
+        sizes[point] = (known.size, 0) if groups is None else (groups.n_lower, groups.n_upper)
+        if known.size:
+            margin = 0.1 * float(np.ptp(known))
+            grid[point] = np.linspace(max(known.min() - margin, 0.0), known.max() + margin, _N_DENSITY)
+            curve[point] = density(samples, groups, grid[point])
+        if groups is not None:
+            gap[point] = groups.lower_end, groups.upper_end
+            pair = None if depths is None else deciding_pair(depths.values[point], groups)
+            if pair is not None:
+                contact[point], threshold[point] = dataset["contact"].values[pair.contact], pair.threshold
+    return {
+        "worn_volume_grid": _array(grid, [*axes, "grid"], "m3", "worn volume"),
+        "worn_volume_density": _array(curve, [*axes, "grid"], "1/m3", "density of the samples at the last count"),
+        "group_size": _array(sizes, [*axes, "group"], "1", "samples below and above the gap; all, 0: one group"),
+        "group_gap": _array(gap, [*axes, "group"], "m3", "ends of the gap between two groups"),
+        "deciding_contact": _array(contact, axes, "1", "contact pair that separates the groups best, -1: none"),
+        "deciding_depth": _array(threshold, axes, "m", "wear depth of this pair between the groups"),
+    }
+
+
+def _array(values: NDArray[Any], dims: Sequence[Hashable], units: str, long_name: str) -> xr.DataArray:
+    return xr.DataArray(values, dims=list(dims), attrs={"units": units, "long_name": long_name})

@@ -1,0 +1,125 @@
+"""Whether samples fall into two groups, as where a pair slips or locks; the density, and the pair that decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from studyrunner.statistics.bands import Array, SampleValues
+
+_FALSE_ALARMS = 0.005
+"""Bound of the probability that samples of one group are told as two."""
+_FEWEST_SPACINGS = 2
+"""In each group: with one a gap passes at ratios that no joint has."""
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Two groups of samples with a gap between. lower_end, upper_end: of the gap, in the unit of the samples.
+
+    is_upper (n,): whether a sample is in the upper group. is_placed (n,): whether it is known to be in one of them.
+    """
+
+    lower_end: float
+    upper_end: float
+    is_upper: NDArray[np.bool_]
+    is_placed: NDArray[np.bool_]
+
+    @property
+    def n_lower(self) -> int:
+        """Samples below the gap."""
+        return int(np.count_nonzero(self.is_placed & ~self.is_upper))
+
+    @property
+    def n_upper(self) -> int:
+        """Samples above the gap."""
+        return int(np.count_nonzero(self.is_placed & self.is_upper))
+
+
+@dataclass(frozen=True)
+class DecidingPair:
+    """The contact pair whose depth separates two groups best: its number, m between both, and in which it is deeper."""
+
+    contact: int
+    threshold: float
+    deeper_above: bool
+
+
+def two_groups(values: SampleValues) -> Groups | None:
+    """The two groups of samples (n,), None where one hill of any form may be what they are of.
+
+    Where the density has one peak, it falls from every gap outwards on one side at least. The spacings there are then
+    longer than the gap by trend, and the ratio of the gap to the mean of these k spacings is above r with a probability
+    of at most (1 + r / k)^-k, the one of a uniform density. The gap is compared with the side on which the probability
+    is larger; that any of n gaps passes by chance has a probability below 0.5 %. The gap must be longer than the
+    numerical errors beside it. Of the gaps that pass the longest is taken.
+    """
+    known = values.is_known
+    order = np.argsort(values.low[known], kind="stable")
+    sample, error = values.low[known][order], values.error[known][order]
+    sample, error = values.low[known][order], values.error[known][order]
+    gap, number = np.diff(sample), np.arange(len(sample) - 1)
+    chance = np.maximum(
+        _chance(gap, number, sample[:-1] - sample[:1]), _chance(gap, number[::-1], sample[-1:] - sample[1:])
+    )
+    passes = (chance * len(gap) < _FALSE_ALARMS) & (gap > error[:-1] + error[1:])
+    passes &= np.minimum(number, number[::-1]) >= _FEWEST_SPACINGS
+    if not passes.any():
+        return None
+    best = int(np.argmax(np.where(passes, gap, 0.0)))
+    lower, upper = float(sample[best]), float(sample[best + 1])
+    is_upper = values.low > lower
+    return Groups(lower, upper, is_upper, is_upper | (values.high < upper))
+
+
+def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
+    """Density of the samples with a value at the points of a grid (m,): Gaussian kernels, Silverman's width.
+
+    The width is of each group alone, so that both peaks stay as sharp as they are. NaN for samples that are all equal.
+    """
+    known = values.is_known
+    parts = [known] if groups is None else [known & ~groups.is_upper, known & groups.is_upper]
+    whole = np.zeros(grid.shape)
+    for part in parts:
+        sample = values.low[part]
+        width = 1.06 * sample.std() * len(sample) ** -0.2 if len(sample) else 0.0
+        # equal samples: as narrow a peak as the grid shows
+        width = max(width, 0.5 * float(np.ptp(grid)) / len(grid))
+        if len(sample) == 0 or width == 0.0:
+            return np.full(grid.shape, np.nan)
+        whole += norm.pdf(grid[:, None], sample, width).sum(axis=1) / np.count_nonzero(known)
+    return whole
+
+
+def deciding_pair(depths: Array, groups: Groups) -> DecidingPair | None:
+    """The pair that separates both groups best; None where the depths of each pair overlap.
+
+    depths (n, n_pairs): m, NaN where not known. Of the pairs whose depths in one group are all larger than those in the
+    other, the one with the largest distance of the means over the root of the mean of both variances.
+    """
+    known = groups.is_placed & np.isfinite(depths).all(axis=1)
+    below, above = depths[known & ~groups.is_upper], depths[known & groups.is_upper]
+    if len(below) == 0 or len(above) == 0:
+        return None
+    rises = above.min(axis=0) > below.max(axis=0)
+    falls = above.max(axis=0) < below.min(axis=0)
+    if not (rises | falls).any():
+        return None
+    width = np.sqrt(0.5 * (below.var(axis=0) + above.var(axis=0)))
+    distance = np.abs(above.mean(axis=0) - below.mean(axis=0))
+    ratio = np.divide(distance, width, out=np.full(len(width), np.inf), where=width > 0.0)
+    pair = int(np.argmax(np.where(rises | falls, ratio, -1.0)))
+    if rises[pair]:
+        threshold = 0.5 * (below[:, pair].max() + above[:, pair].min())
+    else:
+        threshold = 0.5 * (above[:, pair].max() + below[:, pair].min())
+    return DecidingPair(pair, float(threshold), bool(rises[pair]))
+
+
+def _chance(gap: Array, number: NDArray[np.intp], length: Array) -> Array:
+    """Probability of a gap beside so many spacings of this length in all on one side, if they are of one density."""
+    share = np.divide(length, length + gap, out=np.ones(len(gap)), where=length + gap > 0.0)
+    return np.asarray(share**number)
