@@ -354,7 +354,7 @@ def _axis(axis: xr.DataArray) -> dict[str, object]:
     words = axis.dtype.kind not in "fiu"
     return {
         "label": str(axis.name).replace("_", " "),
-        "unit": units_of(str(axis.name)),
+        "unit": units_of(axis),
         "words": words,
         "values": [str(value) for value in axis.values] if words else axis.values.tolist(),
     }

@@ -67,7 +67,7 @@ def _axis_values(result: Result, name: str) -> str:
     axis = result.dataset[name]
     words = axis.dtype.kind not in "fiu"
     values = [str(value) if words else show_number(float(value)) for value in axis.values]
-    units = units_of(name)
+    units = units_of(axis)
     after = f" {units}" if units else ""
     if len(values) > _MOST_VALUES:
         return f"{values[0]} to {values[-1]}{after}, {len(values)} values"
