@@ -53,12 +53,13 @@ def _range(low: float, high: float) -> str:
 
 
 def _error(point: xr.Dataset, middle: int) -> str:
-    low, high = point["worn_volume_quantile_error"].values[middle]
-    value = float(point["worn_volume_quantile"].values[middle, 0])
-    spread = 0.5 * float(high - low)
-    if not math.isfinite(spread) or value <= 0.0:
-        return "numerical error not known" if spread > 0.0 else "no numerical error"
-    return f"numerical error {show_percent(spread / value)}"
+    """Numerical error of the median: how far its ends move, apart from what samples without a value may have."""
+    ends = point["worn_volume_quantile"].values[middle]
+    finite = np.isfinite(ends)
+    moved = np.abs(point["worn_volume_quantile_error"].values[middle][finite] - ends[finite])
+    if not (finite.any() and np.isfinite(moved).all()):
+        return "numerical error not known"
+    return f"numerical error {show_percent(float(moved.sum() / ends[finite].sum()) if moved.any() else 0.0)}"
 
 
 def _groups(point: xr.Dataset) -> str:
@@ -72,11 +73,14 @@ def _groups(point: xr.Dataset) -> str:
 
 
 def _deciding(point: xr.Dataset) -> str:
+    """The input with the largest first index."""
     if "first_index" not in point or not point["first_index"].notnull().any():
         return ""
-    share = point["first_index"].min("bound").fillna(0.0).values
-    name = str(point["input"].values[int(np.argmax(share))]).replace("_", " ")
-    return f"; {name} decides {100.0 * float(share.max()):.0f} %"
+    share = point["first_index"].fillna(0.0).values
+    most = int(np.argmax(share[:, 0]))
+    low, high = (f"{100.0 * each:.0f}" for each in share[most])
+    name = str(point["input"].values[most]).replace("_", " ")
+    return f"; {name} decides {low if low == high else f'{low} to {high}'} %"
 
 
 def _show(coordinate: xr.DataArray) -> str:

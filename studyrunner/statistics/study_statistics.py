@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.scatter.design import SaltelliLayout
 from studyrunner.statistics.bands import Array, Band, SampleValues
-from studyrunner.statistics.indices import Indices, plain_indices, saltelli_indices
+from studyrunner.statistics.indices import plain_indices, saltelli_indices
 from studyrunner.statistics.quantiles import exceedance, mean, quantile
 from studyrunner.statistics.samples_of_result import (
     CYCLE,
@@ -79,59 +79,34 @@ def worn_volume_statistics(
         raise ValueError(f"Give probabilities between 0 and 1, not {tuple(quantiles)} and {confidence}.")
     dataset = counted(dataset)
     everything, dims = volume_samples(dataset)
-    section, inputs = scatter_of(dataset), inputs_of(dataset)
-    layout = SaltelliLayout(len(inputs)) if section is not None and section.method == "saltelli" else None
-    independent = _independent(dataset.sizes[SAMPLE], layout)
-    values = everything.at((..., independent))
+    section = scatter_of(dataset)
+    layout = SaltelliLayout(len(section.inputs)) if section is not None and section.method == "saltelli" else None
+    rows = _independent(dataset.sizes[SAMPLE], layout)
+    values, names = everything.at((..., rows)), list(dims)
 
-    found = _band_arrays(
-        "worn_volume_quantile",
-        _stacked(values, quantiles, confidence),
-        [*dims, "quantile"],
-        "m3",
-        "quantile of worn volume",
-    )
-    found |= _band_arrays("worn_volume_mean", mean(values, confidence), list(dims), "m3", "mean worn volume")
-    coordinates: dict[Hashable, object] = {
-        "quantile": ("quantile", list(quantiles), {"units": "1", "long_name": "probability"})
-    }
-
-    thresholds = _thresholds(exceed, values)
-    band = exceedance(values, thresholds, confidence)
-    long_name = "probability of a larger worn volume"
-    found |= _band_arrays("worn_volume_exceedance", band, [*dims, "exceeded_volume"], "1", long_name)
-    coordinates["exceeded_volume"] = ("exceeded_volume", thresholds, {"units": "m3", "long_name": "worn volume"})
+    found = _band_arrays("worn_volume_mean", "mean worn volume", "m3", mean(values, confidence), names)
+    axis = _axis("quantile", quantiles, "1", "probability")
+    band = _stacked(values, quantiles, confidence)
+    found |= _band_arrays("worn_volume_quantile", "quantile of worn volume", "m3", band, names, axis)
+    axis = _axis("exceeded_volume", _thresholds(exceed, values), "m3", "worn volume")
+    band = exceedance(values, axis.values, confidence)
+    found |= _band_arrays("worn_volume_exceedance", "probability of a larger worn volume", "1", band, names, axis)
 
     depths = depth_samples(dataset)
     if depths is not None:
-        depth_values, depth_dims = depths[0].at((..., independent)), depths[1]
-        thresholds = _thresholds(depth, depth_values)
-        band = exceedance(depth_values, thresholds, confidence)
+        depth_values = depths[0].at((..., rows))
+        axis = _axis("exceeded_depth", _thresholds(depth, depth_values), "m", "wear depth")
+        band = exceedance(depth_values, axis.values, confidence)
         long_name = "probability that a pair is worn deeper before this cycle"
-        found |= _band_arrays("wear_depth_exceedance", band, [*depth_dims, "exceeded_depth"], "1", long_name)
-        coordinates["exceeded_depth"] = ("exceeded_depth", thresholds, {"units": "m", "long_name": "wear depth"})
+        found |= _band_arrays("wear_depth_exceedance", long_name, "1", band, list(depths[1]), axis)
 
-    if inputs:
-        table = np.stack(list(inputs.values()), axis=1)
-        if layout is None:
-            balanced = np.array([is_column(dataset, name) for name in inputs])
-            indices = plain_indices(table, everything, confidence, balanced)
-        else:
-            indices = saltelli_indices(layout, table, everything, confidence)
-        found |= _index_arrays(indices, list(dims))
-        coordinates["input"] = ("input", list(inputs), {"units": "1", "long_name": "input that scatters"})
-
+    found |= _index_arrays(dataset, everything, layout, confidence, names)
+    found["n_samples"] = _array(np.int32(values.n_samples), [], "1", "samples")
     n_without = (~values.is_known).sum(axis=-1)
-    found["n_samples"] = xr.DataArray(values.n_samples, attrs={"units": "1", "long_name": "samples"})
-    found["n_without_value"] = xr.DataArray(
-        n_without, dims=list(dims), attrs={"units": "1", "long_name": "samples without a value to be trusted"}
-    )
-    found |= _group_arrays(dataset, values, independent, dims)
-    coordinates[_BOUND] = (_BOUND, list(_BOUNDS), {"long_name": "over what samples without a value may have"})
-    kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(dims) and array.dims}
-    title = f"Statistics of {values.n_samples} samples"
-    attributes = {"title": title, "confidence": confidence}
-    return xr.Dataset(found, {**kept, **coordinates}, attributes)
+    found["n_without_value"] = _array(n_without, names, "1", "samples without a value to be trusted")
+    found |= _group_arrays(dataset, values, rows, dims)
+    kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(dims)}
+    return xr.Dataset(found, kept, {"title": f"Statistics of {values.n_samples} samples", "confidence": confidence})
 
 
 def _independent(n_rows: int, layout: SaltelliLayout | None) -> NDArray[np.intp]:
@@ -152,32 +127,58 @@ def _thresholds(given: ArrayLike | None, values: SampleValues) -> Array:
     return np.linspace(0.0, float(values.low.max()) or 1.0, _N_THRESHOLDS)
 
 
-def _band_arrays(name: str, band: Band, dims: list[Hashable], units: str, long_name: str) -> dict[str, xr.DataArray]:
-    """NAME, NAME_interval and NAME_error; none of the quantities here is below 0."""
-    ends = {
-        "": (band.lowest, band.highest, ""),
-        "_interval": (band.interval_low, band.interval_high, ", confidence interval"),
-        "_error": (band.error_low, band.error_high, ", with numerical error"),
-    }
-    return {
-        name + suffix: xr.DataArray(
-            np.maximum(np.stack([low, high], axis=-1), 0.0),
-            dims=[*dims, _BOUND],
-            attrs={"units": units, "long_name": long_name + words},
-        )
-        for suffix, (low, high, words) in ends.items()
-    }
+def _axis(name: str, values: Sequence[Any] | Array, units: str, long_name: str) -> xr.DataArray:
+    attributes = {"units": units, "long_name": long_name}
+    return xr.DataArray(
+        np.asarray(values), dims=[name], coords={name: (name, np.asarray(values), attributes)}, name=name
+    )
 
 
-def _index_arrays(indices: Indices, dims: list[Hashable]) -> dict[str, xr.DataArray]:
-    first, total = "share of the variance that the input decides alone", "share that it decides with the others"
-    found = _band_arrays("first_index", indices.first, [*dims, "input"], "1", first)
-    found |= _band_arrays("total_index", indices.total, [*dims, "input"], "1", total)
+def _band_arrays(
+    name: str, long_name: str, units: str, band: Band, dims: list[Hashable], axis: xr.DataArray | None = None
+) -> dict[str, xr.DataArray]:
+    """NAME, NAME_interval and NAME_error; no quantity here is below 0. axis: of the last dimension, if it is no axis
+    of the result.
+    """
+    coordinates = {} if axis is None else dict(axis.coords)
+    found = {}
+    for suffix, low, high, words in (
+        ("", band.lowest, band.highest, ""),
+        ("_interval", band.interval_low, band.interval_high, ", confidence interval"),
+        ("_error", band.error_low, band.error_high, ", with numerical error"),
+    ):
+        ends = np.maximum(np.stack([low, high], axis=-1), 0.0)
+        array = _array(ends, [*dims, *coordinates, _BOUND], units, long_name + words)
+        found[name + suffix] = array.assign_coords({**coordinates, _BOUND: list(_BOUNDS)})
+    return found
+
+
+def _index_arrays(
+    dataset: xr.Dataset,
+    values: SampleValues,
+    layout: SaltelliLayout | None,
+    confidence: float,
+    dims: list[Hashable],
+) -> dict[str, xr.DataArray]:
+    """First and total indices; none where nothing scatters."""
+    inputs = inputs_of(dataset)
+    if not inputs:
+        return {}
+    table = np.stack(list(inputs.values()), axis=1)
+    if layout is None:
+        columns = np.array([is_column(dataset, name) for name in inputs])
+        indices = plain_indices(table, values, confidence, columns)
+        comment = "Of an input with a draw for each pair: what its mean over the pairs decides."
+    else:
+        indices = saltelli_indices(layout, table, values, confidence)
+        comment = "Of an input with a draw for each pair: what all of them decide together."
+    axis = _axis("input", list(inputs), "1", "input that scatters")
+    words = "share of the variance that the input decides"
+    found = _band_arrays("first_index", f"{words} alone", "1", indices.first, dims, axis)
+    found |= _band_arrays("total_index", f"{words}, with the others", "1", indices.total, dims, axis)
     for name, array in found.items():
-        array.attrs["method"] = indices.first_method if name.startswith("first") else indices.total_method
-        array.attrs["comment"] = (
-            "From plain samples, of an input with a draw for each pair: what its mean over the pairs decides."
-        )
+        method = indices.first_method if name.startswith("first") else indices.total_method
+        array.attrs |= {"method": method, "comment": comment}
     return found
 
 
@@ -220,5 +221,5 @@ def _group_arrays(
     }
 
 
-def _array(values: NDArray[Any], dims: Sequence[Hashable], units: str, long_name: str) -> xr.DataArray:
+def _array(values: NDArray[Any] | np.int32, dims: Sequence[Hashable], units: str, long_name: str) -> xr.DataArray:
     return xr.DataArray(values, dims=list(dims), attrs={"units": units, "long_name": long_name})

@@ -126,9 +126,9 @@ def test_bands_hold_what_the_missing_samples_would_have_said() -> None:
     ("model", "first", "total"), [(archard, FIRST, TOTAL), (ishigami, *ishigami_indices())], ids=["archard", "ishigami"]
 )
 def test_indices_of_plain_samples(model: Callable[[Array], Array], first: Array, total: Array) -> None:
-    design = unit_design("sobol", 2, 512, 3)
+    design = unit_design("sobol", 2, 256, 3)
     found = plain_indices(design, known(model(design)), 0.95, SOBOL[: design.shape[1]])
-    check_indices(found, first, total, 0.04)
+    check_indices(found, first, total, 0.06)
     assert "Plischke" in found.first_method
     assert "Sudret" in found.total_method
 
