@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.toml_text import read_toml
 from studyrunner.user_error import UserError
 
@@ -56,6 +57,19 @@ class FretwearAccessor:
     def surfaces(self) -> tuple[str, ...]:
         """Labels of the surfaces of the joint, in the order in which they first appear."""
         return tuple(dict.fromkeys(str(label) for label in self._dataset["contact_surface"].values))
+
+    def worn_volume_statistics(
+        self,
+        quantiles: Sequence[float] = (0.05, 0.5, 0.95),
+        confidence: float = 0.95,
+        exceed: Sequence[float] | None = None,
+        depth: Sequence[float] | None = None,
+    ) -> xr.Dataset:
+        """What the samples of a study with [scatter] say of worn volume and depth.
+
+        As `studyrunner.statistics.study_statistics.worn_volume_statistics` of this dataset. ValueError: it has none.
+        """
+        return worn_volume_statistics(self._dataset, quantiles, confidence, exceed, depth)
 
     def flank(self, name: str, surface: str) -> xr.DataArray:
         """Variable `name` of the pairs of one surface, on the grid in which they lie.

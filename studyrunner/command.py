@@ -226,6 +226,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
+    from studyrunner.sample_lines import describe_samples
     from studyrunner.scene.scene_set import merge_facts
     from studyrunner.scene_building import build_scenes
     from studyrunner.system.progress import ProgressDisplay, format_seconds
@@ -255,5 +256,6 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     counts = f"{summary.n_points} points, {summary.n_complete} computed, {failed} failed"
     head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
     untouched = [] if summary.written else [f"{path} is the finished result that it was"]
-    print(head, summary.certificates, *summary.findings, *untouched, sep="\n", flush=True)
+    samples = [] if study.scatter is None or not summary.written else describe_samples(target.path)
+    print(head, summary.certificates, *summary.findings, *untouched, *samples, sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED

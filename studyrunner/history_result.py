@@ -136,6 +136,9 @@ def _variable(
         values = slower * history.wear_rate
     elif name == "wear_depth_max":
         values = history.wear_depth.max(axis=1, initial=0.0)
+    elif name == "wear_depth_max_error":
+        deepest = np.nan_to_num(history.wear_depth).argmax(axis=1)
+        values = np.take_along_axis(history.wear_depth_error, deepest[:, None], axis=1)[:, 0]
     elif name == "cycle_count":
         values = history.cycles / slower
     else:

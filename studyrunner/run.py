@@ -29,7 +29,7 @@ from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.existing_result import Label, Target
 from studyrunner.netcdf.output import crash_folder, older_folder, progress_file, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
-from studyrunner.netcdf.sample_coordinates import sample_coordinates
+from studyrunner.netcdf.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
@@ -146,7 +146,7 @@ class _ResultWriter:
             target.finished,
             {**self.software, **describe_date(self.date)},
             self.pairs,
-            tuple(sample_coordinates(self.study, self.scenes.facts)),
+            (*worn_coordinate(self.study, self.scenes.facts), *sample_coordinates(self.study, self.scenes.facts)),
         )
         for doubt in gathered.doubts:
             if doubt not in self.said:

@@ -49,6 +49,7 @@ ASKED = {
         ("cycle", "contact"), "m", "wear depth", comment="Of both surfaces of the pair together; it opens the pair."
     ),
     "wear_depth_max": Variable(("cycle",), "m", "largest wear depth of any pair"),
+    "wear_depth_max_error": Variable(("cycle",), "m", "estimated error of the wear depth of the deepest pair"),
     "wear_depth_last": Variable(
         ("contact",), "m", "wear depth at the last count", comment="At the last count that the point has reached."
     ),
@@ -159,6 +160,7 @@ OF_SAMPLES = (
     "worn_volume",
     "wear_rate",
     "wear_depth_max",
+    "wear_depth_max_error",
     "wear_depth_last",
     "response_amplitude",
     "response_peak",
@@ -166,7 +168,7 @@ OF_SAMPLES = (
 )
 """Those of a study with [scatter] that names none: what statistics and pictures need, as there are many points."""
 
-USUAL = tuple(name for name in ASKED if name not in ("wear_depth_max", "wear_depth_last"))
+USUAL = tuple(name for name in ASKED if not name.startswith(("wear_depth_max", "wear_depth_last")))
 """Those of other studies that name none."""
 
 SCENE: dict[str, dict[str, Variable]] = {

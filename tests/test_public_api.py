@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,8 +18,6 @@ import studies
 import studyrunner
 from solver import FrequencyResponse, Outcome, SolverSettings, build_model, frequency_response, march_wear
 from studies import SceneError, build_scene, read_scene
-from studies.scene_file import write_scene
-from studies.scenes import sdof_slider
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studyrunner import Study, UserError, open_result, read_study, run, run_study
 from studyrunner.cli import main
@@ -65,21 +62,6 @@ def test_importing_the_packages_loads_nothing_else() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
-
-
-def test_a_name_is_no_module() -> None:
-    """A module of the same name would take the place of the function once it is loaded."""
-    for package in PACKAGES:
-        folder = Path(package.__file__ or "").parent
-        modules = {path.stem for path in folder.iterdir()}
-        assert modules.isdisjoint(package.__all__)
-
-
-def test_types_and_physics_are_part_of_the_packages() -> None:
-    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["package-data"]
-    for name, file in (("solver", "PHYSICS.md"), *((package.__name__, "py.typed") for package in PACKAGES)):
-        assert file in data[name]
-        assert (ROOT / name / file).is_file()
 
 
 @pytest.mark.slow
@@ -240,16 +222,6 @@ def test_what_is_no_result_is_said_in_one_line(tmp_path: Path) -> None:
 # --- scenes ---
 
 
-def test_scenes_are_those_of_studies(tmp_path: Path) -> None:
-    model = build_scene("sdof_slider", normal_load=np.float64(12.0))
-    own = sdof_slider.build(sdof_slider.Parameters(normal_load=12.0), 1)
-    np.testing.assert_array_equal(model.linear[0].load_static, own.linear[0].load_static)
-    write_scene(model, tmp_path / "slider.h5")
-    read = read_scene(tmp_path / "slider.h5")
-    np.testing.assert_array_equal(read.linear[0].stiffness, model.linear[0].stiffness)
-    assert read.response_names == model.response_names
-
-
 def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path: Path) -> None:
     for name, parameters, message in (
         ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
@@ -311,6 +283,7 @@ def test_the_response_without_friction_is_linear() -> None:
         np.testing.assert_allclose(curve.response[place], [exact.sum(), 2.0 * exact[1]], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_one_joint_gives_the_bits_of_a_study(result: xr.Dataset) -> None:
     """In tests BLAS has one thread, as in a run."""
     model = build_scene("sdof_slider")
@@ -328,14 +301,6 @@ def test_one_joint_gives_the_bits_of_a_study(result: xr.Dataset) -> None:
     np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
 
 
-def test_wear_is_that_of_the_closed_form() -> None:
-    counts = np.linspace(0.0, 1e5, 5)
-    history = march_wear(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1.1e-11, counts)
-    exact = sdof_slider.exact_answer(sdof_slider.Parameters(), 160.0, 10.0, np.array([1.1e-11]), counts)
-    np.testing.assert_allclose(history.worn_volume, exact.worn_volume[0], rtol=1e-2)
-    assert history.outcome is Outcome.CONVERGED
-
-
 def test_a_point_that_fails_is_one_point() -> None:
     settings = SolverSettings(time_limit=0.0)
     curve = frequency_response(slider(), [150.0], 10.0, 0.5, settings=settings)
@@ -350,19 +315,15 @@ def test_a_point_that_fails_is_one_point() -> None:
     ("change", "message"),
     [
         ({"mass": [[1.0, 0.0]]}, "mass: give a square matrix instead of shape (1, 2)"),
-        ({"mass": np.eye(3)}, "mass: give a square matrix"),
         ({"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
         ({"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
         ({"contact_dofs": [0, 1, -1]}, "contact_dofs: give a row of 3 indices for each pair"),
         ({"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give -1 or an index from 0 to 1"),
         ({"contact_dofs": [[0, 0, -1]]}, "contact_dofs: give each displacement to one pair only"),
         ({"contact_dofs": [[-1, -1, -1]]}, "contact_dofs: give every pair a displacement"),
-        ({"contact_dofs": [[0.0, 1.0, -1.0]]}, "contact_dofs: give whole numbers"),
         ({"area": 0.0}, "area: give a positive area, m2, to every contact pair"),
-        ({"area": [1.0, 2.0]}, "area: give shape (1,) instead of (2,)"),
         ({"load_harmonic": [1.0]}, "load_harmonic: give shape (2,) instead of (1,)"),
         ({"response": [2]}, "response: give indices from 0 to 1"),
-        ({"response_names": ["one"]}, "response_names: give 2 texts"),
         ({"surface": "left"}, "surface: give 1 texts"),
     ],
 )
@@ -387,19 +348,15 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change: dict[str, Any],
         ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
         ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
         ({"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
-        ({"friction_coefficient": [0.5, -0.1]}, "friction_coefficient: give values of at least 0"),
         ({"friction_coefficient": [0.5, 0.4]}, "friction_coefficient has shape (2,): give a number or shape (1,)"),
         ({"friction_coefficient": None}, "friction_coefficient is missing"),
-        ({"wear_coefficient": -1.0}, "wear_coefficient: give values of at least 0"),
         ({"cycles": [0.0, 2.0, 2.0]}, "cycles: give ascending counts"),
-        ({"cycles": []}, "cycles: give finite numbers"),
         ({"sweep": "sideways"}, "sweep: give one of up, down, ramp instead of 'sideways'"),
         (
             {"scheme": "euler", "step": 1.0},
             "scheme: give one of explicit, implicit, adaptive, final instead of 'euler'",
         ),
         ({"scheme": "implicit"}, 'step: give the length of a step in cycles to the scheme "implicit"'),
-        ({"scheme": "implicit", "step": 0.0}, "step: give values above 0"),
         ({"settings": SolverSettings(harmonics=5, samples=10)}, "settings.samples: give more than 10"),
     ],
 )

@@ -41,11 +41,6 @@ def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(
         assert np.abs(orbit.sample(64)[0]).max() <= amplitude * (1 + 1e-10)
 
 
-def test_both_cases_occur_among_the_compared_sliders() -> None:
-    assert "stick" in phases(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 9.0, 0.8 * np.sqrt(1.6e6)))
-    assert "stick" not in phases(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 3.0, 0.8 * np.sqrt(1.6e6)))
-
-
 @pytest.mark.parametrize("ratio", [1.0, 1 / 3, 0.2])
 def test_den_hartog_refuses_singular_frequencies(ratio: float) -> None:
     with pytest.raises(StopsOccurError, match="singular"):
@@ -84,32 +79,6 @@ def test_two_masses_have_the_known_first_harmonics(omega: float, first: float, s
     assert abs(orbit.harmonic(1, 0)) < 1e-9 * second
 
 
-def test_two_masses_agree_with_friction_that_is_nearly_rigid() -> None:
-    # A steep but smooth friction law in a general integrator; its slope bounds the difference.
-    omega, slope = 0.4, 2e3
-    orbit = coulomb_orbit(*TWO_MASSES, omega)
-    mass, damping, stiffness = (np.array(matrix, dtype=float) for matrix in TWO_MASSES[:3])
-    assert np.array_equal(mass, np.eye(2))
-
-    def rate(time: float, y: np.ndarray) -> np.ndarray:
-        force = np.array([20 * np.cos(omega * time), -7.2 * np.tanh(slope * y[3])])
-        return np.concatenate([y[2:], force - stiffness @ y[:2] - damping @ y[2:]])
-
-    period = orbit.system.period
-    solution = solve_ivp(
-        rate, (0, period), orbit.sample(1)[:, 0], method="LSODA", rtol=1e-9, atol=1e-9, t_eval=[period]
-    )
-    assert solution.y[:, -1] == pytest.approx(orbit.sample(1)[:, 0], rel=1e-3, abs=1e-2)
-
-
-def test_harmonics_are_those_of_the_samples() -> None:
-    orbit = coulomb_orbit(*TWO_MASSES, 0.4)
-    spectrum = np.fft.rfft(orbit.sample(1024)[:2]) * 2 / 1024
-    for dof in (0, 1):
-        for order in (1, 2, 3, 5):
-            assert orbit.harmonic(dof, order) == pytest.approx(spectrum[dof, order], abs=1e-4)
-
-
 def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase() -> None:
     mass = np.diag([1.0, 2.0, 1.5])
     stiffness = np.array([[3.0, -1, 0], [-1, 2, -1], [0, -1, 2]])
@@ -137,48 +106,6 @@ def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega: fl
     period = orbit.system.period
     end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-11, atol=1e-13, max_step=period / 400).y[:, -1]
     assert end == pytest.approx(start, rel=1e-7)
-
-
-def test_vibro_impact_is_linear_on_the_lower_branch() -> None:
-    orbit = vibro_impact_orbit(*VIBRO_IMPACT, 1.2, sweep="down", sweep_start=1.6, sweep_step=0.1)
-    assert phases(orbit) == {"open"}
-    assert abs(orbit.harmonic(0)) == pytest.approx(0.02 / abs(1 - 1.2**2 + 0.06j), rel=1e-10)
-
-
-def test_vibro_impact_with_interference_oscillates_about_its_static_state() -> None:
-    # Wall pressed by 0.02 m; the force is too small to open it: k x + k_w (x + 0.02) = 0 in the mean.
-    orbit = vibro_impact_orbit(2.0, 0.1, 3.0, 0.05, 500.0, -0.02, 1.7, sweep_start=1.6)
-    assert phases(orbit) == {"closed"}
-    assert orbit.harmonic(0, 0).real == pytest.approx(-500 * 0.02 / 503, rel=1e-10)
-    assert abs(orbit.harmonic(0)) == pytest.approx(0.05 / abs(503 - 2 * 1.7**2 + 0.17j), rel=1e-10, abs=0)
-
-
-def test_wear_under_a_constant_force_is_linear() -> None:
-    depth = slider_wear_depth(
-        [0, 10, 100],
-        wear_coefficient=1e-11,
-        area=1e-4,
-        friction_coefficient=0.5,
-        normal_load=10.0,
-        normal_stiffness=0.0,
-        amplitude=lambda _: 1e-4,
-    )
-    assert depth == pytest.approx(np.array([0, 10, 100]) * 1e-11 / 1e-4 * 10 * 4e-4, rel=1e-10, abs=0)
-
-
-def test_wear_under_a_spring_has_its_closed_solution_at_constant_amplitude() -> None:
-    cycles = np.array([0.0, 1e4, 1e5, 1e6])
-    rate = 1.1e-11 / 1e-4 * 4 * 1.5e-4
-    depth = slider_wear_depth(
-        cycles,
-        wear_coefficient=1.1e-11,
-        area=1e-4,
-        friction_coefficient=0.5,
-        normal_load=10.0,
-        normal_stiffness=1e5,
-        amplitude=lambda _: 1.5e-4,
-    )
-    assert depth == pytest.approx(1e-4 * -np.expm1(-1e5 * rate * cycles), rel=1e-9, abs=0)
 
 
 def test_wear_with_den_hartog_has_its_closed_solution() -> None:

@@ -199,7 +199,7 @@ def _write_values(
             continue
         own = (1 if _one_pair(name, dimension) else sizes[dimension] for dimension in entry.dimensions)
         variable = _create(file, name, entry, dimensions, (*slab, *own))
-        if "contact" in entry.dimensions or "sample" in study.dimensions:
+        if "contact" in entry.dimensions or samples:
             drawn = [each.name for each in samples if set(each.entry.dimensions) <= set(dimensions)]
             variable.setncattr("coordinates", " ".join(on_contact * ("contact" in entry.dimensions) + drawn))
     if not any("contact" in entry.dimensions for entry in variables.values()):

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.drawn_contacts import pair_values
+from studyrunner.scene.drawn_contacts import pair_values, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.realisation import draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
+from studyrunner.study.worn import AXIS
 from studyrunner.variables import COORDINATES, Variable
 
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
@@ -54,6 +55,21 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Sa
     if len(facts) == 1:
         for name, values in pair_values(variants[0], facts[0]).items():
             yield _coordinate(name, ("sample", "contact"), values, *_describe(study, name))
+
+
+def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SampleCoordinate]:
+    """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
+    if study.scene.worn is None or len(facts) > 1:
+        return
+    counts = [len(axis.values) for axis in study.scene_axes if axis.name == AXIS]
+    # the axis of worn states is the last one
+    states = study.variants[: counts[0]] if counts else (study,)
+    values = np.array([worn_depth(state, facts[0]) for state in states])
+    dimensions = (AXIS, "contact") if counts else ("contact",)
+    entry = Variable(
+        dimensions, "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
+    )
+    yield SampleCoordinate("worn_depth", entry, values if counts else values[0])
 
 
 def _coordinate(

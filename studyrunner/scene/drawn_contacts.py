@@ -1,4 +1,4 @@
-"""What the samples of a study draw for each contact pair: gaps, areas, friction coefficients."""
+"""Contact pairs that are not those of the scene: gaps, areas and friction that samples draw, wear before the start."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_pairs, is_of_pairs
 from studyrunner.study.study import Study
+from studyrunner.user_error import UserError, WrongValueError
 
 ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
 """Names of arrays of the contact interface with their values for all pairs, in place of those of the scene."""
@@ -22,18 +23,33 @@ def contact_changes(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts])
 
     facts: of each scene. Raises UserError where a sample draws a value that is none.
     """
-    section = study.scatter
-    if section is None or not any(is_of_pairs(name, each) for name, each in section.inputs.items()):
+    section, variants = study.scatter, study.variants or (study,)
+    scatters = section is not None and any(is_of_pairs(name, each) for name, each in section.inputs.items())
+    if not scatters and study.scene.worn is None:
         return ((),) * len(scenes.numbers)
-    n_samples, variants = section.realisations, study.variants or (study,)
+    n_samples = 1 if section is None else section.realisations
     changes: list[ContactChange] = []
     for place, variant in enumerate(variants):
         own = scenes.numbers[place * n_samples : (place + 1) * n_samples]
         values = {number: pair_values(variant, facts[number]) for number in set(own)}
         for sample, number in enumerate(own):
-            of_sample = {name: tuple(each[sample].tolist()) for name, each in values[number].items()}
-            changes.append(tuple(of_sample.items()))
+            of_sample = {name: each[sample] for name, each in values[number].items()}
+            if variant.scene.worn is not None:
+                # wear opens a pair as a gap does, Eq. (7)
+                gap = of_sample.get("gap", facts[number].gap)
+                of_sample["gap"] = gap + worn_depth(variant, facts[number])
+            changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
     return tuple(changes)
+
+
+def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
+    """Wear depths (n_contact,), m, with which the history of a study of one scene begins. Raises UserError."""
+    if study.scene.worn is None:
+        return np.zeros(len(facts.area))
+    try:
+        return np.array(study.scene.worn.depths(len(facts.area)))
+    except WrongValueError as error:
+        raise UserError(study.source, "scene.worn.depth", error.value, error.remedy) from None
 
 
 def pair_values(study: Study, facts: SceneFacts) -> dict[str, NDArray[np.float64]]:

@@ -39,6 +39,8 @@ def depth_samples(dataset: xr.Dataset) -> tuple[SampleValues, dict[Hashable, int
     if "wear_depth" in dataset and CYCLE in dataset["wear_depth"].dims:
         depth, error = dataset["wear_depth"].max("contact"), dataset.get("wear_depth_error")
         return _samples(dataset, depth, None if error is None else error.max("contact"), relative=False)
+    if "wear_depth_max" in dataset:
+        return _samples(dataset, dataset["wear_depth_max"], dataset.get("wear_depth_max_error"), relative=False)
     if "largest_wear_depth" not in dataset:
         return None
     depth = dataset["largest_wear_depth"]

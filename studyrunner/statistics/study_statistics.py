@@ -191,8 +191,9 @@ def _group_arrays(
     place = tuple(-1 if name == CYCLE else slice(None) for name in dims)
     at_last = values.at(place)
     depths = None
-    if "wear_depth" in dataset:
-        depths = dataset["wear_depth"].isel({CYCLE: -1}, missing_dims="ignore").isel({SAMPLE: rows})
+    name = "wear_depth_last" if "wear_depth_last" in dataset else "wear_depth"
+    if name in dataset:
+        depths = dataset[name].isel({CYCLE: -1}, missing_dims="ignore").isel({SAMPLE: rows})
         depths = depths.transpose(*axes, SAMPLE, "contact")
     grid, curve = np.full((*shape, _N_DENSITY), np.nan), np.full((*shape, _N_DENSITY), np.nan)
     sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)

@@ -101,6 +101,11 @@ def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -
         tables["axes"] = axes
         for axis, value in zip(scene_axes, values, strict=True):
             table = tables.setdefault(axis.table, {})
+            if axis.key == ("worn",):
+                # one state of several
+                states, place = table["worn"], axis.values.index(value)
+                table["worn"] = {"depth": [states["depth"][place]], "result": states.get("result", "")}
+                continue
             table[axis.key[0]] = value if len(axis.key) == 1 else _with(table.get(axis.key[0], {}), axis.key[1], value)
         yield tables
 
@@ -110,6 +115,9 @@ def as_checked(scene_axes: Sequence[SceneAxis], variants: Sequence[Any]) -> tupl
     checked, apart = [], len(variants)
     for axis in scene_axes:
         apart //= len(axis.values)
+        if axis.key == ("worn",):
+            checked.append(axis)
+            continue
         values = []
         for variant in variants[::apart][: len(axis.values)]:
             table = variant.scene.parameters if axis.table == "scene" else variant.wear

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel
 
@@ -14,6 +14,7 @@ from studyrunner.study.checked_table import check_table
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.sections import SceneFileParameters, SceneSection, names_file, names_model
 from studyrunner.study.study_of_result import SCENE_GROUP, Archived
+from studyrunner.study.worn import Worn
 from studyrunner.user_error import UserError
 
 Table = dict[str, object]
@@ -35,6 +36,10 @@ def check_scene(
 ) -> SceneSection:
     """The scene in a table. kept: the result that may hold what a bundled scene was built to, None to build it."""
     parameters = dict(table)
+    if "worn" in parameters:
+        worn = check_table(Worn, cast("Table", parameters.pop("worn")), source, "scene.worn")
+        section = check_scene(parameters, source, path, archived, kept)
+        return section.model_copy(update={"worn": worn})
     model = parameters.pop("model", None)
     if model is None:
         raise UserError(source, "scene.model", None, "missing: give a bundled scene or the path of a scene file")

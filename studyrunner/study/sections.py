@@ -27,6 +27,7 @@ from studyrunner.study.values import (
     read,
     whole,
 )
+from studyrunner.study.worn import Worn
 from studyrunner.user_error import WrongValueError
 from studyrunner.variables import ASKED, KEPT, SCENE, USUAL
 
@@ -175,6 +176,7 @@ class SceneSection(Section):
     """[scene]: model, and parameters of this model.
 
     parameters: checked object of the class of the scene, with `friction_coefficient` at least.
+    worn: wear that the joint begins with.
     path: file of the scene; None for a scene that is built.
     group: group of the scene in this file; empty in a scene file.
     files: files of a finite-element model; None for other scenes.
@@ -183,6 +185,7 @@ class SceneSection(Section):
 
     model: Text
     parameters: SerializeAsAny[BaseModel]
+    worn: Worn | None = None
     path: Path | None = Field(None, exclude=True)
     group: str = Field("", exclude=True)
     files: ModelFiles | None = Field(None, exclude=True)

@@ -91,6 +91,13 @@ class Study(Section):
         return self
 
     @model_validator(mode="after")
+    def _check_worn(self) -> Study:
+        if self.scene.worn is not None and self.wear.law == "table":
+            remedy = 'give another law: the factors of a "table" depend on depths, which a worn scene counts from 0'
+            raise WrongValueError(self.wear.law, remedy, "wear.law")
+        return self
+
+    @model_validator(mode="after")
     def _check_samples(self) -> Study:
         most, given = max(self.given_harmonics, default=0), [n for n in self.samples if n != AUTO]
         fewest = min(given, default=None)

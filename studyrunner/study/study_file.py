@@ -25,6 +25,7 @@ from studyrunner.study.study import Study, check_n_points
 from studyrunner.study.study_of_result import Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.study.wear_section import WearSection
+from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError, WrongValueError
 
 Table = dict[str, object]
@@ -103,6 +104,9 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     if twice:
         value = _section(table, "solver")[twice[0]]
         raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
+    worn = _section(table, "scene").get("worn")
+    if worn is not None:
+        sections["scene"] = {**_section(table, "scene"), "worn": read_worn(worn, source, path.parent)}
     scene_axes = _take_scene_axes(sections, source)
     if scene_axes:
         return _with_variants(sections, scene_axes, source, path, archived)
@@ -125,11 +129,12 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
 
 def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
     """Axes of the study that are keys of [scene] or [wear]."""
+    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"))
     if all(name in AxesSection.model_fields for name in _section(sections, "axes")):
-        return ()
+        return of_worn
     with scene_errors(source, None):
         kind = parameters_of(_section(sections, "scene").get("model"))
-    return take_scene_axes(sections, tuple(AxesSection.model_fields), kind, WearSection, source)
+    return (*take_scene_axes(sections, tuple(AxesSection.model_fields), kind, WearSection, source), *of_worn)
 
 
 def _with_variants(
@@ -156,8 +161,10 @@ def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
     sections = study.model_dump(mode="json")
     scene = sections["scene"]
-    sections["scene"] = {"model": scene["model"], **scene["parameters"]}
+    sections["scene"] = {"model": scene["model"], **scene["parameters"], "worn": _worn_states(study)}
     for axis in study.scene_axes:
+        if axis.key == ("worn",):
+            continue
         given, axes = sections[axis.table], sections["axes"]
         for name in axis.key[:-1]:
             given, axes = only_table(given[name]), axes.setdefault(name, {})
@@ -173,6 +180,19 @@ def format_study(study: Study) -> str:
         lines.append(f"[{name}]")
         lines.extend(f"{key} = {_toml_value(value)}" for key, value in section.items() if value is not None)
     return "\n".join(lines) + "\n"
+
+
+def _worn_states(study: Study) -> dict[str, object] | None:
+    """The table `worn` with all states."""
+    worn = study.scene.worn
+    if worn is None:
+        return None
+    counts = [count for axis in study.scene_axes if axis.key == ("worn",) for count in axis.values]
+    if not counts:
+        return {"depth": [list(each) for each in worn.depth]}
+    # the axis of worn states is the last one
+    depths = [variant.scene.worn.depth[0] for variant in study.variants[: len(counts)] if variant.scene.worn]
+    return {"cycle": counts, "depth": [list(each) for each in depths], "result": worn.result}
 
 
 def _study_path(argument: str) -> Path:

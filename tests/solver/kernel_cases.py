@@ -15,7 +15,6 @@ from solver.model import BoolArray, FloatArray, IntArray
 from solver.structure.fourier import FourierBasis, build_basis
 
 FRICTION = 0.4
-PERIODS = 3
 ORDERS = (1, 2, 3)
 BASIS = build_basis(ORDERS, 20)
 MASS_BASIS = build_basis(ORDERS, 32)

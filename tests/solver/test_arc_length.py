@@ -61,20 +61,6 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
     assert min(visited) < 0.02
 
 
-def test_arc_length_where_there_is_no_fold_agrees_with_natural_steps() -> None:
-    balance_at, first, _ = wall(0.9)
-    start = first(0.01)
-    natural, arrived = follow_naturally(balance_at, start, 0.03, JacobianSolver(), TOLERANCE, Budget())
-    assert arrived
-    result = follow_arc(balance_at, start, 0.03, 0.02, JacobianSolver(), TOLERANCE, Budget())
-    arc = result.point
-    assert arc is not None
-    assert result.folds == ()
-    size = np.abs(natural.evaluation.force_h).max()
-    assert size > 0.001
-    assert arc.evaluation.force_h == pytest.approx(natural.evaluation.force_h, abs=1e-6 * size)
-
-
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
     balance_at, first, _ = wall(0.5)
     budget = Budget()

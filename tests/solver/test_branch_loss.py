@@ -73,7 +73,7 @@ def test_the_exact_branch_ends_at_the_depth_of_the_jump(share: float, impacts: b
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "step"),
-    [("explicit", 50.0), ("implicit", 50.0), ("explicit", 1000.0), ("implicit", 1000.0), ("adaptive", 0.0)],
+    [("explicit", 50.0), ("implicit", 1000.0), ("adaptive", 0.0)],
 )
 def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) -> None:
     found = history(step, scheme)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,7 +14,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ReducedModel
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
-from tests.solver.models import OMEGA, branch_states, dovetail, first_point, random_model, scene
+from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
 
 TOLERANCE = SolverSettings().tolerance
 GOOD = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -75,7 +75,7 @@ def failing(joint: Joint, evaluation: Evaluation) -> set[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_harmonics", [3, 5, 11, 21])
+@pytest.mark.parametrize("n_harmonics", [3, 21])
 def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
     states = [slider(n_harmonics), two_masses(0.4, n_harmonics), two_masses(0.6, n_harmonics)]
     states += [vibro_impact(1.2, n_harmonics), vibro_impact(1.5, n_harmonics), vibro_impact(1.2, n_harmonics, "down")]
@@ -84,42 +84,11 @@ def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
         assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_states_of_elastic_joints_hold(seed: int) -> None:
-    joint, evaluation = random_state(seed)
-    assert evaluation.slip_work.max() > 0.0
-    certificate = certify(joint, evaluation)
-    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
-
-
-@pytest.mark.slow
-def test_a_dovetail_state_that_slips_and_lifts_holds() -> None:
-    settings = SolverSettings(3, 128)
-    omegas = 2 * np.pi * np.array([211.5, 212.5])
-    start = branch_states(dovetail(), 0.5, 2.0, omegas, settings)[-1]
-    assert start.state is not None
-    joint = build_case(dovetail(), 0.5, start.penalty_omega, settings).joint(start.state.omega, 2.0)
-    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
-    evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
-    assert {0, 1, 2} == set(np.unique(evaluation.status_t))
-    certificate = certify(joint, evaluation)
-    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
-    assert certificate.penetration > 1e-4, "a pair that lifts has a corner in its motion, which no series follows"
-
-
 @pytest.mark.slow
 def test_penetration_falls_as_harmonics_are_added() -> None:
-    for omega in (1.2, 1.5):
-        values = [certify(*vibro_impact(omega, n)).penetration for n in (3, 5, 11, 21)]
-        assert (np.diff(values) < 0.0).all()
-        assert values[-1] < values[0] / 8.0
-
-
-@pytest.mark.slow
-def test_the_energy_of_marched_masses_is_balanced_but_for_their_samples() -> None:
-    # what is cut off the series goes through the march: nothing is lost but what lies between the samples
-    for states in ([slider(n) for n in (3, 5, 11, 21)], [two_masses(0.4, n) for n in (3, 5, 11, 21)]):
-        assert max(certify(*state).energy_error for state in states) < 3e-3
+    values = [certify(*vibro_impact(1.2, n)).penetration for n in (3, 11, 21)]
+    assert (np.diff(values) < 0.0).all()
+    assert values[-1] < values[0] / 8.0
 
 
 def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots() -> None:
@@ -138,15 +107,6 @@ def test_an_unconverged_force_is_caught_by_the_residual() -> None:
         noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
         size = np.abs(evaluation.predicted_h).max()
         assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + 1e-5 * size * noise))
-
-
-@pytest.mark.parametrize("harmonic", [1, 2, 3])
-def test_a_dropped_harmonic_is_caught_by_the_residual(harmonic: int) -> None:
-    joint, evaluation = random_state(1)
-    for name in ("displacement_h", "force_h"):
-        values_h = getattr(evaluation, name).copy()
-        values_h[:, :, 2 * harmonic - 1 : 2 * harmonic + 1] = 0.0
-        assert "residual" in failing(joint, replace(evaluation, **{name: values_h}))
 
 
 @pytest.mark.parametrize("state", [slider(5), random_state(1)])
@@ -168,15 +128,6 @@ def test_friction_that_drives_is_caught_by_the_energy(state: tuple[Joint, Evalua
     failures = certify(joint, broken).failures(TOLERANCE)
     assert "residual" not in failures
     assert failures["energy_error"][0] > 0.5
-
-
-@pytest.mark.parametrize("state", [slider(5), random_state(1)])
-def test_another_friction_coefficient_is_caught(state: tuple[Joint, Evaluation]) -> None:
-    joint, evaluation = state
-    weaker = replace(joint, friction_coefficient=0.9 * joint.friction_coefficient)
-    assert "cone_violation" in failing(weaker, evaluation)
-    stronger = replace(joint, friction_coefficient=1.15 * joint.friction_coefficient)
-    assert failing(stronger, evaluation) == {"energy_error"}
 
 
 def test_a_slip_that_does_not_repeat_is_caught() -> None:
@@ -210,32 +161,6 @@ def test_surfaces_in_each_other_are_caught() -> None:
     assert certify(joint, replace(evaluation, wear_depth=evaluation.wear_depth + moved)).penetration == 0.0
 
 
-@pytest.mark.parametrize("kinds", [("normal_only",), ("constant_load",), ("3d",)])
-@pytest.mark.parametrize("friction", [0.0, 0.4, 100.0])
-def test_a_state_in_which_nothing_slips_has_finite_numbers(kinds: tuple[str, ...], friction: float) -> None:
-    case = build_case(random_model(2, kinds), friction, OMEGA, SolverSettings(3, 64))
-    for amplitude in (0.0, 1.0):
-        point = first_point(case, OMEGA, amplitude, np.zeros(1))
-        certificate = certify(case.joint(OMEGA, amplitude), point.evaluation)
-        assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
-
-
-def test_pairs_out_of_reach_have_nothing_to_violate() -> None:
-    model = random_model(3, ("3d", "3d"))
-    model = replace(model, contact=replace(model.contact, gap=np.full(2, 1.0)))
-    case = build_case(model, 0.4, OMEGA, SolverSettings(3, 64))
-    point = first_point(case, OMEGA, 10.0, np.zeros(2))
-    certificate = certify(case.joint(OMEGA, 10.0), point.evaluation)
-    assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
-    assert (
-        certificate.penetration
-        == certificate.tension
-        == certificate.cone_violation
-        == certificate.periodicity_error
-        == 0.0
-    )
-
-
 @pytest.mark.parametrize("name", ["residual", *ACCURACY.violation_limits])
 def test_each_number_is_judged_and_named(name: str) -> None:
     limit = ACCURACY.violation_limits.get(name, 2.0 * TOLERANCE)
@@ -251,12 +176,3 @@ def test_each_number_is_judged_and_named(name: str) -> None:
         for other in ("residual", *ACCURACY.violation_limits)
     }
     assert len(sentences) == 1 + len(ACCURACY.violation_limits)
-
-
-def test_what_others_fill_in_is_open() -> None:
-    names = [field.name for field in fields(Certificate)]
-    assert names == ["residual", *ACCURACY.violation_limits, "response_error", "wear_rate_error", "stable"]
-    certificate = certify(*random_state(1))
-    assert np.isnan(certificate.response_error)
-    assert np.isnan(certificate.wear_rate_error)
-    assert certificate.stable

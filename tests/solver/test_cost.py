@@ -8,7 +8,7 @@ import pytest
 from solver.harmonic_balance.dlft import Linearisation
 from solver.newton import cost
 from solver.newton.options import NEWTON
-from solver.newton.period_preconditioner import PeriodFactor, resonances
+from solver.newton.period_preconditioner import PeriodFactor
 from solver.newton.preconditioner import build_factor
 from solver.newton.slip_preconditioner import SlipFactor
 from solver.settings import SolverSettings
@@ -30,23 +30,10 @@ def test_small_systems_are_dense_and_large_ones_are_not() -> None:
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_an_exact_factorisation_ends_where_the_march_is_cheaper() -> None:
-    tangent = tangent_of(20, 5, 64)
-    most = cost.worthwhile_directions(tangent)
-    pairs, m = tangent.active().size, 11
-    march = cost.march_cost(tangent, len(resonances(tangent.joint)[0]))
-    assert 0 < most < 3 * pairs * m
-    assert cost.slip_cost(pairs, m, most) <= march < cost.slip_cost(pairs, m, most + 1)
-
-
 @pytest.mark.parametrize(("n_pairs", "kind"), [(2, SlipFactor), (40, PeriodFactor)])
 def test_the_cheaper_factorisation_is_built(n_pairs: int, kind: type) -> None:
     found = build_factor(tangent_of(n_pairs, 5, 64))
     assert isinstance(found, kind)
-
-
-def test_sliding_masses_have_the_largest_exact_factorisation() -> None:
-    assert cost.worthwhile_directions(tangent_of(3, 3, 24, masses=True)) == NEWTON.most_directions
 
 
 def test_a_larger_factorisation_is_kept_for_more_products() -> None:

@@ -71,22 +71,11 @@ def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name: str,
     assert found.mean_pressure[0].min() > 0.0
 
 
-@pytest.mark.parametrize(("name", "pairs"), [("cylinder_on_flat", {"strips": 12}), ("sphere_on_flat", {"patches": 4})])
-@pytest.mark.parametrize("values", [{}, {"stroke": 1e-5}])
-def test_the_unworn_contact_is_whole_by_default(name: str, pairs: dict[str, int], values: dict[str, float]) -> None:
-    model = build_scene(name, **pairs, **values)
-    found = march_wear(model, 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=SETTINGS)
-    assert model.contact.edge is not None
-    assert found.outcome is Outcome.CONVERGED
-    assert not found.mean_pressure[0, model.contact.edge].any()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "narrow", "wide"),
     [
         ("cylinder_on_flat", {"strips": 12, "half_width": 1.5 * A_LINE}, {"strips": 20, "half_width": 2.5 * A_LINE}),
-        ("sphere_on_flat", {"patches": 4, "half_width": 1.4 * A_POINT}, {"patches": 7, "half_width": 2.45 * A_POINT}),
     ],
 )
 def test_a_scar_that_grows_out_of_its_pairs_is_no_result(

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import Certificate
-from solver.packing import pack, unpack
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear import output as output_module
 from solver.wear.options import WEAR
-from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput, no_output
+from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput
 
 AREA = np.array([1.0, 3.0])
 LOOP = np.ones((1, 128, 3))
@@ -99,44 +98,6 @@ def test_steps_that_nothing_is_read_of_are_not_kept() -> None:
         assert np.array_equal(values, other[name]), name
     # the course is that of all steps
     assert output.taken.course.ends == whole.taken.course.ends == tuple(np.arange(10) * 10.0)
-
-
-def test_what_is_not_reached_is_nan_or_0() -> None:
-    found = taken([0.0, 30.0, 31.0]).read(np.array([0.0, 30.0, 31.0]))
-    nothing = no_output(3, 2, 1, 1)
-    assert found.keys() == nothing.keys()
-    for name, values in found.items():
-        assert values.dtype == nothing[name].dtype, name
-        assert values.shape == nothing[name].shape, name
-        assert np.isnan(values[2]).all() if values.dtype.kind in "fc" else not values[2], name
-        assert np.isfinite(values[:2]).all(), name
-
-
-def test_an_output_that_was_kept_goes_on() -> None:
-    whole, half = taken([0.0, 25.0, 30.0]), taken([0.0, 25.0, 30.0], n_steps=2)
-    again = DenseOutput(AREA, half.counts, smooth=False)
-    again.taken = unpack(pack(half.taken))
-    again.add(30.0, report([900.0, 0.0], 3.0, RESOLUTIONS[1]), np.array([60.0, 0.0]), 0.5)
-    one, other = (pack(each.taken) for each in (whole, again))
-    assert one.text == other.text
-    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one.arrays, other.arrays, strict=True))
-
-
-def test_the_course_names_the_count_of_every_change_of_harmonics() -> None:
-    course = taken([0.0], n_steps=5).taken.course
-    assert course.resolutions == ((0.0, RESOLUTIONS[0]), (20.0, RESOLUTIONS[1]), (40.0, RESOLUTIONS[0]))
-    assert course.cycles == course.ends
-    assert [depth[0] for depth in course.depths] == [at**2 for at in course.cycles]
-    assert course.rates == tuple(2.0 * at for at in course.cycles)
-
-
-def test_the_course_of_many_steps_is_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, course_steps=8))
-    course = taken([0.0], n_steps=100).taken.course
-    assert len(course.ends) == 101
-    assert len(course.cycles) == len(course.depths) == len(course.rates) <= 9
-    assert (np.diff(course.cycles) > 0.0).all()
-    assert course.cycles[-1] == 1000.0
 
 
 @pytest.mark.parametrize("smooth", [False, True])

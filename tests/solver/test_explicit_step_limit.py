@@ -16,7 +16,7 @@ from solver.packing import pack, unpack
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.wear.rates import WearRates
-from tests.solver.models import branch_states, march_wear, scene
+from tests.solver.models import branch_states, march_wear
 
 STIFFNESS = 1e6  # N/m, of each pair towards the block
 SETTINGS = SolverSettings(3, 128)
@@ -84,24 +84,6 @@ def test_beyond_the_limit_the_explicit_scheme_oscillates(share: float, scheme: S
     assert (abs(last[0] - last[1]) < 0.02 * last.sum()) is not oscillates
 
 
-def test_without_wear_there_is_no_limit() -> None:
-    model = scene("sdof_slider", 3)
-    (start,) = branch_states(model, 0.5, 10.0, [1000.0], SETTINGS)
-    found = march_wear(model, 0.5, start, 0.0, 1.0, "explicit", np.array([0.0, 1.0]), SETTINGS)
-    assert found.step_limit == np.inf
-    assert not found.oscillates
-
-
-def test_the_limit_of_the_slider_is_that_of_differences_of_its_wear_rate() -> None:
-    model = scene("sdof_slider", 3)
-    (start,) = branch_states(model, 0.5, 10.0, [1000.0], SETTINGS)
-    found = march_wear(model, 0.5, start, 1e-11, 10.0, "explicit", np.linspace(0.0, 20.0, 3), SETTINGS)
-    slopes = np.diff(found.wear_rate) / AREA / np.diff(found.wear_depth[:, 0])
-    at_start = 1.5 * slopes[0] - 0.5 * slopes[1]
-    expected = -2.0 / at_start if at_start < 0.0 else np.inf
-    assert found.step_limit == pytest.approx(expected, rel=0.02, abs=0.0)
-
-
 @pytest.mark.parametrize(
     ("rates", "oscillates"),
     [
@@ -119,15 +101,6 @@ def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscil
         followed = followed.after(np.array([1.0, rate]))
     assert followed.oscillate() is oscillates is oscillation_of_all(rates)
     assert not followed.oscillate(10.0)
-
-
-@pytest.mark.parametrize(("share", "oscillates"), [(1e-4, False), (1e-2, True)])
-def test_a_pair_oscillates_where_that_is_noticed_in_the_whole(share: float, oscillates: bool) -> None:
-    followed = WearRates.none(3)
-    for step in range(8):
-        pair = share * (1.0 + step % 2)
-        followed = followed.after(np.array([pair, 2.0, 2.0 + pair]))
-    assert followed.oscillate() is oscillates
 
 
 @settings(max_examples=200)

@@ -15,7 +15,7 @@ import pytest
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
@@ -25,7 +25,6 @@ from tests.solver.models import OMEGA, dovetail, march_wear, random_model, scene
 
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 BOUND = 60.0  # s of the processor for a case that takes a few at most: what is found is a hang, not a busy machine
-SCHEMES: tuple[Scheme, ...] = ("implicit", "explicit")
 FRICTION = 0.4
 AMPLITUDE = 60.0  # N: the pairs of the elastic model stick, slip and open
 WEAR = 1e-11  # 1/Pa: takes about a third of the preload of the elastic model in CYCLES
@@ -181,7 +180,7 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("factor", "scheme"),
-    [(1e-3, "implicit"), (1.0, "explicit"), (1e2, "implicit"), (1e2, "explicit"), (1e4, "implicit")],
+    [(1e-3, "implicit"), (1e2, "explicit"), (1e4, "implicit")],
 )
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
 def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
@@ -194,7 +193,7 @@ def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1e-4, 1.0, 50.0])
+@pytest.mark.parametrize("factor", [1e-4, 50.0])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
 def test_amplitude(base: Case, factor: float) -> None:
     history = run_converged(replace(base, amplitude=factor * base.amplitude))
@@ -212,23 +211,13 @@ def test_a_block_that_bounces(factor: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("amplitude", [5e-5, 0.5, 25.0])
+@pytest.mark.parametrize("amplitude", [5e-5, 25.0])
 def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
     settings = SolverSettings(3, 64)
     case = Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 3e3, 1e3, settings=settings)
     ended = run(case)
     assert ended.start.outcome is Outcome.CONVERGED
     assert ended.history.outcome is Outcome.CONVERGED
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("n_steps", "scheme"), [(1, "implicit"), (1, "explicit"), (7, "explicit"), (200, "implicit")])
-def test_step_from_one_cycle_to_all_cycles(n_steps: int, scheme: Scheme) -> None:
-    cycles = 200.0
-    case = replace(elastic(), wear=WEAR * CYCLES / cycles, cycles=cycles, step=cycles / n_steps, scheme=scheme)
-    ended = run(case)
-    if scheme == "implicit":
-        assert ended.history.outcome is Outcome.CONVERGED
 
 
 @pytest.mark.slow
@@ -239,13 +228,6 @@ def test_contact_stiffness_ratio(ratio: float) -> None:
     carried = history.mean_pressure[0] * 1e-4
     assert carried.sum() == pytest.approx(100.0, rel=0.05)
     assert np.argmax(carried) == int(ratio > 1.0)
-
-
-def test_massless_contact_displacements() -> None:
-    case = block()
-    assert np.linalg.matrix_rank(case.model.linear[0].mass) == 3
-    history = run_converged(case)
-    assert history.slip_range.max() > 0.0
 
 
 @pytest.mark.parametrize("friction_force", [9.0, 9.99])
@@ -266,7 +248,7 @@ def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("number", [0])
 def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) -> None:
     case = elastic()
     linear = case.model.linear[0]
@@ -286,18 +268,10 @@ def test_zero_damping_off_resonance() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
-def test_no_static_load(base: Case) -> None:
-    linear = base.model.linear[0]
-    bare = replace(base.model, linear={0: replace(linear, load_static=np.zeros_like(linear.load_static))})
-    run_converged(replace(base, model=bare))
-
-
-@pytest.mark.slow
 def test_forces_below_all_numbers() -> None:
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
     case = block(preload=0.0, lift=0.2)
-    for amplitude in (1e-100, 1e-160, 0.0, 1.0):
+    for amplitude in (1e-160, 0.0):
         run(replace(case, amplitude=amplitude))
 
 
@@ -310,22 +284,6 @@ def test_gaps_never_reached(base: Case) -> None:
     assert (history.open_fraction == 1.0).all()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_wear_that_consumes_the_whole_preload(scheme: Scheme) -> None:
-    # 10 N on a spring of 1e5 N/m: nothing is left to wear at 1e-4 m
-    history = run_converged(replace(slider(), cycles=4e6, step=4e4, scheme=scheme))
-    if scheme == "implicit":
-        assert (history.wear_depth <= 1e-4 * (1.0 + 1e-6)).all()
-    assert history.wear_depth[-1, 0] == pytest.approx(1e-4, rel=0.05)
-    assert history.mean_pressure[-1, 0] < 0.05 * history.mean_pressure[0, 0]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["3d", "one_tangent", "second_tangent", "normal_only", "constant_load"])
-def test_one_pair(kind: str) -> None:
-    run_converged(Case(random_model(5, (kind,)), OMEGA))
-
-
 @pytest.mark.slow
 def test_500_pairs() -> None:
     # one tangent each and a constant load: the same with closing displacements takes fifty times as long
@@ -335,32 +293,11 @@ def test_500_pairs() -> None:
     assert 0 < (history.wear_depth[-1] > 0.0).sum() < 500
 
 
-def test_area_ratio() -> None:
-    # the depth goes with 1/area at the same load: the smallest pair hands its load over, the others go on
-    history = run_converged(block((1e7, 1e7, 1e7), area=(1e-7, 1e-6, 1e-3)))
-    assert history.wear_depth[-1, 0] >= history.wear_depth[-1, 1] >= history.wear_depth[-1, 2] > 0.0
-
-
 def test_a_pair_that_is_worn_through_at_once_asks_for_shorter_steps() -> None:
     # 33 N on 1e-9 m2 wear 4 cm in 200 cycles: many times what takes the pair out of reach
     ended = run(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
     assert ended.history.outcome is Outcome.STEP_TOO_LONG
     assert ended.history.last_cycle == 0.0
-
-
-@pytest.mark.parametrize("ground", [1e-1, 1e-6])
-def test_a_nearly_singular_free_body(ground: float) -> None:
-    # held by friction and by springs of 1e-8 and 1e-13 of the contact stiffness; pushed by less than friction holds
-    case = replace(block(ground=ground), amplitude=30.0, friction=0.5)
-    history = run_converged(case)
-    assert history.response_peak.max() < 1e-3
-
-
-def load_shares(step: float, scheme: Scheme) -> FloatArray:
-    """Difference of the normal forces of the two pairs of the block, N, after each of eight steps."""
-    history = run_converged_at_steps(replace(block(), step=step, cycles=8.0 * step, scheme=scheme))
-    carried: FloatArray = history.mean_pressure * 1e-4
-    return carried[:, 1] - carried[:, 0]
 
 
 def run_converged_at_steps(case: Case) -> WearHistory:
@@ -370,43 +307,6 @@ def run_converged_at_steps(case: Case) -> WearHistory:
     history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
     assert history.outcome.complete
     return history
-
-
-def block_limit() -> float:
-    """Largest stable explicit step of the block, cycles: wear evens the loads of its two pairs out at this rate."""
-    difference = load_shares(300.0, "explicit")
-    # explicit Euler on d' = -s d: each step multiplies by 1 - s h
-    return 2.0 * 300.0 / (1.0 - difference[1] / difference[0])
-
-
-@pytest.mark.slow
-def test_the_explicit_scheme_throws_the_load_to_and_fro_beyond_its_limit() -> None:
-    limit = block_limit()
-    assert 2000.0 < limit < 3500.0
-    stable, unstable = (load_shares(share * limit, "explicit") for share in (0.4, 1.2))
-    # evenly worn pairs carry nearly even loads
-    assert (stable > -0.02 * stable[0]).all()
-    assert np.abs(stable[3:]).max() < 0.02 * stable[0]
-    assert (unstable[1:] * unstable[:-1] < 0.0).all()
-    assert np.abs(unstable[-1]) > 2.0 * unstable[0]
-
-
-@pytest.mark.parametrize("share", [1.2, 4.0])
-def test_the_implicit_scheme_runs_through_beyond_that_limit(share: float) -> None:
-    difference = load_shares(share * block_limit(), "implicit")
-    # towards evenly worn pairs, which carry nearly even loads, and not beyond
-    assert (difference > -0.02 * difference[0]).all()
-    assert np.abs(difference[3:]).max() < 0.02 * difference[0]
-
-
-@pytest.mark.slow
-def test_the_explicit_scheme_says_where_it_is_unstable() -> None:
-    limit = block_limit()
-    for share in (0.4, 1.2, 4.0):
-        case = replace(block(), step=share * limit, cycles=8.0 * share * limit, scheme="explicit")
-        history = run_converged_at_steps(case)
-        assert history.step_limit == pytest.approx(limit, rel=0.1)
-        assert history.oscillates == (share > 1.0)
 
 
 def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone() -> None:

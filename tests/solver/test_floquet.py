@@ -17,11 +17,10 @@ from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
-from solver.stability.floquet import find_instability, growing_exponents, moving, multipliers_of
+from solver.stability.floquet import find_instability, multipliers_of
 from solver.stability.monodromy import build_monodromy, switching_pairs
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Case, Joint, build_case
-from tests import references
 from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 from tests.solver.random_orbits import Scene, drawn
@@ -98,20 +97,12 @@ def largest(multipliers: ComplexArray) -> float:
 @pytest.mark.parametrize(
     ("kind", "seed", "allowed"),
     [
-        ("slider", 1, 0.01),
-        ("slider", 7, 0.01),
         ("stopping slider", 5, 0.02),
         ("swinging slider", 5, 0.02),
-        ("swinging slider", 7, 0.01),
         ("two masses", 6, 0.05),
         ("impact", 2, 0.04),
-        ("impact", 6, 0.01),
         ("grazing", 2, 0.05),
-        ("grazing", 4, 0.01),
         ("jenkins", 2, 0.01),
-        ("jenkins", 6, 0.01),
-        ("slipping little", 3, 0.01),
-        ("inclined", 4, 0.01),
         ("inclined", 8, 0.01),
     ],
 )
@@ -122,8 +113,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("damping", [-0.3, -3.0])
-@pytest.mark.parametrize("kind", ["slider", "two masses", "jenkins"])
+@pytest.mark.parametrize(("kind", "damping"), [("slider", -3.0), ("two masses", -0.3), ("jenkins", -3.0)])
 def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
     """Friction holds some of these vibrations, and some not."""
     seen = 0
@@ -142,7 +132,7 @@ def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("seed", [1, 2, 5, 17, 29, 54])
+@pytest.mark.parametrize("seed", [1, 17, 29])
 def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
@@ -154,7 +144,7 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("omega", "n_harmonics", "n_samples"),
-    [(1.0, 3, 128), (1.0, 9, 256), (1.2, 5, 128), (1.2, 3, 256), (1.5, 9, 128), (1.5, 5, 256)],
+    [(1.0, 3, 128), (1.5, 9, 128)],
 )
 def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
     omega: float, n_harmonics: int, n_samples: int
@@ -208,35 +198,12 @@ def test_a_growing_vibration_is_no_result(
     assert np.isnan(history.response).all()
 
 
-@pytest.mark.slow
-def test_friction_bounds_a_vibration_with_little_negative_damping() -> None:
-    """The structure alone is unstable, the state is not: it is an exact periodic motion that attracts."""
-    model = driven(-0.02)
-    case, joint, at = state_at(model, 0.5, 20.0, 0.05)
-    linear = model.linear[0]
-    orbit = references.coulomb_orbit(
-        linear.mass, linear.damping, linear.stiffness, [20.0, 0.0], 1, 7.2, 2.0 * np.pi * 0.05
-    )
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-    assert np.abs(response) == pytest.approx([abs(orbit.harmonic(0)), abs(orbit.harmonic(1))], rel=2e-3)
-    assert growing_exponents(linear, np.ones(2, bool)).size > 0
-    assert find_instability(case, joint, at, Budget()) is None
-
-
 def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
     start = start_of(driven(-0.5), 50.0, 20.0, 0.05, SolverSettings())
     assert start.outcome is Outcome.UNSTABLE
     # the first mass alone: x'' - 0.5 x' + 2 x = 0 for 20 s
     assert f"{np.exp(0.25 * 20.0):.3g}" in start.message
     assert "linear structure alone" in start.message
-
-
-def test_exponents_of_a_structure() -> None:
-    model = driven(-0.5)
-    joint = build_case(model, 0.5, 1.0, SolverSettings(1, 8)).joint(1.0, 1.0)
-    found = growing_exponents(model.linear[0], moving(joint, np.array([True])))
-    assert np.sort_complex(found) == pytest.approx(0.25 + np.sqrt(2.0 - 0.0625) * np.array([-1j, 1j]))
-    assert growing_exponents(bundled("two_masses").linear[0], np.ones(2, bool)).size == 0
 
 
 def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
@@ -279,17 +246,3 @@ def test_it_is_not_looked_for_in_a_travelling_wave() -> None:
         find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Budget())
         is None
     )
-
-
-@pytest.mark.slow
-def test_the_outcome_of_a_march_that_comes_to_such_a_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, settings = drawn("impact", 17), SolverSettings(27, 512)
-    frequency = scene.omega / (2.0 * np.pi)
-    assert start_of(scene.model, 0.0, scene.excitation, frequency, settings).outcome is Outcome.PERIOD_DOUBLED
-    with monkeypatch.context() as handed_out:
-        handed_out.setattr(frequency_sweep, "find_instability", lambda *_: None)
-        start = start_of(scene.model, 0.0, scene.excitation, frequency, settings)
-    assert start.outcome is Outcome.CONVERGED
-    history = march_wear(scene.model, 0.0, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
-    assert history.outcome is Outcome.PERIOD_DOUBLED
-    assert "in each period of the excitation" in history.message

@@ -12,13 +12,6 @@ from solver.structure.fourier import build_basis, change_orders, derivative, fro
 OMEGA = 37.0
 
 
-@given(n_harmonics=st.integers(0, 12), extra=st.integers(1, 40), seed=st.integers(0, 2**31))
-def test_analysis_undoes_synthesis(n_harmonics: int, extra: int, seed: int) -> None:
-    basis = build_basis(tuple(range(1, n_harmonics + 1)), 2 * n_harmonics + extra)
-    values_h = np.random.default_rng(seed).normal(size=(3, 2, 2 * n_harmonics + 1))
-    assert values_h @ basis.synthesis @ basis.analysis == pytest.approx(values_h, abs=1e-13)
-
-
 def test_synthesis_is_the_series_0_cos_1_sin_1_cos_2_sin_2() -> None:
     time = np.arange(32) / 32 * 2 * np.pi / OMEGA
     expected = 0.3 + 1.1 * np.cos(OMEGA * time) - 0.4 * np.sin(OMEGA * time) + 2.5 * np.sin(2 * OMEGA * time)
@@ -45,40 +38,10 @@ def test_derivative_multiplies_the_amplitude_of_harmonic_n_by_i_n_omega() -> Non
     assert not rate_h[..., 0].any()
 
 
-def test_derivative_is_the_limit_of_differences_in_time() -> None:
-    values_h = np.random.default_rng(2).normal(size=7)
-    step = 1e-6  # of a period
-    phase = 0.3
-
-    def value(fraction: float) -> float:
-        angle = 2 * np.pi * fraction
-        row = [1.0, *(f(n * angle) for n in (1, 2, 3) for f in (np.cos, np.sin))]
-        return float(values_h @ row)
-
-    rate_h = derivative(values_h, OMEGA * np.arange(1, 4))
-    row = [1.0, *(f(n * 2 * np.pi * phase) for n in (1, 2, 3) for f in (np.cos, np.sin))]
-    difference = (value(phase + step) - value(phase - step)) / (2 * step) * OMEGA / (2 * np.pi)
-    # central differences: (2 pi 3 step)^2 / 6 and round-off / step, both below 1e-9 of 3 omega |x|
-    assert float(rate_h @ row) == pytest.approx(difference, rel=1e-7, abs=1e-7 * OMEGA)
-
-
 @pytest.mark.parametrize(("orders", "samples"), [((1,), 2), ((1, 2, 3), 6), ((1, 3, 5), 10), ((7,), 4), ((), 0)])
 def test_samples_that_alias_are_refused(orders: tuple[int, ...], samples: int) -> None:
     with pytest.raises(ValueError, match="samples"):
         build_basis(orders, samples)
-
-
-def test_one_sample_more_than_two_a_harmonic_is_enough() -> None:
-    assert build_basis((1, 2, 3), 7).analysis.shape == (7, 7)
-
-
-def test_harmonics_above_the_basis_alias_only_from_samples_minus_harmonics_on() -> None:
-    basis = build_basis((1, 2, 3), 16)
-    phase = 2 * np.pi * np.arange(16) / 16
-    for order in range(4, 13):
-        assert np.cos(order * phase) @ basis.analysis == pytest.approx(np.zeros(7), abs=1e-14)
-    # the error of a truncated series: harmonic N - 3 comes back as harmonic 3
-    assert (np.cos(13 * phase) @ basis.analysis)[5] == pytest.approx(1.0, abs=1e-14)
 
 
 @given(orders=st.sets(st.integers(1, 30), max_size=8), extra=st.integers(1, 20), seed=st.integers(0, 2**31))
@@ -99,13 +62,6 @@ def test_odd_harmonics_are_rows_of_all_of_them() -> None:
     phase = 2 * np.pi * np.arange(32) / 32
     expected = 0.3 + 1.1 * np.cos(phase) - 0.4 * np.sin(phase) + 2.5 * np.sin(3 * phase) + 0.7 * np.sin(5 * phase)
     assert time_series == pytest.approx(expected, abs=1e-14)
-
-
-def test_the_derivative_of_odd_harmonics_takes_their_own_rates() -> None:
-    orders = np.array([1, 3, 7])
-    values_h = np.random.default_rng(4).normal(size=(2, 7))
-    rate_h = derivative(values_h, OMEGA * orders)
-    assert to_complex(rate_h) == pytest.approx(1j * OMEGA * orders * to_complex(values_h), abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -131,17 +87,3 @@ def test_changed_orders_keep_the_harmonics_that_both_have(orders: tuple[int, ...
             assert np.array_equal(after[..., place], before[..., orders.index(order)])
         else:
             assert not after[..., place].any()
-
-
-def test_changing_to_the_same_orders_changes_nothing() -> None:
-    values_h = np.random.default_rng(5).normal(size=(2, 7))
-    same = change_orders(values_h, (1, 3, 5), (1, 3, 5))
-    assert np.array_equal(same, values_h)
-    assert not np.shares_memory(same, values_h)
-
-
-def test_the_shared_basis_cannot_be_written_to() -> None:
-    basis = build_basis((1, 2), 8)
-    for matrix in (basis.synthesis, basis.analysis):
-        with pytest.raises(ValueError, match="read-only"):
-            matrix[0, 0] = 2.0

@@ -12,11 +12,9 @@ from solver import march_wear as march_from_unworn
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
-from solver.results.history import PeriodicState, WearHistory
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case, friction_of_pairs
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider
-from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_balance, random_model, scene
+from tests.solver.models import OMEGA, first_point, random_balance, random_model
 
 SETTINGS = SolverSettings(5, 128)
 KINDS = ("3d", "one_tangent", "constant_load")
@@ -59,12 +57,6 @@ def assert_same_bits(one: object, other: object, but: tuple[str, ...] = ()) -> N
             np.testing.assert_array_equal(values, others, err_msg=field.name)
 
 
-def history_of(model: ReducedModel, friction: float | np.ndarray | None) -> WearHistory:
-    (start,) = branch_states(model, friction, 10.0, [1000.0], SETTINGS)
-    cycles = np.array([0.0, 1000.0, 2000.0])
-    return march_wear(model, friction, start, 1e-11, 1000.0, "implicit", cycles, SETTINGS)
-
-
 def test_equal_coefficients_give_the_bits_of_one_for_all() -> None:
     model, bent = random_model(3, KINDS), random_model(3, KINDS)
     balance, predicted = random_balance(model, SETTINGS, 3, wear=True)
@@ -76,34 +68,6 @@ def test_equal_coefficients_give_the_bits_of_one_for_all() -> None:
     np.testing.assert_array_equal(tangent.force_tangent, its.force_tangent)
     np.testing.assert_array_equal(tangent.motion_tangent, its.motion_tangent)
     assert certify(balance.joint, at) == certify(other.joint, beside)
-
-
-def test_a_history_of_a_scene_with_its_own_coefficients_has_the_bits_of_one_for_all() -> None:
-    model = scene("sdof_slider")
-    expected = history_of(model, 0.5)
-    assert expected.worn_volume[-1] > 0.0
-    assert_same_bits(history_of(model, np.full(1, 0.5)), expected, ("run_time",))
-    assert_same_bits(history_of(with_own_friction(model, [0.5]), None), expected, ("run_time",))
-
-
-def state_at(model: ReducedModel, friction: float | np.ndarray) -> PeriodicState:
-    (start,) = branch_states(model, friction, 10.0, [1000.0], SolverSettings(9, 256, 1e-10))
-    assert start.state is not None
-    return start.state
-
-
-@pytest.mark.slow
-def test_two_sliders_with_their_own_coefficients_are_those_that_stand_alone() -> None:
-    model = scene("sdof_slider", normal_stiffness=0.0)
-    friction = np.array([0.3, 0.6])
-    both = state_at(side_by_side(model, model), friction)
-    for pair in range(2):
-        alone = state_at(model, float(friction[pair]))
-        size = np.abs(alone.displacement_h).max()
-        assert both.displacement_h[pair] == pytest.approx(alone.displacement_h[0], abs=1e-6 * size)
-        slider = DenHartogSlider(0.1, 1.6e5, 10.0, 1000.0)
-        exact = slider.first_harmonic(np.array(friction[pair] * 10.0))
-        assert np.hypot(*both.displacement_h[pair, 1, 1:3]) == pytest.approx(float(np.abs(exact)), rel=2e-3)
 
 
 def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone() -> None:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from solver.accuracy.resolved_state import ResolvedState
-from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances, start_with_tail
+from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances
 from solver.harmonic_balance.converged import PathPoint
-from solver.harmonic_balance.prolongation import transfer
 from solver.loading_history.start_states import follow_branch
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
@@ -60,15 +59,6 @@ def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> N
     along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Budget())
     assert along is not None
     assert along.scaled_residual() <= case.settings.tolerance
-
-
-def test_a_start_with_its_tail_is_nearer_for_a_marched_mass() -> None:
-    case, omega, amplitude, point = states()[0]
-    other = case.at(RICH)
-    joint = other.joint(omega, amplitude)
-    balance, tailed = start_with_tail(joint, point.evaluation, case.resolution.orders)
-    plain, padded = transfer(other, joint, point.evaluation, case.resolution.orders)
-    assert balance.evaluate(tailed).scaled_residual() < plain.evaluate(padded).scaled_residual()
 
 
 @pytest.mark.slow

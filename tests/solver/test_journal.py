@@ -76,7 +76,6 @@ def in_short_runs(
 Case = tuple[Callable[[], ReducedModel], float, float, list[float], Sweep]
 CASES: dict[str, Case] = {
     "first state, nodes and resolutions": (lambda: dovetail(13), 0.5, 0.5, [212.0], "up"),
-    "ramp": (lambda: dovetail(13), 0.5, 0.5, [211.5, 212.7], "ramp"),
     "folds and settling in time": (lambda: scene("vibro_impact"), 0.0, 0.02, [0.2], "up"),
     "masses on sliders": (lambda: scene("two_masses"), 0.5, 20.0, [0.1], "down"),
 }

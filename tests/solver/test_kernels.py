@@ -13,17 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force, mean_normal_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force
 from solver.contact.period_march import integrate_slip_work, march_period
-from solver.contact.tangent import march_tangent
 from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
 from tests.solver.kernel_cases import (
     BASIS,
     FRICTION,
-    PERIODS,
     KernelCase,
-    both_tangents,
     friction_of,
     kernel_case,
     kernel_results,
@@ -68,14 +65,6 @@ def test_every_sample_obeys_signorini_and_coulomb(
         assert moved @ force == pytest.approx(np.linalg.norm(moved) * np.linalg.norm(force), rel=1e-9, abs=1e-9)
 
 
-def test_the_three_states_of_a_sample() -> None:
-    assert contact_sample(-1.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
-    assert contact_sample(0.0, 3.0, 4.0, 0.5, 1.0, 1.0) == (0.0, 0.0, 0.0, 3.0, 4.0, SEPARATED)
-    assert contact_sample(20.0, 4.0, 5.0, 0.5, 1.0, 1.0) == (20.0, 3.0, 4.0, 1.0, 1.0, STICK)
-    assert contact_sample(4.0, 4.0, 5.0, 0.5, 1.0, 1.0) == pytest.approx((4.0, 1.2, 1.6, 2.8, 3.4, SLIP))
-    assert contact_sample(4.0, 4.0, 5.0, 0.0, 1.0, 1.0) == (4.0, 0.0, 0.0, 4.0, 5.0, SLIP)
-
-
 @pytest.mark.parametrize("most_periods", [1, 2, 5])
 def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None:
     case = kernel_case(4, 24, seed=1)
@@ -88,28 +77,6 @@ def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None
         assert error[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
     assert periods.max() <= most_periods
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
-
-
-def test_a_period_is_marched_until_its_state_repeats() -> None:
-    # Separation forgets the history within one pass, slip under constant pressure within two.
-    case = kernel_case(6, 48, seed=3)
-    *_, periods, error = march_period(*marched(case), 1e-9, 50)
-    assert (error <= 1e-9).all()
-    assert (periods >= 2).all()
-    again = march_period(*marched(case), 1e-9, 60)
-    assert np.array_equal(again[3], periods)
-
-
-def test_a_stuck_pair_keeps_its_history_and_wears_exactly_zero() -> None:
-    case = kernel_case(3, 64, seed=4)
-    predicted = case.predicted_t.copy()
-    predicted[:, 0] = 1e3  # far above what the tangents need
-    force_t, state_t, status_t, periods, error = march_period(predicted, friction_of(predicted), case.start, 0.0, 8)
-    assert (status_t == STICK).all()
-    assert np.array_equal(integrate_slip_work(force_t, state_t), np.zeros(3))
-    assert np.array_equal(periods, np.ones(3))
-    assert not error.any()
-    assert np.array_equal(state_t, np.repeat(case.start[:, :, None], 65, axis=2))
 
 
 def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() -> None:
@@ -128,30 +95,6 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     assert work <= FRICTION * expected * (1 + 1e-12)
 
 
-def test_wear_with_a_pressure_that_varies_takes_the_mean_of_both_ends_of_an_increment() -> None:
-    force_t = np.zeros((1, 3, 3))
-    force_t[:, 0] = [1.0, 3.0, 5.0]
-    state_t = np.zeros((1, 2, 4))
-    state_t[:, 0] = [0.0, 3.0, 3.0, 3.0]
-    state_t[:, 1] = [0.0, 4.0, 4.0, 10.0]
-    expected = [0.5 * (5 + 1) * 5 + 0.5 * (3 + 5) * 6]
-    assert integrate_slip_work(force_t, state_t) == pytest.approx(expected, rel=1e-15, abs=0.0)
-
-
-def test_a_pair_that_stays_pressed_keeps_its_samples_of_the_normal_force() -> None:
-    predicted_t = kernel_case(3, 24, seed=6).predicted_t
-    pressed = predicted_t - predicted_t[:, :1].min(axis=2, keepdims=True) + 1.0
-    assert np.array_equal(mean_normal_force(pressed), pressed[:, 0])
-    assert not mean_normal_force(-pressed).any()
-
-
-def test_a_sample_beside_an_opening_counts_by_the_closed_part_of_the_step() -> None:
-    predicted_t = np.zeros((1, 3, 4))
-    predicted_t[0, 0] = [4.0, -4.0, -1.0, 3.0]
-    # closed for 1/2 of the step behind sample 0 and 3/4 of the one before sample 3, each of half the weight
-    assert mean_normal_force(predicted_t)[0] == pytest.approx([4.0 * (0.5 + 0.25), 0.0, 0.0, 3.0 * (0.5 + 0.375)])
-
-
 def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples() -> None:
     # max(cos(t - 1) - 0.3, 0): closed for |t - 1| < a, cos a = 0.3
     a = np.arccos(0.3)
@@ -167,99 +110,6 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
         error < 2 * (2 * np.pi / n) ** 2 * np.sin(a) / np.pi
         for error, n in zip(errors, (32, 64, 128, 256), strict=True)
     )
-
-
-def derivative_error(
-    case: KernelCase, n_contact: int, closure: float = 0.0, most_periods: int = PERIODS
-) -> tuple[float, float, float]:
-    """Largest error of the tangents against central differences relative to their size, and the switches' distance."""
-    basis = BASIS
-    m = basis.synthesis.shape[0]
-
-    def run(predicted_h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        predicted_t = predicted_h @ basis.synthesis
-        force_t, state_t, status_t, *_ = march_period(
-            predicted_t, friction_of(case.start), case.start, closure, most_periods
-        )
-        force_h = force_t @ basis.analysis
-        force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
-        return force_h, integrate_slip_work(force_t, state_t), status_t
-
-    predicted_t = case.predicted_h @ basis.synthesis
-    _, state_t, _, periods, _ = march_period(predicted_t, friction_of(case.start), case.start, closure, most_periods)
-    force_tangent, wear_tangent = march_tangent(
-        predicted_t,
-        friction_of(predicted_t),
-        case.start,
-        state_t,
-        periods,
-        both_tangents(n_contact),
-        basis.synthesis,
-        basis.analysis,
-        case.has_normal,
-    )
-    assert not force_tangent[:, :m].any()
-    force_tangent[:, :m, :m] = mean_normal_tangent(predicted_t, basis.synthesis, basis.analysis, case.has_normal)
-    force_error, wear_error, same = 0.0, 0.0, True
-    _, _, status = run(case.predicted_h)
-    step = 1e-4
-    for component in range(3):
-        for k in range(m):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = case.predicted_h.copy()
-                moved[case.has_normal | (component > 0), component, k] += sign * step
-                ends.append(run(moved))
-            same = same and all(np.array_equal(end[2], status) for end in ends)
-            force_difference = (ends[0][0] - ends[1][0]) / (2 * step)
-            column = force_tangent[:, :, component * m + k].reshape(n_contact, 3, m)
-            force_error = max(force_error, np.abs(column - force_difference).max())
-            wear_difference = (ends[0][1] - ends[1][1]) / (2 * step)
-            wear_error = max(wear_error, np.abs(wear_tangent[:, component * m + k] - wear_difference).max())
-    assert same, "a sample changes its state within the differences: another seed is needed"
-    return force_error, wear_error, float(np.abs(wear_tangent).max())
-
-
-@pytest.mark.parametrize("seed", [10, 12, 13])
-def test_tangents_are_those_of_central_differences(seed: int) -> None:
-    case = kernel_case(4, BASIS.n_samples, seed=seed)
-    assert not case.has_normal.all()
-    force_error, wear_error, wear_size = derivative_error(case, 4)
-    # truncation: step^2 / pull^2 with pulls above 0.1 N; round-off: 1e-16 * 100 N / step
-    assert force_error < 1e-7
-    assert wear_error < 1e-7 * max(wear_size, 1.0)
-    assert wear_size > 1.0
-
-
-def test_the_derivative_of_the_start_state_goes_through_the_passes() -> None:
-    # Sliding one way and back, the end of a pass depends on p: a tangent of one pass would leave that out.
-    case = kernel_case(4, BASIS.n_samples, seed=10)
-    _, state_t, *_ = march_period(*marched(case), 1e-12, PERIODS)
-    arguments = (case.predicted_t, friction_of(case.predicted_t), case.start, state_t)
-    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
-    one, _ = march_tangent(*arguments, np.full(4, 1), both_tangents(4), *rest)
-    two, _ = march_tangent(*arguments, np.full(4, 2), both_tangents(4), *rest)
-    assert np.abs(one - two).max() > 1e-3
-
-
-@pytest.mark.parametrize("line", [0, 1])
-def test_a_pair_with_one_tangent_has_the_tangent_of_one_with_two_that_moves_along_it(line: int) -> None:
-    m = BASIS.synthesis.shape[0]
-    case = kernel_case(4, BASIS.n_samples, seed=10)
-    predicted_t, start = case.predicted_t.copy(), case.start.copy()
-    predicted_t[:, 2 - line] = start[:, 1 - line] = 0.0
-    _, state_t, status_t, periods, _ = march_period(predicted_t, friction_of(predicted_t), start, 1e-12, PERIODS)
-    assert len(np.unique(status_t)) == 3
-    arguments = (predicted_t, friction_of(predicted_t), start, state_t, periods)
-    rest = (BASIS.synthesis, BASIS.analysis, case.has_normal)
-    two, two_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, both_tangents(4), *rest))
-    one, one_wear = (part.reshape(4, -1, 3, m) for part in march_tangent(*arguments, np.full(4, line), *rest))
-    there = np.array([0, 1 + line])
-    rows = slice((1 + line) * m, (2 + line) * m)
-    assert one[:, rows][:, :, there] == pytest.approx(two[:, rows][:, :, there], abs=1e-12)
-    assert one_wear[:, :, there] == pytest.approx(two_wear[:, :, there], abs=1e-12)
-    missing = one.reshape(4, 3 * m, 3 * m)[:, (2 - line) * m : (3 - line) * m]
-    assert np.array_equal(missing, np.broadcast_to(np.eye(3 * m)[(2 - line) * m : (3 - line) * m], missing.shape))
 
 
 def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
@@ -294,32 +144,6 @@ def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int)
         assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
     assert slowest > 40
     assert periods.max() < 20
-
-
-@pytest.mark.parametrize("seed", [31, 33])
-def test_tangents_of_a_slow_closure_are_those_of_central_differences(seed: int) -> None:
-    force_error, wear_error, wear_size = derivative_error(slowly_closing(seed), 6, closure=1e-12, most_periods=400)
-    assert force_error < 1e-6
-    assert wear_error < 1e-6 * max(wear_size, 1.0)
-
-
-def test_a_basis_of_one_harmonic_and_few_samples_works() -> None:
-    basis = build_basis((), 1)
-    predicted_t = np.array([[[2.0], [0.5], [3.0]]])
-    start = np.zeros((1, 2))
-    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 1)
-    assert np.hypot(*force_t[0, 1:, 0]) == pytest.approx(FRICTION * 2.0)
-    everything = (basis.synthesis, basis.analysis, np.ones(1, bool))
-    tangent, _ = march_tangent(
-        predicted_t, friction_of(predicted_t), start, state_t, np.array([1]), both_tangents(1), *everything
-    )
-    # the force is 2 mu n with n along (0.5, 3): growing pressure lengthens it, a push across turns it
-    along, size = np.array([0.5, 3.0]) / np.hypot(0.5, 3.0), np.hypot(0.5, 3.0)
-    across = 2.0 * FRICTION / size * (np.eye(2) - np.outer(along, along))
-    assert tangent[0, 1:] == pytest.approx(np.column_stack([FRICTION * along, across]), rel=1e-12)
-    assert mean_normal_tangent(predicted_t, *everything)[0, 0] == pytest.approx([1.0])
-    force_t, state_t, *_ = march_period(predicted_t, friction_of(predicted_t), start, 0.0, 8)
-    assert integrate_slip_work(force_t, state_t)[0] == 0.0
 
 
 @pytest.mark.slow

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
-from solver.contact.period_march import integrate_slip_work, march_period
-from solver.contact.rigid_slider import march_masses
-from solver.contact.tangent import march_tangent, mass_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Joint, build_case
 from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
@@ -84,56 +81,6 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution: Resolution, fr
 
 
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_elastic_pairs_are_those_of_their_kernel(resolution: Resolution) -> None:
-    joint = mixed_joint(resolution, [])
-    values, history = predicted(joint)
-    found = march_law(joint, values, history)
-    predicted_t = values @ joint.basis.synthesis
-    start = history * joint.penalty.tangential[:, None]
-    closure = 1e-10 * FRICTION * predicted_t[:, 0].max()
-    force_t, state_t, status_t, periods, error = march_period(
-        predicted_t, joint.friction_coefficient, start, closure, 400
-    )
-    assert np.array_equal(found.force_t, force_t)
-    assert np.array_equal(found.state_t, state_t)
-    assert np.array_equal(found.status_t, status_t)
-    assert np.array_equal(found.periods, periods)
-    assert np.array_equal(found.start, start)
-    assert found.periodicity_error == error.max()
-    assert found.slip_work == pytest.approx(integrate_slip_work(force_t, state_t) / joint.penalty.tangential, rel=1e-14)
-    assert found.force_h[:, 1:] == pytest.approx((force_t @ joint.basis.analysis)[:, 1:], rel=1e-12, abs=1e-12)
-    normal_h = mean_normal_force(predicted_t) @ joint.basis.analysis
-    assert found.force_h[:, 0] == pytest.approx(normal_h, rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_masses_are_those_of_their_kernel_under_means_over_the_steps(resolution: Resolution) -> None:
-    joint = mixed_joint(resolution)
-    values, history = predicted(joint)
-    found = march_law(joint, values, history)
-    n_samples, orders = joint.basis.n_samples, joint.basis.orders
-    # the mean over a step around a sample, by quadrature
-    points, weights = np.polynomial.legendre.leggauss(8)
-    means = np.zeros((6, 3, n_samples))
-    for point, weight in zip(points, weights, strict=True):
-        phase = 2.0 * np.pi * (np.arange(n_samples) + 0.5 * point) / n_samples
-        rows = np.array([np.ones(n_samples), *(f(n * phase) for n in orders for f in (np.cos, np.sin))])
-        means += 0.5 * weight * (values @ rows)
-    means[:, 0] = values[:, 0] @ joint.basis.synthesis
-    assert found.predicted_t[FREE] == pytest.approx(means[FREE], rel=1e-12, abs=1e-10)
-    mass, drag, line = joint.penalty.mass[FREE], joint.penalty.drag[FREE], joint.line[FREE]
-    step = 2.0 * np.pi / OMEGA / n_samples
-    assert joint.sample_step == pytest.approx(step, rel=1e-15)
-    force_t, velocity_t, place_t, _, slip_work, _ = march_masses(
-        means[FREE], joint.friction_coefficient[FREE], mass, drag, line, step
-    )
-    assert found.force_t[FREE] == pytest.approx(force_t, abs=1e-9)
-    assert found.state_t[FREE] == pytest.approx(place_t, abs=1e-9 * np.abs(place_t).max())
-    assert found.start[FREE] == pytest.approx(velocity_t[:, :, 0], abs=1e-9 * np.abs(velocity_t).max())
-    assert found.slip_work[FREE] == pytest.approx(slip_work, rel=1e-9)
-
-
-@pytest.mark.parametrize("resolution", RESOLUTIONS)
 def test_the_motion_of_a_joint_is_that_of_the_march(resolution: Resolution) -> None:
     # the harmonics of u = motion(p - lambda) against those of the places that the mass was marched through
     joint = mixed_joint(resolution)
@@ -150,67 +97,3 @@ def test_the_motion_of_a_joint_is_that_of_the_march(resolution: Resolution) -> N
         # a stop within a step is resolved by the march alone: second order in the step
         slack = 40.0 / resolution.samples**2 * np.abs(expected).max()
         assert np.abs(moved[pair, 1:, 1:] - expected).max() < slack
-
-
-def test_the_harmonics_of_a_stuck_mass_are_those_of_its_predicted_force() -> None:
-    joint = mixed_joint(RESOLUTIONS[1])
-    values, history = predicted(joint)
-    values[:, 0] = 0.0
-    values[:, 0, 0] = 1e6
-    found = march_law(joint, values, history)
-    assert (found.status_t[FREE] == STICK).all()
-    assert found.force_h[FREE] == pytest.approx(values[FREE], abs=1e-10 * PRELOAD + 1e-15 * 1e6)
-    assert not found.slip_work.any()
-    force_tangent, slip_tangent = law_tangent(joint, found)
-    assert not slip_tangent.any()
-    m = values.shape[2]
-    for pair in FREE:
-        own = joint.component_index[joint.component_index // 3 == pair] % 3
-        select = (own[own > 0][:, None] * m + np.arange(m)).ravel()
-        block = force_tangent[pair][np.ix_(select, select)]
-        assert block == pytest.approx(np.eye(select.size), abs=1e-12)
-
-
-@pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_pairs_that_stick_or_are_open_all_period_long_have_the_tangents_of_the_kernels(resolution: Resolution) -> None:
-    joint = mixed_joint(resolution)
-    values, history = predicted(joint)
-    m = values.shape[2]
-    # two pairs stick, two are open, of each kind one; the others switch
-    values[[0, 3], 0] = 0.0
-    values[[0, 3], 0, 0] = 1e3 * PRELOAD
-    values[[2, 4], 0] = 0.0
-    values[[2, 4], 0, 0] = -PRELOAD
-    found = march_law(joint, values, history)
-    assert [set(found.status_t[pair]) for pair in (0, 2, 3, 4)] == [{STICK}, {SEPARATED}, {STICK}, {SEPARATED}]
-    assert len(set(found.status_t[5])) > 1
-    force_tangent, slip_tangent = law_tangent(joint, found)
-    assert not slip_tangent[[0, 2, 3, 4]].any()
-    basis, factor = joint.basis, joint.step_mean_factor()
-    elastic = [0, 2, 5]
-    by_kernel, _ = march_tangent(
-        found.predicted_t[elastic],
-        joint.friction_coefficient[elastic],
-        *(part[elastic] for part in (found.start, found.state_t, found.periods, joint.line)),
-        basis.synthesis,
-        basis.analysis,
-        joint.has_normal[elastic],
-    )
-    masses, _ = mass_tangent(
-        found.predicted_t[FREE],
-        joint.friction_coefficient[FREE],
-        *(part[FREE] for part in (joint.penalty.mass, joint.penalty.drag, joint.line)),
-        joint.sample_step,
-        found.start[FREE],
-        basis.synthesis,
-        basis.synthesis * factor[:, None],
-        basis.analysis / factor,
-        joint.has_normal[FREE],
-    )
-    normal = mean_normal_tangent(found.predicted_t, basis.synthesis, basis.analysis, joint.has_normal)
-    for pair in range(6):
-        kernel = by_kernel[elastic.index(pair)] if pair in elastic else masses[FREE.index(pair)]
-        kernel[:m, :m] = normal[pair]
-        own = joint.component_index[joint.component_index // 3 == pair] % 3
-        select = np.ix_(*2 * [(own[:, None] * m + np.arange(m)).ravel()])
-        assert force_tangent[pair][select] == pytest.approx(kernel[select], abs=1e-11)

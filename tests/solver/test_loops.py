@@ -11,9 +11,8 @@ from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
-from solver.settings import Scheme, SolverSettings, first_resolution
-from solver.structure.fourier import synthesis
-from tests.solver.models import branch_states, march_wear, random_model, scene
+from solver.settings import Scheme, SolverSettings
+from tests.solver.models import branch_states, march_wear, scene
 
 FRICTION = 0.5
 AREA = 1e-4
@@ -74,14 +73,6 @@ def test_between_samples_the_values_are_those_of_straight_lines(samples: int, le
         assert row == pytest.approx(np.interp(loop_phases(), phases, own, period=2 * np.pi), rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("samples", [32, 64, 128, 384, 512])
-def test_a_phase_that_is_a_sample_is_that_sample(samples: int) -> None:
-    values = np.random.default_rng(1).normal(size=samples)
-    common = np.gcd(samples, LOOP_PHASES)
-    found = at_phases(values, 0.0)
-    assert np.array_equal(found[:: LOOP_PHASES // common], values[:: samples // common])
-
-
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme: Scheme) -> None:
     history = slider_march(scheme, CYCLES)
@@ -103,7 +94,7 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme: Scheme) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("samples", [64, 128, 256])
+@pytest.mark.parametrize("samples", [64, 256])
 def test_the_loop_encloses_the_energy_that_friction_takes(scheme: Scheme, samples: int) -> None:
     history = slider_march(scheme, np.array([0.0, 8000.0, 16000.0]), SolverSettings(harmonics=9, samples=samples))
     work = loop_work(history)[:, 0]
@@ -112,25 +103,6 @@ def test_the_loop_encloses_the_energy_that_friction_takes(scheme: Scheme, sample
     # 128 straight lines cut the corners of the rectangle, by the square of a step
     assert work == pytest.approx(4 * limit * sliding, rel=3e-3, abs=0.0)
     assert work == pytest.approx(FRICTION * history.wear_rate / WEAR, rel=3e-3, abs=0.0)
-
-
-def test_a_mass_that_stops_stands_still_in_its_loop() -> None:
-    model = scene("two_masses", 5)
-    settings = SolverSettings(harmonics=5, samples=128)
-    (start,) = branch_states(model, 0.5, 20.0, [0.4], settings)
-    history = march_wear(model, 0.5, start, 0.0, 1.0, "implicit", np.array([0.0]), settings, loops=(0,))
-    motion, force = history.loop_displacement[0, 0, :, 1], history.loop_force[0, 0, :, 1]
-    stuck = np.abs(force) < 0.98 * 7.2
-    inside = stuck & np.roll(stuck, 1) & np.roll(stuck, -1)
-    still = inside & np.roll(inside, 1)
-    assert np.count_nonzero(still) >= 6
-    assert start.state is not None
-    series = start.state.displacement_h[0, 1] @ synthesis((1, 2, 3, 4, 5), loop_phases())
-    moved, of_series = (np.abs(values - np.roll(values, 1))[still].max() for values in (motion, series))
-    # its series of five harmonics ripples, and is 1 % off in the range
-    assert moved < 1e-4 * np.ptp(motion) < 0.1 * of_series
-    assert np.ptp(motion) == pytest.approx(history.slip_range[0, 0], rel=5e-4, abs=0.0)
-    assert np.ptp(series) != pytest.approx(history.slip_range[0, 0], rel=5e-3, abs=0.0)
 
 
 @pytest.mark.slow
@@ -159,11 +131,6 @@ def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-def test_loops_of_a_joint_enclose_the_energy_that_friction_takes() -> None:
-    history = dovetail_march()
-    assert loop_work(history)[0].sum() == pytest.approx(FRICTION * history.wear_rate[0] / WEAR, rel=0.02, abs=0.0)
-
-
 def test_a_loop_does_not_depend_on_the_others_that_are_asked_for() -> None:
     every, some, none = (dovetail_march(loops=loops) for loops in (tuple(range(16)), (3, 7), ()))
     for name in ("loop_displacement", "loop_force"):
@@ -182,29 +149,3 @@ def test_between_steps_loops_are_interpolated_like_all_else(scheme: Scheme) -> N
         assert inner[[0, 2, 4]] == pytest.approx(whole, rel=0.0, abs=1e-14 * scale)
         assert inner[1] == pytest.approx(0.75 * whole[0] + 0.25 * whole[1], rel=0.0, abs=1e-12 * scale)
         assert inner[3] == pytest.approx(0.25 * whole[1] + 0.75 * whole[2], rel=0.0, abs=1e-12 * scale)
-
-
-def test_what_a_pair_does_not_have_is_zero() -> None:
-    model = random_model(1, ("3d", "one_tangent", "second_tangent", "normal_only", "constant_load"))
-    settings = SolverSettings(3, 64)
-    (start,) = branch_states(model, 0.3, 100.0, [300.0], settings)
-    history = march_wear(
-        model, 0.3, start, 0.0, 1.0, "implicit", np.array([0.0]), settings, loops=tuple(range(model.contact.n_contact))
-    )
-    motion, force = history.loop_displacement[0], history.loop_force[0]
-    missing = model.contact.dofs < 0
-    for pair, component in np.argwhere(missing):
-        assert not motion[pair, :, component].any()
-        constant = model.contact.normal_load[pair] if component == 0 else 0.0
-        assert np.array_equal(force[pair, :, component], np.full(LOOP_PHASES, constant))
-    for pair, component in np.argwhere(~missing):
-        assert np.ptp(motion[pair, :, component]) > 0.0 or np.ptp(force[pair, :, component]) > 0.0
-
-
-def test_a_failed_point_has_no_loops() -> None:
-    model, _ = slider_start()
-    failed = StartState(Outcome.SINGULAR, None, 1.0, first_resolution(SLIDER), np.inf, np.inf, 1, 0.0)
-    history = march_wear(model, FRICTION, failed, WEAR, 1.0, "implicit", np.array([0.0, 1.0]), SLIDER, loops=(0,))
-    for values in (history.loop_displacement, history.loop_force):
-        assert values.shape == (2, 1, LOOP_PHASES, 3)
-        assert np.isnan(values).all()

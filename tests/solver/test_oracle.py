@@ -42,7 +42,7 @@ def worn(model: ReducedModel, starts: list[StartState], scheme: Scheme) -> list[
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["implicit", "explicit", "adaptive"])
+@pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
 def test_wear_is_that_of_dense_solves(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
     model = sector()
     # the same start: a sweep chooses its steps by what happens, and by every digit of that

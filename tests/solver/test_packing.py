@@ -9,7 +9,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history import sweep
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -25,7 +24,7 @@ from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR
 from tests.solver.test_explicit_step_limit import exact_limit, seesaw
 
 AUTO = SolverSettings(rtol=3e-2)
-MOST_STOPS = 3
+MOST_STOPS = 2
 
 
 @pytest.mark.parametrize(
@@ -107,7 +106,7 @@ def from_every_stop(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("explicit", 800.0), ("adaptive", 1.0)])
+@pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("adaptive", 1.0)])
 def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=8))
     (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
@@ -119,13 +118,10 @@ def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monk
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "step"), [("implicit", 50.0), ("adaptive", 1.0)])
-def test_a_history_goes_on_before_and_behind_a_jump(
-    scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=30))
     settings = SolverSettings(11, 128)
-    whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, step, scheme, 1000.0, settings)
+    whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, 100.0, "implicit", 1000.0, settings)
     cycles = [at.progress.state.cycle for at in kept if at.fine is None]
     assert min(cycles) < whole.jump_cycle < max(cycles)
 
@@ -133,7 +129,7 @@ def test_a_history_goes_on_before_and_behind_a_jump(
 @pytest.mark.slow
 def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=1))
-    monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 100)
+    monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 10)
     (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
     step = 1.2 * exact_limit()
     whole, kept = from_every_stop(
@@ -144,41 +140,19 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-def test_a_start_state_comes_back() -> None:
-    (start,) = branch_states(dovetail(3), 0.5, 0.5, [2 * np.pi * 212.0], SolverSettings(3, 64))
-    found = unpack(pack(start))
-    assert_same(replace(found, state=None, coarse=None), replace(start, state=None, coarse=None))
-    assert_same(found.state, start.state)
-    assert_same(found.coarse, start.coarse)
-    failed = replace(start, state=None, coarse=None, outcome=Outcome.BRANCH_LOST)
-    assert_same(unpack(pack(failed)), failed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_sweep_goes_on_to_the_same_numbers(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Over a fold of the vibro-impact, and on a joint followed with few harmonics."""
-    for model, friction, amplitude, frequencies in (
-        (scene("vibro_impact"), 0.0, 0.02, np.linspace(0.14, 0.27, 7)),
-        (dovetail(13), 0.5, 0.5, np.array([211.5, 212.7, 213.2])),
+def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers() -> None:
+    model, frequencies = scene("vibro_impact"), np.array([0.2, 0.255])
+    kept: list[tuple[frozenset[int], Packed]] = []
+    whole: dict[int, StartState] = {}
+    for index, start in follow_branch(
+        model, 0.0, 0.02, frequencies, "up", AUTO, keep=lambda progress: kept.append((frozenset(whole), progress))
     ):
-        monkeypatch.setattr(sweep, "ACCURACY", replace(sweep.ACCURACY, coarse_unknowns=200))
-        kept: list[tuple[frozenset[int], Packed]] = []
-        whole: dict[int, StartState] = {}
-
-        def note(progress: Packed, kept: list = kept, whole: dict = whole) -> None:
-            kept.append((frozenset(whole), progress))
-
-        for index, start in follow_branch(model, friction, amplitude, frequencies, direction, AUTO, keep=note):
-            whole[index] = start
-        assert len(kept) >= 2
-        for done, progress in kept[:: max(1, len(kept) // 2)]:
-            left = [index for index in range(frequencies.size) if index not in done]
-            again = follow_branch(model, friction, amplitude, frequencies[left], direction, AUTO, resume=progress)
-            for place, start in again:
-                wanted = whole[left[place]]
-                assert_same(replace(start, state=None, coarse=None), replace(wanted, state=None, coarse=None))
-                for one, other in ((start.state, wanted.state), (start.coarse, wanted.coarse)):
-                    assert (one is None) == (other is None)
-                    if one is not None:
-                        assert_same(one, other)
+        whole[index] = start
+    assert [whole[index].branch for index in (0, 1)] == [0, 1]
+    for done, progress in (kept[0], kept[-1]):
+        left = [index for index in range(frequencies.size) if index not in done]
+        for place, start in follow_branch(model, 0.0, 0.02, frequencies[left], "up", AUTO, resume=progress):
+            wanted = whole[left[place]]
+            assert_same(replace(start, state=None, coarse=None), replace(wanted, state=None, coarse=None))
+            assert_same(start.state, wanted.state)
+            assert_same(start.coarse, wanted.coarse)

@@ -1,17 +1,14 @@
-"""Which formulation the scene leads to, and that units do not matter."""
+"""Which formulation the scene leads to, and the motion that belongs to a force in each of them."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
-from solver.structure.penalty import build_penalty, static_penalty
+from solver.structure.penalty import build_penalty
 from tests.solver.models import OMEGA, dovetail, random_model, scene, with_free_masses
 
 DOVETAIL_OMEGA = 2 * np.pi * 212.0
@@ -49,88 +46,6 @@ def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_ha
     assert (penalty.tangential < largest * 1.5).all()
     assert (penalty.tangential > largest * 1e-3).all()
     assert (penalty.normal > largest * 1e-3).all()
-
-
-def scaled(model: ReducedModel, length: float, force: float, rate: float) -> ReducedModel:
-    """The same structure in other units: 1 m, 1 N and 1 rad/s are `length`, `force` and `rate` of the new ones."""
-
-    def linear(old: LinearModel) -> LinearModel:
-        stiffness = force / length
-        return LinearModel(
-            mass=old.mass * (stiffness / rate**2),
-            damping=old.damping * (stiffness / rate),
-            stiffness=old.stiffness * stiffness,
-            load_static=old.load_static * force,
-            load_harmonic=old.load_harmonic * force,
-            response=old.response,
-        )
-
-    contact: ContactInterface = replace(
-        model.contact, gap=model.contact.gap * length, normal_load=model.contact.normal_load * force
-    )
-    return replace(model, linear={k: linear(old) for k, old in model.linear.items()}, contact=contact)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_units_do_not_matter(seed: int) -> None:
-    # random stiffness and mass: whichever formulation is chosen, it must be the same one in all units
-    kinds = ("3d", "constant_load", "normal_only", "one_tangent")
-    model = random_model(seed, kinds)
-    length, force, rate = 1e3, 1e-6, 2.0**-7
-    for omega in (OMEGA, 10 * OMEGA):
-        before = build_penalty(model, omega, 3)
-        after = build_penalty(scaled(model, length, force, rate), rate * omega, 3)
-        assert np.array_equal(after.inertial, before.inertial)
-        tangential = before.tangential * force / length
-        stiffness = force / length
-        fast = before.inertial
-        assert after.mass[fast] == pytest.approx(before.mass[fast] * stiffness / rate**2, rel=1e-9, abs=0.0)
-        assert after.drag[fast] == pytest.approx(before.drag[fast] * stiffness / rate, rel=1e-9, abs=0.0)
-        exists = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-        assert after.tangential[exists] == pytest.approx(tangential[exists], rel=1e-10, abs=0.0)
-        assert after.mean[exists] == pytest.approx((before.mean * force / length)[exists], rel=1e-10, abs=0.0)
-        closing = model.contact.dofs[:, 0] >= 0
-        assert after.normal[closing] == pytest.approx((before.normal * force / length)[closing], rel=1e-10, abs=0.0)
-
-
-def test_a_pair_without_a_displacement_has_a_penalty_to_divide_by() -> None:
-    model = random_model(3, ("constant_load", "normal_only"))
-    penalty = build_penalty(model, OMEGA, 3)
-    for values in (penalty.normal, penalty.tangential, penalty.mean, penalty.mass, penalty.drag):
-        assert (values > 0).all()
-        assert np.isfinite(values).all()
-
-
-def test_a_static_state_is_at_displacement_level_with_the_same_stiffness() -> None:
-    slider = build_penalty(scene("sdof_slider"), 2 * np.pi * 160, 5)
-    static = static_penalty(slider)
-    assert slider.inertial.all()
-    assert not static.inertial.any()
-    # k + s^2 m of the slider at the rate s of the first harmonic left out
-    rate = 6 * 2 * np.pi * 160
-    assert static.tangential == pytest.approx(1.6e5 + 0.1 * rate**2, rel=1e-12, abs=0.0)
-    at_frequency = 1.6e5 + 0.1 * (2 * np.pi * 160) ** 2
-    assert static.mean == pytest.approx(1e-5 * at_frequency, rel=1e-12, abs=0.0)
-    assert np.array_equal(static.normal, slider.normal)
-    joint = static_penalty(build_penalty(dovetail(), DOVETAIL_OMEGA, 3))
-    assert np.array_equal(joint.tangential, build_penalty(dovetail(), DOVETAIL_OMEGA, 3).tangential)
-
-
-@pytest.mark.parametrize(("name", "mass"), [("sdof_slider", 0.1), ("two_masses", 1.0)])
-@pytest.mark.parametrize("highest", [1, 5, 21])
-def test_the_mass_of_a_slider_is_its_own(name: str, mass: float, highest: int) -> None:
-    omega = {"sdof_slider": 2 * np.pi * 160, "two_masses": 0.5}[name]
-    penalty = build_penalty(scene(name), omega, highest)
-    # seen through the spring to the other mass: of the order (w_0 / s)^4 for two masses, exact for one
-    rate = (highest + 1) * omega
-    slack = 1e-12 if name == "sdof_slider" else 4.0 / rate**4 + 1e-12
-    assert penalty.mass == pytest.approx([mass], rel=slack, abs=0.0)
-    assert penalty.drag == pytest.approx(0.1 * penalty.mass * omega, rel=1e-12, abs=0.0)
-
-
-def test_a_free_mass_among_elastic_pairs_is_found_by_itself() -> None:
-    model = with_free_masses(random_model(6, ("3d", "constant_load", "one_tangent", "3d")), [1, 3])
-    assert build_penalty(model, OMEGA, 3).inertial.tolist() == [False, True, False, True]
 
 
 @pytest.mark.parametrize("orders", [(1, 2, 3), (1, 3, 5), (1,)])

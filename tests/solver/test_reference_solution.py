@@ -10,11 +10,10 @@ import pytest
 
 from solver.accuracy.history_error import Met, history_error
 from solver.accuracy.options import ACCURACY
-from solver.accuracy.reference import coarser
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution, Scheme, SolverSettings, all_orders
+from solver.settings import Scheme, SolverSettings
 from solver.wear.check import Checked, FullCheck
 from solver.wear.control import AdaptiveSteps
 from solver.wear.state import Failure, WearState
@@ -70,18 +69,6 @@ def test_the_error_of_the_dovetail_holds_that_of_its_steps(scheme: Scheme, step:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["implicit", "explicit"])
-def test_the_error_falls_with_the_step(scheme: Scheme) -> None:
-    steps = np.array([4000.0, 2000.0, 1000.0])
-    model = scene("sdof_slider", 9)
-    settings = SolverSettings(9, 256)
-    (found,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
-    sizes = [march_wear(model, 0.5, found, WEAR, step, scheme, CYCLES, settings).error_estimate for step in steps]
-    # what harmonics and samples leave wrong stays
-    assert sizes[0] > sizes[1] > sizes[2]
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), SCHEMES)
 def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: float) -> None:
     model = scene("sdof_slider", 21)
@@ -106,15 +93,6 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme: Scheme, step: fl
     least = ACCURACY.history_safety * apart / history.worn_volume[1:]
     assert (history.worn_volume_error[1:] >= least * (1.0 - 1e-12)).all()
     assert history.error_estimate < 0.3
-
-
-@pytest.mark.slow
-def test_nothing_that_wears_nothing_has_an_error() -> None:
-    history = worn("implicit", 1000.0, frequency=205.0)
-    assert history.outcome is Outcome.CONVERGED
-    assert not history.worn_volume.any()
-    assert not history.worn_volume_error.any()
-    assert history.error_estimate == 0.0
 
 
 @pytest.mark.slow
@@ -158,15 +136,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch: p
     assert history.outcome is Outcome.SENSITIVE
     assert history.message.startswith(f"worn volume {1e9 * history.worn_volume[-1]:.3g} mm3, not known: ")
     assert history.message.endswith("the history does not go so far")
-
-
-@pytest.mark.parametrize("highest", [3, 5, 9, 39])
-def test_its_harmonics_are_others_but_of_the_same_kind(highest: int) -> None:
-    for orders in (all_orders(highest), tuple(range(1, highest + 1, 2))):
-        other = coarser(Resolution(orders, 256), scene("sdof_slider", 5))
-        assert other.highest != highest
-        assert other.orders[:2] == orders[:2] or len(other.orders) == 1
-        assert (other.highest < highest) == (highest > 3)
 
 
 def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
@@ -228,15 +197,6 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing() -> None:
     assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.history_safety])
 
 
-def test_a_volume_is_known_no_better_than_the_wear_rates_of_the_start_state() -> None:
-    other = read(DEPTH, rate=((1.3, 0.9), (1.0, 1.0), (1.0, 1.0)))
-    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "adaptive")
-    # pair by pair, though later states are the same
-    assert (found.worn_volume[1:] >= 0.5 / 3.0).all()
-    # the state itself is known by states with more harmonics
-    assert found.wear_rate == pytest.approx([0.0, 0.0, 0.0])
-
-
 def test_what_nothing_confirms_is_not_known() -> None:
     lost = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]])
     found = history_error(COUNTS, read(DEPTH), lost, NOWHERE, AREA, "explicit")
@@ -251,10 +211,3 @@ def test_what_nothing_confirms_is_not_known() -> None:
     still = history_error(COUNTS, read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), NOWHERE, AREA, "explicit")
     assert not still.worn_volume.any()
     assert not still.wear_depth.any()
-
-
-def test_response_and_wear_rate_are_known_no_better_than_the_reference_solution_says() -> None:
-    other = read(DEPTH, 1.25 * np.ones((3, 2)), response_peak=[[1.0], [1.5], [1.0]], response=[[1.0], [1.0], [1.0j]])
-    found = history_error(COUNTS, read(DEPTH), other, NOWHERE, AREA, "implicit")
-    assert found.response == pytest.approx([1e-3, 0.5, np.sqrt(2.0)])
-    assert found.wear_rate == pytest.approx([0.0, 0.25, 0.25])

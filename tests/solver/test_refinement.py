@@ -20,7 +20,7 @@ from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
-from solver.settings import Resolution, SolverSettings, all_orders, first_resolution, samples_for
+from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
@@ -58,29 +58,6 @@ def solved_at(case: Case, omega: float, amplitude: float, point: PathPoint, reso
 def response(case: Case, omega: float, amplitude: float, point: PathPoint) -> np.ndarray:
     joint = case.joint(omega, amplitude)
     return to_complex(joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h)))[:, 0]
-
-
-# ---------------------------------------------------------------------------------------------------------- resolution
-
-
-@pytest.mark.parametrize("highest", [1, 3, 8, 9, 15, 25, 41, 115])
-def test_samples_are_a_power_of_two_with_eight_a_harmonic(highest: int) -> None:
-    samples = samples_for(highest)
-    assert samples & (samples - 1) == 0
-    assert samples >= max(64, 8 * highest)
-    assert samples == 64 or samples < 16 * highest
-
-
-def test_settings_fix_what_they_name() -> None:
-    assert first_resolution(SolverSettings(5, 48)) == Resolution((1, 2, 3, 4, 5), 48)
-    assert first_resolution(SolverSettings(harmonics=20)) == Resolution(all_orders(20), samples_for(20))
-    assert first_resolution(SolverSettings(samples=200)) == Resolution((1, 2, 3), 200)
-    assert not SolverSettings(5, 48).automatic
-    assert SolverSettings(harmonics=5).automatic
-    assert SolverSettings(samples=48).automatic
-
-
-# -------------------------------------------------------------------------------------------------------------- states
 
 
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> None:
@@ -129,45 +106,6 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
     )
 
 
-def test_a_stuck_state_of_fixed_harmonics_keeps_them() -> None:
-    case, point = slider(SolverSettings(harmonics=5), force=2.0)
-    assert (point.evaluation.status_t == STICK).all()
-    refined = refine(case, SLIDER_OMEGA, 2.0, point, Budget())
-    assert refined.case is case
-    assert refined.estimate == Estimate(0.0, 0.0)
-
-
-def test_fixed_settings_return_only_an_estimate() -> None:
-    case, point = slider(SolverSettings(3, 64))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
-    assert refined.case is case
-    assert refined.point is point
-    assert refined.accurate
-    assert 1e-4 < refined.estimate.response < 0.1
-    assert 1e-4 < refined.estimate.wear_rate < 0.1
-
-
-@pytest.mark.parametrize("settings", [SolverSettings(harmonics=9, rtol=1e-3), SolverSettings(samples=256, rtol=1e-3)])
-def test_what_the_settings_fix_is_not_changed(settings: SolverSettings) -> None:
-    case, point = slider(settings)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
-    if settings.harmonics != "auto":
-        assert refined.case.resolution.orders == all_orders(9)
-        assert refined.case.resolution.samples >= case.resolution.samples
-    else:
-        assert refined.case.resolution.samples == 256
-        assert refined.case.resolution.highest > case.resolution.highest
-    assert refined.accurate == (refined.estimate.largest <= 1e-3)
-
-
-def test_three_harmonics_that_do_not_suffice_are_not_called_accurate() -> None:
-    case, point = slider(SolverSettings(harmonics=1, rtol=1e-3))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
-    assert refined.case.resolution.orders == (1,)
-    assert not refined.accurate
-    assert refined.estimate.response > 1e-3
-
-
 @pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("few_pairs_unknowns", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     name: str, most: int, monkeypatch: pytest.MonkeyPatch
@@ -200,14 +138,6 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:
     lower = solved_at(refined.case, SLIDER_OMEGA, 10.0, refined.point, Resolution((1,), 64))
     one = response(refined.case.at(Resolution((1,), 64)), SLIDER_OMEGA, 10.0, lower)
     assert abs(one / exact - 1.0).max() > 0.3 * settings.rtol
-
-
-def test_the_point_keeps_its_parameter_and_the_iterations_are_counted() -> None:
-    case, point = slider(SolverSettings(rtol=1e-3))
-    budget = Budget()
-    refined = refine(case, SLIDER_OMEGA, 10.0, PathPoint(42.0, point.evaluation, point.history), budget)
-    assert refined.point.parameter == 42.0
-    assert budget.iterations > 0
 
 
 # ----------------------------------------------------------------------------------------------------------- estimates

@@ -1,4 +1,4 @@
-"""Rigid friction at the tip of a cantilever, and the peak of a slider, against exact motions."""
+"""Rigid friction at the tip of a cantilever, and the peak of a response, against exact motions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.accuracy.harmonic_levels import reach, reaches
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
@@ -23,19 +22,14 @@ from solver.structure.penalty import build_penalty
 from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact import NATURAL
-from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
+from tests.solver.models import branch_states, first_point, march_wear, scene
 
 SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
-CASES = [  # spring, force, N, frequency, rad/s
-    ("rigid", 3.0, 0.7),
-    ("rigid", 6.0, 0.7),
-    ("rigid", 3.0, 0.96),
-    ("rigid", 6.0, 1.6),
-    ("soft spring", 6.0, 0.7),
-    ("soft spring", 3.0, 1.0),
-    ("stiff spring", 6.0, 0.85),
-    ("stiff spring", 3.0, 0.96),
-    ("stiff spring", 6.0, 1.2),
+CASES = [  # spring, force, N, frequency, rad/s, rtol; `python -m tests.benchmarks.accuracy` has more
+    ("rigid", 6.0, 1.6, 1e-3),
+    ("rigid", 3.0, 0.7, 1e-2),
+    ("soft spring", 3.0, 1.0, 1e-3),
+    ("stiff spring", 6.0, 1.2, 1e-2),
 ]
 
 
@@ -57,9 +51,7 @@ def reported(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "force", "omega", "rtol"), [*((*case, 1e-3) for case in CASES), *((*case, 1e-2) for case in CASES[::4])]
-)
+@pytest.mark.parametrize(("name", "force", "omega", "rtol"), CASES)
 def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
     name: str, force: float, omega: float, rtol: float
 ) -> None:
@@ -74,17 +66,6 @@ def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
     assert 0.5 * max(error, peak_error) < start.response_error <= rtol
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
-@pytest.mark.parametrize("ratio", [0.62, 0.9])
-def test_the_peak_of_den_hartogs_slider(ratio: float, rtol: float) -> None:
-    model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(rtol=rtol)
-    (start,) = branch_states(model, 0.5, 10.0, [ratio * NATURAL], settings)
-    largest = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, ratio * NATURAL)
-    error = abs(reported(model, 0.5, start, settings)[1] / largest - 1.0)
-    assert error < rtol
-    assert 0.5 * error < start.response_error <= rtol
-
-
 def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
     # the spring of 200 N/m and the tip's 0.05 kg are in resonance at 63 rad/s
     sprung, rigid = Cantilever(spring=200.0).model(), Cantilever().model()
@@ -92,17 +73,6 @@ def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
     assert all(build_penalty(rigid, 1.0, highest).inertial[0] for highest in (3, 27, 79, 165))
     # from there on the penalty is the spring
     assert build_penalty(sprung, 1.0, 1000).tangential[0] == pytest.approx(200.0, rel=1e-2)
-
-
-def test_how_many_harmonics_reach_beyond_the_structure() -> None:
-    slider = scene("sdof_slider", normal_stiffness=0.0)
-    # k / (k + m s^2) of a mass on a spring is a quarter at sqrt(3) times its natural frequency
-    assert not reaches(slider, NATURAL / 10.0, 15)
-    assert reaches(slider, NATURAL / 10.0, 17)
-    assert reach(slider, NATURAL, 1) == 1
-    # the modes of the beam end at 57 rad/s
-    assert 27 <= reach(Cantilever().model(), 1.0, 3) <= 79
-    assert reach(Cantilever().model(), 1.0, 115) == 115
 
 
 def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
@@ -121,13 +91,8 @@ def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
     assert tail_orders(joint) == tuple(range(10, 28))
 
 
-def test_an_elastic_joint_has_no_tail() -> None:
-    model = random_model(4, ("constant_load",))
-    assert tail_orders(build_case(model, 0.4, OMEGA, SolverSettings()).joint(OMEGA, 1.0)) == ()
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("first", "second"), [(27, 79), (79, 27)])
+@pytest.mark.parametrize(("first", "second"), [(79, 27)])
 def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, second: int) -> None:
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))

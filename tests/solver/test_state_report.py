@@ -11,17 +11,17 @@ import pytest
 from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.converged import PathPoint
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import Budget
 from solver.results.history import PeriodicState
-from solver.results.state_report import largest_distance, periodic_state, report_state
+from solver.results.state_report import periodic_state, report_state
 from solver.settings import SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint, build_case
 from tests.solver.contact_twin import pair_period, status
-from tests.solver.models import OMEGA, dovetail, first_point, random_model
+from tests.solver.models import OMEGA, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series
 
 FRICTION = 0.4
@@ -84,43 +84,6 @@ def test_the_static_state_is_in_equilibrium_and_obeys_the_contact_law(kinds: str
     worn = np.random.default_rng(seed).uniform(0.0, 4e-5, n_contact)
     for depth in (np.zeros(n_contact), worn):
         check_static(case.model, static_point(case, depth).evaluation, FRICTION)
-
-
-def test_the_static_state_of_the_dovetail_obeys_the_contact_law() -> None:
-    case = build_case(dovetail(), 0.5, 2 * np.pi * 212.0, SolverSettings(3, 64))
-    point = static_point(case, np.zeros(16), 1e-9)
-    check_static(case.model, point.evaluation, 0.5)
-    force = point.evaluation.force_h[:, :, 0]
-    # the spring-up of the load leaves pairs on both sides of sticking
-    assert (force[:, 0] > 0).all()
-
-
-def test_a_wide_gap_leaves_a_pair_open() -> None:
-    case = case_of("3d", 4)
-    contact = replace(case.model.contact, gap=np.array([0.0, 1e-2, 0.0]))
-    case = build_case(replace(case.model, contact=contact), FRICTION, OMEGA, SETTINGS)
-    evaluation = static_point(case, np.zeros(3)).evaluation
-    assert not evaluation.force_h[1].any()
-    assert (evaluation.force_h[[0, 2], 0, 0] > 0).all()
-    check_static(case.model, evaluation, FRICTION)
-
-
-def test_the_static_state_does_not_depend_on_how_exactly_its_steps_are_solved() -> None:
-    # A loose tolerance ends Newton's method earlier; as it ends exactly in its piece, the state is the same.
-    case = case_of("3d", 5)
-    tight, loose = (static_point(case, np.zeros(3), tolerance) for tolerance in (1e-12, 1e-7))
-    size = np.abs(tight.evaluation.force_h).max()
-    assert loose.evaluation.force_h == pytest.approx(tight.evaluation.force_h, abs=20 * 1e-7 * size * 10)
-    lengths = np.abs(tight.evaluation.displacement_h).max()
-    assert loose.history == pytest.approx(tight.history, abs=20 * 1e-7 * lengths * 10)
-
-
-def test_a_load_that_rises_in_proportion_without_slip_leaves_no_history() -> None:
-    model = random_model(6, ("normal_only", "normal_only"))
-    case = build_case(model, FRICTION, OMEGA, SETTINGS)
-    point = static_point(case, np.zeros(2))
-    check_static(model, point.evaluation, FRICTION)
-    assert not point.history.any()
 
 
 @pytest.mark.parametrize("kinds", KINDS)
@@ -193,11 +156,6 @@ def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds: str, seed
         assert np.array_equal(at.status_t[pair], expected)
 
 
-def test_the_random_states_stick_slip_and_open() -> None:
-    seen = {int(s) for kinds in KINDS for seed in (1, 2) for s in periodic(kinds, seed)[1].evaluation.status_t.ravel()}
-    assert seen == {0, 1, 2}
-
-
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     joint, point, state = periodic(kinds, 1)
@@ -222,32 +180,6 @@ def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
         pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
         assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
     assert np.array_equal(report.wear_depth, state.wear_depth)
-
-
-def test_largest_distance_is_that_between_any_two_points() -> None:
-    points = np.array([[[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 2.0, 0.5]]])
-    assert largest_distance(points) == pytest.approx([np.sqrt(5.0)])
-    assert np.array_equal(largest_distance(np.ones((2, 2, 5))), np.zeros(2))
-
-
-def test_a_stored_state_is_reproduced_without_an_iteration() -> None:
-    joint, point, state = periodic("3d", 1)
-    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
-    again = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-    assert again.scaled_residual() <= 1.1 * SETTINGS.tolerance
-    assert again.force_t == pytest.approx(point.evaluation.force_t, abs=1e-8)
-
-
-def test_without_excitation_the_periodic_state_is_the_static_one() -> None:
-    case = case_of("mixed", 3)
-    idle = np.zeros(6)
-    point = first_point(case, OMEGA, 0.0, idle)
-    still = static_point(case, idle).evaluation
-    size = np.abs(still.force_h).max()
-    assert point.evaluation.force_h[:, :, 1:] == pytest.approx(
-        0.0 * point.evaluation.force_h[:, :, 1:], abs=1e-8 * size
-    )
-    assert point.evaluation.force_h[:, :, 0] == pytest.approx(still.force_h[:, :, 0], abs=1e-8 * size)
 
 
 def test_a_structure_that_only_friction_holds_slides_until_its_weak_springs_carry_the_rest() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +16,7 @@ from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.options import WEAR
 from solver.wear.step_limit import moved_fraction, too_long
-from tests.solver.models import OMEGA, branch_states, dovetail, march_wear, random_model
+from tests.solver.models import branch_states, dovetail, march_wear
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 FREQUENCY = 212.5  # Hz
@@ -47,14 +46,6 @@ def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
     change = np.linalg.norm(after - before) / np.linalg.norm(before)
     assert change > 0.01
     assert moved_fraction(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
-
-
-def test_wear_that_does_not_act_back_moves_nothing() -> None:
-    model = random_model(2, ("constant_load", "constant_load"))
-    joint = build_case(model, 0.3, OMEGA, SETTINGS).joint(OMEGA, 0.0)
-    point = solve_static_state(joint, np.zeros(2), 1e-10, Budget())
-    assert point is not None
-    assert moved_fraction(joint, point.evaluation, np.ones(2)) == 0.0
 
 
 def test_the_reason_names_the_step_and_one_that_would_do() -> None:
@@ -87,38 +78,9 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(scheme: Scheme)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["explicit", "implicit"])
-def test_steps_that_move_all_of_the_normal_forces_are_known_not_to_be_accurate(scheme: Scheme) -> None:
-    outcome, _, _ = last_volume(1.1e-7, scheme, 1000.0, CYCLES)
-    assert outcome in (Outcome.SENSITIVE, Outcome.STEP_TOO_LONG)
-
-
-@pytest.mark.slow
 def test_the_step_that_is_advised_is_none_too_long() -> None:
     _, _, message = last_volume(1.1e-5, "explicit", 1000.0, CYCLES)
     advised = float(message.split("at most ")[1].split()[0])
     assert 1e-4 < advised < 1e-2
     outcome, _, message = last_volume(1.1e-5, "explicit", advised, 20.0 * advised * np.array([0.0, 1.0]))
     assert outcome is Outcome.CONVERGED, message
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
-def test_usual_steps_are_none_too_long(scheme: Scheme) -> None:
-    outcome, volume, _ = last_volume(1.1e-11, scheme, 2000.0, np.array([0.0, 2e4]))
-    assert outcome is Outcome.CONVERGED
-    assert volume > 1e-11
-
-
-def test_an_open_pair_carries_nothing_and_holds_nothing() -> None:
-    model = dovetail()
-    gap = np.zeros(16)
-    gap[:2] = 1e-3
-    loose = replace(model, contact=replace(model.contact, gap=gap))
-    joint = build_case(loose, FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS).joint(2.0 * np.pi * FREQUENCY, 0.0)
-    point = solve_static_state(joint, np.zeros(16), 1e-10, Budget())
-    assert point is not None
-    assert point.evaluation.force_h[:2, 0, 0].max() == 0.0
-    worn = np.zeros(16)
-    worn[:2] = 1e-6
-    assert moved_fraction(joint, point.evaluation, worn) == 0.0

@@ -10,15 +10,13 @@ import pytest
 
 from solver.accuracy.error_estimate import Estimate, euler_error
 from solver.accuracy.period_events import left_out
-from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.check import chosen_for_another
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps
-from solver.wear.euler import euler_balance
 from solver.wear.options import WEAR as OPTIONS
-from solver.wear.state import Choice, Failure, WearState
+from solver.wear.state import Choice, WearState
 from solver.wear.step import Step
 from tests.solver.worn_slider import AREA, END, WEAR, begun
 
@@ -69,14 +67,6 @@ def test_a_given_step_follows_its_own_equation(scheme: Scheme) -> None:
     assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_last_given_step_is_shortened_and_a_remainder_of_round_off_is_none() -> None:
-    states, steps = steps_of(GivenSteps("implicit", 3000.0, 7000.0), 3)
-    assert counts(states).tolist() == [0.0, 3000.0, 6000.0, 7000.0]
-    assert [step.length for step in steps] == [3000.0, 3000.0, 1000.0]
-    almost = 6000.0 * (1.0 + 1e-13)
-    assert steps_of(GivenSteps("implicit", 3000.0, almost), 2)[0][-1].cycle == almost
-
-
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth() -> None:
     # Eq. (22): one pair, so each step wears just that depth
     states, _ = steps_of(GivenSteps("explicit", 1.0, END, 2e-6), 4)
@@ -94,15 +84,6 @@ def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twic
     assert lengths[-1] > 2.0 * lengths[0]
 
 
-def test_a_step_that_moves_many_times_the_normal_forces_is_a_failure() -> None:
-    work, state = begun()
-    plan = GivenSteps("explicit", 1e9, 1e12)
-    failed = plan.step(work, plan.begin(work, state))
-    assert isinstance(failed, Failure)
-    assert failed.outcome is Outcome.STEP_TOO_LONG
-    assert "times the normal forces" in failed.message
-
-
 def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter() -> None:
     rtol = 1e-2
     states, steps = steps_of(AdaptiveSteps(rtol), 12)
@@ -114,20 +95,6 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter() -> None:
         assert step.error <= allowed
     assert (lengths[1:] <= OPTIONS.largest_step_ratio * lengths[:-1] * (1.0 + 1e-12)).all()
     assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
-
-
-def test_the_first_adaptive_step_wears_little_and_is_stable() -> None:
-    work, state = begun()
-    first = AdaptiveSteps(1e-2).begin(work, state).length
-    moved = float(np.abs(state.point.evaluation.displacement_h[:, :, 1:]).max())
-    by_depth = OPTIONS.first_depth * moved / float(work.rate(state.point.evaluation).max())
-    assert first == min(OPTIONS.first_step * state.step_limit, by_depth)
-
-
-def test_adaptive_steps_know_the_wear_coefficient_by_its_product_with_cycles_alone() -> None:
-    (once, _), (faster, _) = (steps_of(AdaptiveSteps(1e-2), 6, wear) for wear in (WEAR, 3.0 * WEAR))
-    assert counts(once) == pytest.approx(3.0 * counts(faster), rel=1e-9)
-    assert depths(once) == pytest.approx(depths(faster), rel=1e-9)
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,23 +145,6 @@ def test_a_state_is_data_that_survives_being_kept(plan: Control) -> None:
     one, other = (pack(next_of(state)) for state in (kept, unpack(pack(kept))))
     assert one.text == other.text
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one.arrays, other.arrays, strict=True))
-
-
-def test_the_next_state_is_extrapolated_where_that_is_nearer() -> None:
-    work, state = begun()
-    first = GivenSteps("implicit", 4000.0, END).step(work, state)
-    assert isinstance(first, Step)
-    length, change = first.state.change or (0.0, np.zeros(0))
-    now = first.state.point.evaluation.predicted_h
-    assert length == 4000.0
-    assert np.array_equal(change, now - state.point.evaluation.predicted_h)
-    joint = work.at(first.state)
-    ahead = euler_balance(joint, "implicit", first.state.point.evaluation, 2000.0, WEAR, work.wearing)
-    balance = ahead(1.0, first.state.point.history)
-    assert np.array_equal(work.predicted(first.state, balance, 2000.0), now + 0.5 * change)
-    astray = replace(first.state, change=(length, -100.0 * change))
-    assert np.array_equal(work.predicted(astray, balance, 2000.0), now)
-    assert np.array_equal(work.predicted(replace(astray, change=None), balance, 2000.0), now)
 
 
 @pytest.mark.parametrize(

@@ -67,19 +67,10 @@ def slip_work(start: StartState) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
+@pytest.mark.parametrize("sweep", ["down", "ramp"])
 def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep: str) -> None:
-    others = [205.0, 211.1, 212.0, 212.499, 212.501, 214.0]
+    others = [211.1, 212.499, 212.501]
     assert_same_state(starts(sorted([*others, BESIDE]), sweep)[BESIDE], alone(sweep))
-    if sweep == "up":
-        assert_same_state(followed()[0][BESIDE], alone())
-
-
-@pytest.mark.slow
-def test_the_three_loading_histories_leave_different_states() -> None:
-    works = [slip_work(alone(sweep)) for sweep in ("up", "down", "ramp")]
-    assert all(work > 0.0 for work in works)
-    assert len({f"{work:.4e}" for work in works}) == 3
 
 
 @pytest.mark.slow
@@ -101,19 +92,6 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
     )
     assert 1e-3 * np.linalg.norm(fine.state.displacement_h[:, :, 1:]) < wrong < 2.0 * seen
     assert abs(slip_work(coarse) / slip_work(fine) - 1.0) < coarse.wear_rate_error
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("settings", "same"), [(AUTOMATIC, False), (SolverSettings(5, 64), True)])
-def test_the_reference_sweep_has_fewer_harmonics_where_automatic(settings: SolverSettings, same: bool) -> None:
-    line = FrequencySweep(dovetail(13), 0.5, 0.5, "up", settings)
-    line.advance(BESIDE)
-    assert line.nodes is not None
-    assert line.nodes.here is not None
-    fine, coarse = line.nodes.case.resolution, line.nodes.reference_path.case.resolution
-    assert (fine == coarse) == same
-    assert coarse.highest <= fine.highest
-    assert coarse.samples <= fine.samples
 
 
 @pytest.mark.slow
@@ -142,19 +120,6 @@ def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep: str) -> 
             assert 0.49 < ratio <= 0.7001 if sweep == "up" else 1.2999 <= ratio < 1.86
         assert 1.0 <= origin.penalty / frequency < 1.2
         assert all(abs(start / resonance - 1.0) > 0.01 for start in origin.starts[:1] for resonance in (212.9, 411.0))
-
-
-def test_all_points_of_a_cell_share_their_origin() -> None:
-    model = scene("two_masses")
-    origins = {find_origin(model, frequency, "up") for frequency in np.linspace(0.106, 0.124, 5)}
-    assert len(origins) == 1
-
-
-@pytest.mark.slow
-def test_a_ramp_finds_a_state_at_every_frequency() -> None:
-    found = starts([205.0, 212.0, 213.0], "ramp")
-    assert [start.outcome for start in found.values()] == [Outcome.CONVERGED] * 3
-    assert all(np.isnan(start.fold_frequency) for start in found.values())
 
 
 @pytest.mark.slow

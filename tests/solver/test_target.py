@@ -67,9 +67,3 @@ def test_a_wear_that_is_not_reached_changes_nothing() -> None:
         assert np.isnan(found.cycles_to_target)
         assert np.array_equal(found.wear_depth, whole.wear_depth)
         assert np.array_equal(found.worn_volume_error, whole.worn_volume_error)
-
-
-def test_adaptive_steps_beyond_the_end_do_not_count() -> None:
-    just_beyond = 1.0001 * float(whole_history().wear_depth[-1, 0])
-    found = march_until(WearTarget("wear_depth", just_beyond))
-    assert np.isnan(found.cycles_to_target)

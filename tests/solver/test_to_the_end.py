@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -55,40 +54,6 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> N
     assert np.diff(way) == pytest.approx(np.full(8, 0.25), rel=1e-6)
     assert found.cycles[0] == 0.0
     assert (np.diff(found.cycles) > 0.0).all()
-
-
-def test_straight_lines_between_the_outputs_are_the_history() -> None:
-    """Neither the burst of wear nor the long calm behind it falls between two outputs."""
-    few, many = worn(ToTheEnd(11)), worn(ToTheEnd(201))
-    whole = many.worn_volume[-1]
-    between = np.interp(many.cycles, few.cycles, few.worn_volume)
-    assert np.abs(between - many.worn_volume).max() < 0.02 * whole
-    assert np.diff(few.cycles).max() < 0.21 * few.cycles[-1]
-    assert np.diff(few.worn_volume).max() < 0.21 * whole
-
-
-@pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
-def test_the_rows_are_those_of_a_march_to_the_same_counts(scheme: Scheme) -> None:
-    # implicit steps to a given count do not grow: as long as the wear rate rises they are the same
-    found = worn(ToTheEnd(101), scheme)
-    counts = found.cycles if scheme == "adaptive" else found.cycles[found.cycles < 4000.0]
-    read = worn(counts if scheme == "adaptive" else np.append(counts, 4000.0), scheme)
-    n = read.cycles.size
-    assert n > 5
-    for name in ("wear_depth", "mean_pressure", "response", "wear_rate", "slip_range", "residual", "harmonics_used"):
-        there = getattr(found, name)[:n]
-        assert getattr(read, name)[:-1] == pytest.approx(there[:-1], rel=1e-2, abs=1e-6 * np.abs(there).max()), name
-    assert read.wear_depth[1:-1] == pytest.approx(found.wear_depth[1 : n - 1], rel=1e-3, abs=1e-12)
-    assert read.worn_volume_error[1:-1] == pytest.approx(found.worn_volume_error[1 : n - 1], rel=0.5, abs=1e-3)
-
-
-def test_a_smaller_share_goes_nearer_to_the_end() -> None:
-    shares = (1e-1, 1e-2, 1e-3)
-    found = [worn(ToTheEnd(2, share)) for share in shares]
-    limit = limit_depth(unworn()[0], found[0].slip_range[0] == 0.0)
-    left = [np.abs(each.wear_depth[-1] - limit).max() / limit.max() for each in found]
-    assert all(later < 0.5 * earlier for earlier, later in pairwise(left))
-    assert left[0] < 0.1
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
@@ -151,14 +116,6 @@ def test_what_cannot_be_marched_to_the_end_is_told() -> None:
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, scheme="explicit", step=10.0)
     with pytest.raises(ValueError, match="outputs = 1: give at least 2"):
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, outputs=1)
-
-
-def test_a_joint_at_rest_is_at_its_end() -> None:
-    model, start = unworn()
-    still = march_wear(model, 0.6, start, 0.0, 1000.0, "adaptive", ToTheEnd(3), COARSE)
-    assert still.outcome is Outcome.CONVERGED
-    assert not still.cycles.any()
-    assert not still.worn_volume.any()
 
 
 def test_without_a_start_state_there_is_nothing() -> None:

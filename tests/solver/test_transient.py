@@ -14,7 +14,6 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.loading_history.sweep_start import find_origin
 from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
@@ -24,7 +23,7 @@ from solver.settings import SolverSettings
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, build_case
 from tests.references import coulomb_orbit, slider_orbit
-from tests.solver.models import OMEGA, converged_state, first_point, random_model, scene
+from tests.solver.models import converged_state, first_point, scene
 from tests.solver.reconstruction import full_motion
 
 FORCE = 0.02
@@ -95,37 +94,6 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
     assert budget.iterations < 500
 
 
-def test_before_the_fold_the_mass_stays_where_it_is() -> None:
-    settings = SolverSettings(21, 256)
-    # with the penalty of the sweep that finds the start: what the motion is at the samples depends on it
-    penalty = 2.0 * np.pi * find_origin(scene("vibro_impact"), 1.4 / (2.0 * np.pi), "up").penalty
-    case = build_case(scene("vibro_impact"), 0.0, penalty, settings)
-    start, joint = upper_state(case, 1.4), case.joint(1.4, FORCE)
-    _, found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), Budget()
-    )
-    assert found is not None
-    size = np.abs(start.evaluation.displacement_h).max()
-    assert found.evaluation.displacement_h == pytest.approx(start.evaluation.displacement_h, abs=1e-6 * size)
-
-
-def test_a_periodic_motion_stays_the_same_in_a_step_of_any_length() -> None:
-    case = build_case(random_model(1, ("3d", "one_tangent")), 0.4, OMEGA, SolverSettings(3, 64, 1e-10))
-    idle = np.zeros(2)
-    point = first_point(case, OMEGA, 60.0, idle)
-    joint = case.joint(OMEGA, 60.0)
-    transient = Transient(case, joint)
-    motion = transient.periodic(point.evaluation)
-    for inverse in (1e-6 * OMEGA, 0.01 * OMEGA, OMEGA):
-        stepped = Balance.frozen(transient.step(motion, inverse), point.evaluation.history, idle)
-        at = stepped.evaluate(point.evaluation.predicted_h)
-        assert at.scaled_residual() < 1e-9
-        after = transient.after(at, motion, inverse)
-        size = np.abs(motion.displacement).max()
-        assert after.displacement == pytest.approx(motion.displacement, abs=1e-8 * size)
-        assert after.velocity == pytest.approx(motion.velocity, abs=1e-8 * np.abs(motion.velocity).max())
-
-
 @pytest.mark.slow
 def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
     # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
@@ -155,20 +123,6 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
         errors.append(abs(np.real(motion.displacement[:, 1] @ phases) - exact))
     assert errors[1] < 0.02 * abs(exact)
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
-
-
-@pytest.mark.slow
-def test_where_no_step_converges_nothing_is_returned_after_few_iterations() -> None:
-    case = build_case(scene("vibro_impact"), 0.0, 1.2, SolverSettings(5, 64))
-    start, joint = upper_state(case, 1.2), case.joint(1.2, FORCE)
-    unreachable = replace(case, settings=replace(case.settings, tolerance=0.0))
-    budget = Budget()
-    _, found = relax_to_periodic(
-        unreachable, joint, np.zeros(1), start.evaluation, joint, start.history, JacobianSolver(), budget
-    )
-    assert found is None
-    # steps are halved from one period to the shortest one
-    assert budget.iterations < 8 * CONTINUATION.near_iterations
 
 
 def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:

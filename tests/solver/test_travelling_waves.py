@@ -16,7 +16,6 @@ from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings
-from solver.stability.hill import is_stable
 from solver.structure.joint import Case, build_case
 from tests.solver.models import branch_states, dovetail, march_wear
 
@@ -55,13 +54,7 @@ def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("nodal_diameter", "amplitude"), [(3, 0.5), (7, 0.5), (20, 0.5), (20, 2.0)])
-def test_every_point_over_the_resonance_has_a_state(nodal_diameter: int, amplitude: float) -> None:
-    assert [start.outcome for start in starts(nodal_diameter, amplitude)] == [Outcome.CONVERGED] * len(OFFSETS)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+@pytest.mark.parametrize("nodal_diameter", [3, 20])
 def test_every_point_is_marched_to_its_end_or_keeps_what_it_had(nodal_diameter: int) -> None:
     for offset, history in zip(OFFSETS, histories(nodal_diameter, 0.5), strict=True):
         assert history.last_cycle >= 0.0
@@ -75,29 +68,14 @@ def test_every_point_is_marched_to_its_end_or_keeps_what_it_had(nodal_diameter: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+@pytest.mark.parametrize("nodal_diameter", [3, 20])
 def test_what_wears_does_so_at_the_resonance(nodal_diameter: int) -> None:
     volumes = [float(history.worn_volume[-1]) for history in histories(nodal_diameter, 0.5)]
     assert 1e-11 < volumes[1] < 1e-8
     assert volumes[2] < 1e-6 * volumes[1]
 
 
-@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
-def test_the_sign_of_the_determinant_is_that_of_the_whole_jacobian(nodal_diameter: int) -> None:
-    case, point = state(nodal_diameter)
-    joint = case.joint(point.parameter, 0.5)
-    assert (
-        np.abs(joint.structure.dynamic_stiffness[0].imag).max() > 1e-3 * np.abs(joint.structure.static_stiffness).max()
-    )
-    balance = Balance.frozen(joint, point.evaluation.history, np.zeros(16))
-    tangent = balance.linearise(point.evaluation)
-    whole = tangent.dense(np.arange(16))
-    sign, _ = np.linalg.slogdet(whole)
-    assert JacobianSolver().determinant_sign(tangent) == sign
-    assert is_stable(tangent, JacobianSolver()) == (sign > 0.0)
-
-
-@pytest.mark.parametrize("nodal_diameter", [3, 7, 20])
+@pytest.mark.parametrize("nodal_diameter", [3, 20])
 def test_the_structure_settles_to_the_state_that_the_balance_has(nodal_diameter: int) -> None:
     """Steps in time know nothing of the balance of a travelling wave but its matrices: from rest they lead to a state
     whose motion differs from that raised gradually by the friction history alone.

@@ -83,9 +83,3 @@ def test_a_joint_that_is_held_says_so_beside_all_else() -> None:
     _, both = judged(held_from=4.0, inaccurate_from=0.0, inaccurate_in="response", inaccurate_error=0.02)
     assert both.startswith("from cycle 0 on the response is known to 2 % only; from cycle 4 on every pair slips")
     assert judged([0], held_from=4.0) == (Outcome.CONVERGED, "")
-
-
-def test_the_count_of_a_final_state_is_no_count_that_never_comes() -> None:
-    cycles = np.array([0.0, np.nan, np.inf])
-    assert judged([0, 2], cycles=cycles) == (Outcome.CONVERGED, "")
-    assert judged([0, 2], cycles=cycles, cut_off_cycle=np.inf)[0] is Outcome.CONTACT_CUT_OFF

@@ -10,8 +10,7 @@ import pytest
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings, first_resolution
-from solver.structure.joint import build_case
-from tests.references import slider_amplitude, slider_orbit, slider_wear_depth
+from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,
@@ -80,17 +79,7 @@ def test_with_21_harmonics_the_depth_is_that_of_the_exact_motion(scheme: Scheme)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", GIVEN)
-def test_the_worn_slider_moves_as_its_friction_force_lets_it(scheme: Scheme) -> None:
-    history = march(4000.0, scheme, CYCLES[::2], FINE)
-    for depth, response in zip(history.wear_depth[:, 0], history.response[:, 0], strict=True):
-        friction_force = FRICTION * (10.0 - 1e5 * depth)
-        exact = slider_orbit(0.1, 0.0, 1.6e5, FORCE, friction_force, OMEGA).harmonic(0)
-        assert abs(response) == pytest.approx(abs(exact), rel=0.02, abs=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rtol", [1e-1, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4])
 def test_the_worn_volume_is_as_exact_as_asked_for(rtol: float) -> None:
     history = adaptive(rtol)
     assert history.outcome is Outcome.CONVERGED
@@ -115,30 +104,6 @@ def test_adaptive_steps_are_of_second_order() -> None:
     assert -0.5 < slope < -0.3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", GIVEN)
-@pytest.mark.parametrize("step", [8000.0, 2000.0])
-def test_the_error_estimate_holds_that_of_the_steps(scheme: Scheme, step: float) -> None:
-    exact = exact_depths(CYCLES)[-1]
-    error = abs(final_depth(step, scheme) - exact) / exact
-    # it holds the error of harmonics and samples as well
-    assert error < march(step, scheme).error_estimate < 10.0 * error
-
-
-def test_the_wear_rate_is_that_of_the_sliding_path() -> None:
-    # the slider moves to and fro between two turns: its path is twice the range of its slip
-    history = march(8000.0, "explicit", np.array([0.0, 8000.0]))
-    path = 2.0 * history.slip_range[0, 0]
-    # the range is that of the ends of the steps, the turn lies in between
-    assert history.wear_rate[0] == pytest.approx(WEAR * 10.0 * path, rel=(2 * np.pi / COARSE.samples) ** 2, abs=0.0)
-
-
-def test_the_normal_force_falls_with_the_depth() -> None:
-    history = march(4000.0, "implicit")
-    assert history.mean_pressure[:, 0] * AREA == pytest.approx(10.0 - 1e5 * history.wear_depth[:, 0], rel=1e-9, abs=0.0)
-    assert not history.open_fraction.any()
-
-
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_wear_never_falls(scheme: Scheme) -> None:
     history = march(8000.0, scheme, FINE_OUTPUT)
@@ -150,30 +115,11 @@ def test_wear_never_falls(scheme: Scheme) -> None:
     assert np.isnan(history.jump_cycle)
 
 
-def test_the_end_is_not_seen_by_adaptive_steps() -> None:
-    whole, part = adaptive(1e-2), adaptive(1e-2, cycles=FINE_OUTPUT[:31])
-    assert part.newton_iterations < whole.newton_iterations
-    assert np.array_equal(part.wear_depth, whole.wear_depth[:31])
-    assert np.array_equal(part.wear_rate, whole.wear_rate[:31])
-
-
 @pytest.mark.slow
 def test_the_largest_depth_rule_is_of_first_order() -> None:
     histories = [march(1.0, "explicit", np.array([0.0, END]), largest_depth=largest) for largest in (4e-6, 2e-6, 1e-6)]
     errors = [history.wear_depth[-1, 0] - exact_depths(CYCLES)[-1] for history in histories]
     assert np.polyfit(np.log([4.0, 2.0, 1.0]), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_without_a_wear_coefficient_nothing_changes(scheme: Scheme) -> None:
-    history = march(1000.0, scheme, wear=0.0)
-    assert history.outcome is Outcome.CONVERGED
-    for name in ("wear_depth", "wear_rate", "worn_volume", "worn_volume_error"):
-        assert not getattr(history, name).any(), name
-    for name in ("mean_pressure", "slip_range", "response", "response_peak", "open_fraction"):
-        values = getattr(history, name)
-        assert np.array_equal(values, np.repeat(values[:1], CYCLES.size, axis=0)), name
-    assert history.error_estimate == 0.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -221,18 +167,3 @@ def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
         one, other = getattr(slow, name), getattr(fast, name)
         assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
     assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9, abs=0.0)
-
-
-def test_a_history_starts_from_the_state_it_is_given() -> None:
-    model, start = slider_start(COARSE)
-    state = start.state
-    assert state is not None
-    history = march(1000.0, "implicit", np.array([0.0, 1.0]))
-    response_h = (
-        build_case(model, FRICTION, start.penalty_omega, COARSE)
-        .joint(OMEGA, FORCE)
-        .structure.response_h(state.displacement_h[0, :2])
-    )
-    assert history.response[0] == pytest.approx(response_h[:, 1] - 1j * response_h[:, 2], rel=1e-12, abs=0.0)
-    assert history.newton_iterations >= start.newton_iterations
-    assert history.run_time >= start.run_time

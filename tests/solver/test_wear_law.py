@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
 from solver import march_wear as march_model
-from solver.contact.archard import slip_work_rate, slip_work_slopes, volume_rate, wear_gain, wear_rate
+from solver.contact.archard import slip_work_rate, slip_work_slopes
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
 from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
@@ -29,38 +29,11 @@ TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
 
 
-def test_the_rate_is_the_wear_coefficient_times_work_over_the_area() -> None:
-    assert wear_rate(WEAR, AREA, WORK) == pytest.approx(WEAR * WORK / AREA, rel=1e-15)
-    assert volume_rate(WEAR, WORK.sum()) == pytest.approx(wear_rate(WEAR, AREA, WORK) @ AREA, rel=1e-15)
-
-
 def test_the_slopes_are_the_derivatives_of_the_slip_work() -> None:
     normal, speed, step = 12.0, 0.3, 1e-4
     by_normal = (slip_work_rate(normal + step, speed) - slip_work_rate(normal - step, speed)) / (2 * step)
     by_speed = (slip_work_rate(normal, speed + step) - slip_work_rate(normal, speed - step)) / (2 * step)
     assert slip_work_slopes(normal, speed) == pytest.approx((by_normal, by_speed), rel=1e-9)
-
-
-def test_slip_work_times_friction_is_what_friction_dissipates() -> None:
-    # the trapezoidal rule takes the normal force of both ends of an increment, the return map that of its end
-    balance, predicted = random_balance(random_model(1), SolverSettings(3, 2048), 1, wear=False)
-    at = balance.evaluate(predicted)
-    slip = np.diff(at.state_t, axis=2) / balance.joint.penalty.tangential[:, None, None]
-    dissipated = (at.force_t[:, 1:] * slip).sum(axis=(1, 2))
-    assert dissipated.max() > 0.0
-    energy = wearing_work(WearLaw("energy"), balance.joint.contact, balance.joint.friction_coefficient)
-    assert dissipated == pytest.approx(energy.work(at.slip_work, at.slip_work, at.wear_depth), rel=5e-3)
-
-
-def test_archards_law_takes_the_slip_work_as_it_is() -> None:
-    gain = wear_gain(WEAR, AREA, 250.0)
-    assert ARCHARDS_WORK.work(WORK, WORK, WORK) is WORK
-    assert np.array_equal(ARCHARDS_WORK.growth(gain, WORK, WORK, WORK), 250.0 * WEAR / AREA * WORK)
-    tangent = np.random.default_rng(0).normal(size=(3, 5))
-    assert np.array_equal(
-        ARCHARDS_WORK.growth_tangent(gain, (WORK, WORK, WORK), tangent, tangent), gain[:, None] * tangent
-    )
-    assert ARCHARDS_WORK.largest_factor == ARCHARDS_WORK.amplification(WORK, WORK, WORK) == 1.0
 
 
 def random_work(seed: int, n_contact: int, n_pressures: int = 4, n_depths: int = 5) -> WearingWork:
@@ -213,12 +186,6 @@ def test_histories_are_those_of_the_differential_equation(law: WearLaw) -> None:
         assert abs(fine) < 0.02 * exact
     # their leading errors are opposite
     assert errors[0][1] / errors[1][1] == pytest.approx(-1.0, rel=0.15)
-
-
-def test_below_the_threshold_nothing_wears() -> None:
-    history = march_by(WearLaw("threshold", 5.0 * THRESHOLD), "adaptive")
-    assert not history.wear_depth.any()
-    assert history.last_cycle == END
 
 
 def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor() -> None:

@@ -13,8 +13,6 @@ from solver.model import FloatArray, IntArray
 from studies.scenes.dovetail_mesh import DovetailMesh
 from studies.scenes.dovetail_parameters import Parameters
 
-# Edges of an element in the order of CalculiX's mid-side nodes 9 to 20.
-_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 # Corners of the faces S1 to S6.
 FACES = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 
@@ -27,7 +25,7 @@ _STICK_SLOPE = 1e14
 class CalculixMesh:
     """A sector for CalculiX, node and element numbers from 0 (a deck counts from 1).
 
-    nodes (n_nodes, 3). elements (n_elements, 8 or 20). clamped, left, right: node numbers; the clamped ones are not
+    nodes (n_nodes, 3). elements (n_elements, 8). clamped, left, right: node numbers; the clamped ones are not
     among left and right, which are in no particular order.
     """
 
@@ -37,36 +35,20 @@ class CalculixMesh:
     left: IntArray
     right: IntArray
 
-    @property
-    def element_type(self) -> str:
-        """Name of the element in a deck."""
-        return "C3D20R" if self.elements.shape[1] == 20 else "C3D8I"
 
-
-def build_calculix_mesh(mesh: DovetailMesh, quadratic: bool, glued: bool = True) -> CalculixMesh:
-    """The sector's mesh, flanks glued by shared nodes or left apart, with straight mid-side nodes where quadratic."""
+def build_calculix_mesh(mesh: DovetailMesh, glued: bool = True) -> CalculixMesh:
+    """The sector's mesh, flanks glued by shared nodes or left apart."""
     elements = mesh.mesh.elements.copy()
     if glued:
         follower = np.arange(len(mesh.mesh.nodes))
         follower[mesh.blade_flanks] = mesh.disk_flanks
         elements = follower[elements]
-    nodes = mesh.mesh.nodes
-    sets = {"clamped": mesh.bore_nodes, "left": mesh.left_nodes, "right": mesh.right_nodes}
-    if quadratic:
-        ends = np.sort(elements[:, _EDGES], axis=2)
-        edges, edge_of = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-        middles = len(nodes) + edge_of.reshape(len(elements), 12)
-        for name, members in sets.items():
-            both = np.isin(edges, members).all(axis=1)
-            sets[name] = np.concatenate([members, len(nodes) + np.flatnonzero(both)])
-        nodes = np.concatenate([nodes, nodes[edges].mean(axis=1)])
-        elements = np.hstack([elements, middles])
     return CalculixMesh(
-        nodes=nodes,
+        nodes=mesh.mesh.nodes,
         elements=elements,
-        clamped=sets["clamped"],
-        left=np.setdiff1d(sets["left"], sets["clamped"]),
-        right=np.setdiff1d(sets["right"], sets["clamped"]),
+        clamped=mesh.bore_nodes,
+        left=np.setdiff1d(mesh.left_nodes, mesh.bore_nodes),
+        right=np.setdiff1d(mesh.right_nodes, mesh.bore_nodes),
     )
 
 
@@ -80,7 +62,7 @@ def model_lines(mesh: CalculixMesh, parameters: Parameters) -> list[str]:
     """Nodes, elements, material, clamped bore and cyclic symmetry."""
     lines = ["*NODE, NSET=NALL"]
     lines += [f"{i + 1}, {x:.12e}, {y:.12e}, {z:.12e}" for i, (x, y, z) in enumerate(mesh.nodes)]
-    lines.append(f"*ELEMENT, TYPE={mesh.element_type}, ELSET=EALL")
+    lines.append("*ELEMENT, TYPE=C3D8I, ELSET=EALL")
     for number, corners in enumerate(mesh.elements):
         lines += [f"{number + 1},", _rows(corners)]
     for name, members in (("CLAMPED", mesh.clamped), ("LEFT", mesh.left), ("RIGHT", mesh.right)):
@@ -150,7 +132,7 @@ def contact_lines(mesh: DovetailMesh, calculix: CalculixMesh, parameters: Parame
     lines: list[str] = []
     for side in (0, 1):
         for body, flanks in (("B", mesh.blade_flanks), ("D", mesh.disk_flanks)):
-            inside = np.isin(calculix.elements[:, :8], flanks[side])
+            inside = np.isin(calculix.elements, flanks[side])
             lines.append(f"*SURFACE, NAME={body}{side}, TYPE=ELEMENT")
             for number, corners in enumerate(FACES):
                 found = np.flatnonzero(inside[:, corners].all(axis=1))

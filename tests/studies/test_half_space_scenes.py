@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from scipy.integrate import dblquad, quad
 
 from solver import march_wear
-from solver.contact.wear_law import WearLaw
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
@@ -27,7 +26,7 @@ from studies.scenes.closed_forms.hertz import (
     point_worn_depth,
 )
 from studies.scenes.half_space.influence import composite_modulus, patch_compliance, strip_compliance
-from tests.studies.half_space_twin import compliances, limit_depth, pressed
+from tests.studies.half_space_twin import limit_depth, pressed
 
 MU, E, NU = 0.6, 200e9, 0.3
 MODULUS = composite_modulus(E, NU)
@@ -134,7 +133,7 @@ def worn(name: str, cycles: float, harmonics: int, rtol: float, **values: float)
 
 @pytest.mark.slow
 def test_the_stick_zone_of_the_cylinder_is_that_of_cattaneo() -> None:
-    model, history = worn("cylinder_on_flat", 0.0, 9, 1e-2, strips=60)
+    model, history = worn("cylinder_on_flat", 0.0, 5, 1e-2, strips=40)
     assert history.outcome is Outcome.CONVERGED
     x, c = np.abs(model.contact.position[:, 0]), line_stick_width(A_LINE, 0.5)
     force, _ = pressed(model, LINE["P"] * 0.01)
@@ -168,16 +167,6 @@ def test_the_sphere_moves_as_mindlin_says() -> None:
     assert limit.max() == pytest.approx(exact.max(), rel=0.05)
 
 
-@pytest.mark.slow
-def test_partial_slip_wears_the_cylinder_to_the_limit_state_of_its_strips() -> None:
-    # the truth A, at a small size; tests/benchmarks/validation.py has 200 strips
-    model, history = worn("cylinder_on_flat", 1e7, 3, 1e-4, strips=40)
-    assert history.outcome is Outcome.CONVERGED
-    limit = limit_depth(model, history.slip_range[0] == 0.0)
-    assert np.abs(history.wear_depth[-1] - limit).max() < 1e-6 * limit.max()
-    assert history.wear_rate[-1] < 1e-9 * history.wear_rate[0]
-
-
 def test_the_limit_state_of_strips_is_that_of_the_half_plane() -> None:
     for share in (0.5, 0.75, 0.91):
         c, errors = line_stick_width(A_LINE, share), []
@@ -192,57 +181,6 @@ def test_the_limit_state_of_strips_is_that_of_the_half_plane() -> None:
         assert depth.max() == pytest.approx(exact.max(), rel=2e-3)
         assert abs(errors[-1]) < 2e-3
         assert max(np.abs(errors)) < 0.01
-
-
-def test_strips_that_end_with_the_stick_zone_are_of_first_order_and_wider_ones_are_better() -> None:
-    c = line_stick_width(A_LINE, 0.5)
-    fine = np.linspace(c, 2.5 * A_LINE, 40001)
-    area = 2.0 * float(np.trapezoid(line_worn_depth(fine, LINE["R"], A_LINE, c), fine))
-
-    def error(within: int, wider: float) -> float:
-        width, strips = c / (within - wider), 2 * int(np.ceil(1.45 * A_LINE / c * within))
-        model = build_scene("cylinder_on_flat", strips=strips, half_width=0.5 * strips * width)
-        depth = limit_depth(model, model.contact.position[:, 0] < c)
-        return float(depth @ model.contact.area) / 0.01 / area - 1.0
-
-    plain = [error(within, 0.0) for within in (8, 16, 32, 64)]
-    assert observed_order(plain) == pytest.approx(1.0, abs=0.05)
-    for within, without in zip((8, 16, 32, 64), plain, strict=True):
-        assert abs(error(within, 1.0 / 6.0)) < 0.04 * abs(without)
-
-
-@pytest.mark.slow
-def test_gross_slip_wears_what_mccoll_ding_and_leen_found() -> None:
-    # flat and cylinder after 18 000 cycles: 0.9382e-3 mm2 and 2.713 um of the flat, by finite elements that follow the
-    # stroke, which fixed pairs do not
-    flat, cylinder = 2.9e-14, 1.9e-14
-    model = build_scene("cylinder_on_flat", strips=32, P=18.5e3, stroke=25e-6, half_width=0.3e-3)
-    law = WearLaw(surfaces=(("flat", 1.0), ("cylinder", cylinder / flat)))
-    settings = SolverSettings(harmonics=9, samples=64, rtol=1e-2)
-    found = march_wear(model, 20.0, 1.0, 0.9, flat, [18_000.0], sweep="ramp", settings=settings, law=law)
-    assert found.outcome is Outcome.CONVERGED
-    share = flat / (flat + cylinder)
-    assert share * found.worn_volume[-1] / 0.01 == pytest.approx(0.9382e-9, rel=0.025)
-    assert share * found.wear_depth[-1].max() == pytest.approx(2.713e-6, rel=0.1)
-    # and more exactly what the force, the stroke and the bend of the bodies make of it, strip by strip
-    pressure = found.mean_pressure[-1] * model.contact.area
-    bent = float(pressure @ (compliances(model)[1] @ (0.9 * pressure)) / pressure.sum())
-    assert found.wear_rate[-1] == pytest.approx((flat + cylinder) * 4.0 * 185.0 * (25e-6 - bent), rel=0.01)
-
-
-def test_the_limit_state_of_patches_is_that_of_the_half_space() -> None:
-    for share, patches in ((0.5, 12), (0.5, 20), (0.8, 12), (0.8, 20)):
-        c = point_stick_radius(A_POINT, share)
-        r = np.linspace(c, 2.5 * A_POINT, 40001)
-        exact = point_worn_depth(r, POINT["R"], A_POINT, c)
-        model = build_scene("sphere_on_flat", patches=patches, Q=share * MU * POINT["P"])
-        sticks, _ = pressed(model, (1.0 - share) * POINT["P"])
-        depth = limit_depth(model, sticks > 0.0)
-        assert depth.max() == pytest.approx(exact.max(), rel=0.04 if patches == 12 else 0.03)
-        volume = float(np.trapezoid(2.0 * np.pi * r * exact, r))
-        assert depth @ model.contact.area == pytest.approx(volume, rel=0.03 if patches == 12 else 0.01)
-        # nothing wears at the edge of the patches
-        assert not depth[np.linalg.norm(model.contact.position, axis=1) > 0.95 * model.contact.position.max()].any()
 
 
 def test_the_closed_forms_have_their_published_values() -> None:
@@ -264,18 +202,6 @@ def test_the_closed_forms_have_their_published_values() -> None:
         assert r[depth > 0.0].max() == pytest.approx(edge, abs=6e-5)
         assert np.trapezoid(2.0 * np.pi * r * depth, r) * 0.5 == pytest.approx(volume, abs=6e-5)
     assert not line_worn_depth(np.array([0.0, 0.5]), 0.5, 1.0, 0.7).any()
-
-
-@pytest.mark.slow
-def test_a_stroke_that_slides_moves_every_pair_by_what_the_bodies_leave_of_it() -> None:
-    stroke = 5e-6
-    model, history = worn("cylinder_on_flat", 0.0, 15, 1e-2, strips=24, stroke=stroke)
-    force, _ = pressed(model, LINE["P"] * 0.01)
-    bent = compliances(model)[1] @ (MU * force)
-    touching = force > 0.0
-    assert history.slip_range[0][touching] == pytest.approx(2.0 * (stroke - bent[touching]), rel=1e-2)
-    # Archard's volume does not depend on where it slips
-    assert history.wear_rate[0] == pytest.approx(1e-13 * 4.0 * force @ (stroke - bent), rel=1e-2)
 
 
 def test_the_frequency_has_no_influence() -> None:

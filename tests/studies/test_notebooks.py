@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import base64
 import re
 import time
 
@@ -18,6 +17,7 @@ SMALL = [
     *("slow_time.cycles=8000", "slow_time.outputs=5", "solver.harmonics=3", "solver.samples=64"),
     "outputs.loops=[0, 3]",
 ]
+RUN = ("wear_maps", "explicit_and_implicit")  # `python -m tests.benchmarks.notebooks` runs all of them
 READ_A_RESULT = ("read_a_result", "frf_before_and_after", "wear_maps")  # the others run a study of their own
 FIGURES = {
     "read_a_result": 2,
@@ -83,7 +83,7 @@ def tells(source):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [path for path in NOTEBOOKS if path.stem in RUN], ids=lambda path: path.stem)
 def test_notebook_runs_without_a_warning_and_draws_its_figures(path, request, tmp_path):
     reads = path.stem in READ_A_RESULT
     variables = {"RESULT": str(request.getfixturevalue("small_result"))} if reads else {}
@@ -92,7 +92,7 @@ def test_notebook_runs_without_a_warning_and_draws_its_figures(path, request, tm
     assert time.monotonic() - begin < 120.0
     assert not written_as_warning(cells)
     assert count_figures(cells) == FIGURES[path.stem]
-    if not reads and path.stem != "error_against_run_time":
+    if not reads:
         # numbers as on the machine that they were stored on, but for rounding
         for now, stored in zip(said(cells), said(code_of(path)), strict=True):
             assert now == (
@@ -139,39 +139,6 @@ def test_notebook_holds_its_outputs_and_nothing_of_the_machine(path):
     assert settle(nbformat.read(path, as_version=4)) == notebook
     told = [output.get("text") or "".join(map(str, output.data.values())) for output in outputs(code)]
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|usr|Users)\b|\bat 0x", "\n".join(told))
-
-
-def test_what_differs_from_run_to_run_is_not_kept():
-    """Prints that arrive in pieces, random names in views of datasets, times, the version of Python."""
-
-    def notebook(pieces, name, version):
-        html = f"<div class='xr-wrap' id='{name}'></div>"
-        view = nbformat.v4.new_output("execute_result", {"text/plain": "<Dataset>", "text/html": html})
-        table = nbformat.v4.new_output("display_data", {"text/plain": "1", "text/html": "<table>1</table>"})
-        prints = [nbformat.v4.new_output("stream", name="stdout", text=text) for text in pieces]
-        other = nbformat.v4.new_output("stream", name="stderr", text="!")
-        cell = nbformat.v4.new_code_cell("", id="one", outputs=[*prints, other, view, table])
-        cell.metadata.execution = nbformat.from_dict({"started": name})
-        made = nbformat.v4.new_notebook(cells=[cell])
-        made.metadata.language_info = nbformat.from_dict({"name": "python", "version": version})
-        return made
-
-    settled = settle(notebook(["a\n", "b\n"], "x1", "3.11.7"))
-    assert settled == settle(notebook(["a\nb\n"], "x2", "3.13.0"))
-    first, second, view, table = settled.cells[0].outputs
-    assert (first.text, second.text) == ("a\nb\n", "!")
-    assert dict(view.data) == {"text/plain": "<Dataset>"}
-    assert "<table>" in table.data["text/html"]
-
-
-def test_pictures_are_small():
-    """Pictures of 800 pixels would not fit a page of a forge, and all of a notebook are to load at once."""
-    for path in NOTEBOOKS:
-        for output in outputs(code_of(path)):
-            if "image/png" in output.get("data", {}):
-                png = base64.b64decode(output.data["image/png"])
-                assert int.from_bytes(png[16:20], "big") <= 820, path.stem
-                assert len(png) < 30_000, path.stem
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -1,4 +1,4 @@
-"""The elimination front by front against its slow twin, one sparse factorisation with a column for each shape."""
+"""The elimination front by front in both of its ways, and modes of a singular mass against a dense solution."""
 
 from __future__ import annotations
 
@@ -8,57 +8,12 @@ from scipy import linalg
 
 from studies.finite_element.condensation import projection
 from studies.finite_element.condensation.modes import lowest_modes
-from studies.model_check import check_model
 from studies.scenes.dovetail_sector import Parameters, build, natural_frequencies
-from tests.studies.reduction_twin import build_linear
-
-MATRICES = ("mass", "damping", "stiffness")
-VECTORS = ("load_static", "load_harmonic", "response")
-
-
-def response_of(linear, frequency, n_relative):
-    """Response to the harmonic load with a joint of springs, which moves the relative displacements."""
-    omega = 2.0 * np.pi * frequency
-    dynamic = linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping
-    dynamic[np.arange(n_relative), np.arange(n_relative)] += 1e8
-    return linear.response @ np.linalg.solve(dynamic, linear.load_harmonic)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("mesh", "stress_stiffening", "n_sectors", "nodal_diameter"),
-    [(1, False, 47, 0), (1, True, 47, 3), (1, False, 46, 23), (2, True, 47, 0), (2, False, 47, 3)],
-)
-def test_reduced_model_is_that_of_the_slow_twin(mesh, stress_stiffening, n_sectors, nodal_diameter):
-    parameters = Parameters(
-        mesh=mesh,
-        n_sectors=n_sectors,
-        nodal_diameter=nodal_diameter,
-        stress_stiffening=stress_stiffening,
-        retention_stiffness=0.0,
-    )
-    model, twin = build(parameters, 1), build_linear(parameters, 1)
-    n_relative = 3 * model.contact.n_contact
-    assert set(model.linear) <= set(twin)
-    for k, linear in model.linear.items():
-        for name in (*MATRICES, *VECTORS):
-            own, reference = getattr(linear, name), getattr(twin[k], name)
-            assert own.dtype == reference.dtype, name
-            assert np.abs(own - reference).max() <= 1e-9 * np.abs(reference).max(), name
-        own, reference = (
-            linalg.eigh(item.stiffness[n_relative:, n_relative:], item.mass[n_relative:, n_relative:])[0]
-            for item in (linear, twin[k])
-        )
-        assert own == pytest.approx(reference, rel=1e-9)
-    excited = nodal_diameter
-    for frequency in (150.0, 191.0, 400.0):
-        own, reference = (response_of(item[excited], frequency, n_relative) for item in (model.linear, twin))
-        assert own == pytest.approx(reference, rel=1e-7)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("nodal_diameter", [0, 3])
-def test_combined_shapes_give_what_condensed_forms_give(nodal_diameter, monkeypatch):
+def test_combined_shapes_give_what_condensed_forms_give(monkeypatch):
+    nodal_diameter = 3
     parameters = Parameters(mesh=2, nodal_diameter=nodal_diameter)
     condensed = build(parameters, 1).linear[nodal_diameter]
     # As if every boundary were a large one.
@@ -67,13 +22,6 @@ def test_combined_shapes_give_what_condensed_forms_give(nodal_diameter, monkeypa
     for name in ("mass", "damping"):
         own, reference = getattr(combined, name), getattr(condensed, name)
         assert np.abs(own - reference).max() <= 1e-11 * np.abs(reference).max()
-
-
-@pytest.mark.slow
-def test_160_pairs():
-    model = build(Parameters(mesh=4), 0)
-    assert model.contact.n_contact == 2 * 16 * 5
-    check_model(model)
 
 
 @pytest.mark.slow

@@ -118,37 +118,15 @@ def test_what_needs_no_room_stays_as_it_is(name: str) -> None:
     assert scene_with_room("sdof_slider", slider, much) is slider
 
 
-def test_the_width_is_that_of_what_wears_at_most() -> None:
-    def cylinder(expected: ExpectedWear) -> float:
-        found = room("cylinder_on_flat", expected, stroke=1e-5)
-        assert found is not None
-        return found
-
-    # the segment 2 b^3 / (3 R) is 4 k N P s, beside the unworn contact; the middle of the last of 100 strips
-    area = 4.0 * 1e-9 * 1.2e5 * 1e-5
-    assert cylinder(ExpectedWear(1.0, 1e-9)) == round_up(1.1 * np.cbrt(A_LINE**3 + 9e-3 * area) * 100 / 99)
-    assert cylinder(ExpectedWear(2.0, 1e-9)) == cylinder(ExpectedWear(1.0, 2e-9)) > cylinder(ExpectedWear(1.0, 1e-9))
-    for ends in ({"volume": 1e-11}, {"depth": 2e-6}):
-        assert cylinder(ExpectedWear(1.0, math.inf, **ends)) == cylinder(ExpectedWear(1.0, 1.0, **ends))
-        assert cylinder(ExpectedWear(1.0, 1.0, **ends)) < cylinder(ExpectedWear(1.0, 1.0))
-    # strips stay above the depth that displacements refer to, and a wrong unit is no reason not to build
-    assert cylinder(ExpectedWear(1.0, 1e9)) == 2.7e-3
-    build_scene("cylinder_on_flat", stroke=1e-5, half_width=2.7e-3)
-    assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3
-
-
 def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears() -> None:
     stroke = 2.15e-6
     stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
     assert 0.0 < stick < 0.3 * A_LINE
     found = room("cylinder_on_flat", ExpectedWear(1.0, 1e-3), stroke=stroke)
     assert found == round_up(1.1 * line_worn_edge(A_LINE, stick) * 100 / 99)
-
-
-def test_widths_are_rounded_up_to_three_digits() -> None:
-    assert round_up(1.23401e-4) == 1.24e-4
-    assert round_up(1.24e-4) == 1.24e-4
-    assert round_up(9.999e-4) == 1e-3
+    # a wrong unit is no reason not to build
+    assert room("cylinder_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 2.7e-3
+    assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3
 
 
 @pytest.mark.slow

@@ -9,14 +9,13 @@ import pytest
 from scipy import linalg
 
 from solver.model import ReducedModel
-from studies.scene_answers import N_MODES, stuck_frequencies
+from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
 
-AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])  # Hz, 20-node elements, nodal diameter 0, glued
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
 CYCLES = np.array([0.0, 1e3, 3e4, 1e5])
 
@@ -52,7 +51,7 @@ def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frequency", [150.0, 160.0, 185.0, 230.0])
+@pytest.mark.parametrize("frequency", [160.0, 230.0])
 def test_the_slider_wears_by_its_differential_equation(frequency):
     found = answer(frequency)
     for row, wear in enumerate(WEAR):
@@ -79,13 +78,6 @@ def test_a_constant_force_wears_at_a_constant_rate():
     assert np.ptp(found.response_amplitude) == 0.0
 
 
-def test_all_that_the_spring_presses_is_worn_away_in_the_end():
-    found = answer(wear=np.array([1e-3]), cycles=np.array([0.0, 1e5, 1e9]))
-    assert found.worn_volume[0] == pytest.approx([0.0, 1e-8, 1e-8], rel=1e-12, abs=0.0)
-    free = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
-    assert found.response_amplitude[0, 1:, 0] == pytest.approx([free, free], rel=1e-9, abs=0.0)
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -102,13 +94,6 @@ def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
     assert found.response_amplitude.shape == (3, 4, 1)
     assert np.isnan(found.worn_volume).all()
     assert np.isnan(found.response_amplitude).all()
-
-
-def test_without_friction_the_response_is_that_of_the_spring():
-    found = answer(friction_coefficient=0.0)
-    amplitude = 10.0 / (1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
-    assert found.response_amplitude == pytest.approx(np.full((3, 4, 1), amplitude), rel=1e-12, abs=0.0)
-    assert found.worn_volume[0, 1] > 0.0
 
 
 def test_the_mesh_is_the_skin_of_blade_and_disk():
@@ -128,18 +113,6 @@ def test_the_mesh_is_the_skin_of_blade_and_disk():
         assert volume == pytest.approx(np.linalg.det(edges).sum(), rel=0.1)
 
 
-@pytest.mark.slow
-def test_frequencies_of_the_glued_sector_at_rest():
-    parameters = scene_parameters("dovetail_sector")(stress_stiffening=False, n_sectors=47)
-    coarse = scene_frequencies("dovetail_sector", dovetail(stress_stiffening=False))
-    assert coarse.nodal_diameters == tuple(range(24))
-    assert coarse.frequencies.shape == (24, N_MODES)
-    assert (np.diff(coarse.frequencies, axis=1) > 0.0).all()
-    assert np.abs(coarse.frequencies[0] / AT_REST - 1.0).max() < 0.12
-    default = stuck_frequencies(build_scene("dovetail_sector", parameters, 0))
-    assert np.abs(default.frequencies[0] / AT_REST - 1.0).max() < 0.03
-
-
 def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector():
     parameters = dovetail(nodal_diameter=4, n_sectors=12)
     model = build_scene("dovetail_sector", parameters, 3)
@@ -147,14 +120,6 @@ def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector(
     assert whole.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
     assert own.nodal_diameters == tuple(model.linear) == (0, 4)
     assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)
-
-
-def test_the_frequencies_of_a_small_model():
-    model = build_scene("two_masses", scene_parameters("two_masses")(stiffness_1=3.0, mass_1=2.0), 1)
-    found = stuck_frequencies(model)
-    assert found.nodal_diameters == (0,)
-    assert found.frequencies[0, 0] == pytest.approx(np.sqrt(4.0 / 2.0) / (2 * np.pi), rel=1e-12, abs=0.0)
-    assert np.isnan(found.frequencies[0, 1:]).all()
 
 
 def chain(mass: np.ndarray, stiffness: np.ndarray) -> ReducedModel:

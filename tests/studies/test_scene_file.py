@@ -14,8 +14,7 @@ from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
-from studies.scenes import build_scene, scene_parameters
-from tests.studies.scene_models import changed, drop, general_model, linear_model, plain, put, sector
+from tests.studies.scene_models import changed, drop, plain, put, sector
 
 
 def assert_same_bits(one: ReducedModel, other: ReducedModel) -> None:
@@ -56,21 +55,6 @@ def test_round_trip_is_bitwise(tmp_path: Path, build: Callable[[], ReducedModel]
     write_scene(model, tmp_path / "scene.h5")
     assert_same_bits(read_scene(tmp_path / "scene.h5", 5), model)
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
-
-
-@pytest.mark.parametrize("name", ["sdof_slider", "two_masses", "vibro_impact", "cylinder_on_flat", "sphere_on_flat"])
-def test_textbook_scenes_survive_the_round_trip(tmp_path: Path, name: str) -> None:
-    model = build_scene(name, scene_parameters(name)(), 3)
-    write_scene(model, tmp_path / "scene.h5")
-    assert_same_bits(read_scene(tmp_path / "scene.h5"), model)
-
-
-def test_a_sector_at_nodal_diameter_0_keeps_its_sectors(tmp_path: Path) -> None:
-    model = general_model({0: linear_model(7, hermitian=False, seed=1)}, n_sectors=47)
-    write_scene(model, tmp_path / "scene.h5")
-    with h5py.File(tmp_path / "scene.h5") as file:
-        assert "stiffness" in file
-    assert_same_bits(read_scene(tmp_path / "scene.h5", 21), model)
 
 
 def test_writing_twice_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -150,31 +134,12 @@ def test_complex_numbers_of_octave_are_read(tmp_path: Path) -> None:
     assert model.linear[0].load_harmonic.tobytes() == values.tobytes()
 
 
-def test_text_of_fixed_length_is_read(tmp_path: Path) -> None:
-    model = read_scene(changed(tmp_path, plain(), put("response/names", np.array([b"tip", b"middle"]))))
-    assert model.response_names == ("tip", "middle")
-
-
-def test_names_can_be_shared_by_the_nodal_diameters(tmp_path: Path) -> None:
-    def change(file: h5py.File) -> None:
-        drop("nd/0/response/names", "nd/2/response/names")(file)
-        file["response/names"] = ["a", "b"]
-
-    assert read_scene(changed(tmp_path, sector(), change)).response_names == ("a", "b")
-
-
 def test_the_users_own_attributes_are_left_alone(tmp_path: Path) -> None:
     def change(file: h5py.File) -> None:
         file.attrs["code"] = "CalculiX"
         file["mass"].attrs["unit"] = "kg"
 
     assert_same_bits(read_scene(changed(tmp_path, plain(), change)), plain())
-
-
-def test_a_backward_wave_is_a_nodal_diameter_above_half(tmp_path: Path) -> None:
-    model = replace(sector(), nodal_diameter=4)
-    write_scene(model, tmp_path / "scene.h5")
-    assert_same_bits(read_scene(tmp_path / "scene.h5", 7), model)
 
 
 def test_what_is_unusual_but_possible_passes() -> None:

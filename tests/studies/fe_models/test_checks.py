@@ -87,23 +87,6 @@ def test_held_model_does_not_tell_its_speed(tmp_path):
         check_nodes_have_dofs(matrices, deck.node_sets["BORE"], "BORE")
 
 
-@needs_ccx
-def test_no_perturbation(tmp_path):
-    deck, matrices = exported(tmp_path, changed("*STEP,PERTURBATION", "*STEP"))
-    with pytest.raises(SceneError) as wrong:
-        check_speed(deck, matrices, SI)
-    assert str(wrong.value) == (
-        "matrices: the deck spins at 500 rad/s, the stiffness holds 0; write *STEP,PERTURBATION."
-    )
-
-
-@needs_ccx
-def test_another_speed(tmp_path, sector):
-    deck = read_deck(write(tmp_path, changed("250000.0", "160000.0")))
-    with pytest.raises(SceneError, match=r"spins at 400 rad/s, the stiffness holds 500; give the files of one run"):
-        check_speed(deck, sector[1], SI)
-
-
 CONTACT = """\
 *SURFACE INTERACTION,NAME=ROOT
 *SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=TIED
@@ -133,16 +116,6 @@ def test_contact_still_in_the_stiffness(tmp_path):
     deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL", removed, text))
     assert deck.steps[-1].contact_removed == (("BLADES", "DISKS"),)
     check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
-
-
-@needs_ccx
-def test_inner_nodes_of_elements(tmp_path, sector):
-    """C3D8I has amplitudes inside, with numbers above those of the mesh: no part of a translation."""
-    deck, matrices = exported(tmp_path, changed("TYPE=C3D8,", "TYPE=C3D8I,"))
-    assert matrices.node.max() > deck.node_numbers.max()
-    assert mass_of(deck, matrices) == pytest.approx(mass_of(*sector), rel=1e-9)
-    assert matrices.mass.sum() / 3 > 2 * mass_of(*sector)
-    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
 
 
 def springs(deck: Deck, pairs: list[tuple[int, int, float]]) -> Matrices:

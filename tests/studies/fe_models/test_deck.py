@@ -9,7 +9,7 @@ import pytest
 
 from studies.fe_models.deck.mesh import Boundary, ContactPair, Material, SolidSection, Tie
 from studies.fe_models.deck.read import read_deck
-from tests.studies.fe_models.decks import CUBES, PART, SECTOR, write
+from tests.studies.fe_models.decks import CUBES, PART, write
 
 
 def line_of(text: str) -> int:
@@ -88,20 +88,6 @@ def test_what_is_not_read_is_said(cubes):
     )
 
 
-def test_sector_of_calculix():
-    deck = read_deck(SECTOR)
-    assert deck.ties == (Tie("GLUE", "BLADES", "DISKS", 1e-4, False), Tie("CYC", "LEFTS", "RIGHTS", 1e-4, True))
-    assert deck.cyclic is not None
-    assert (deck.cyclic.n_sectors, deck.cyclic.tie, deck.cyclic.axis.tolist()) == (12, "CYC", [[0, 0, 0], [0, 0, 1]])
-    # the cut faces are one sector apart, and their sets hold the nodes of their elements' faces
-    left, right = (deck.coordinates[deck.rows_of_nodes(deck.node_sets[name])] for name in ("LEFT", "RIGHT"))
-    for points, angle in ((left, -np.pi / 12), (right, np.pi / 12)):
-        np.testing.assert_allclose(np.arctan2(points[:, 1], points[:, 0]), angle, atol=1e-9)
-    assert [load.omega_squared for load in deck.steps[0].centrifugal] == [250000.0] * 2
-    assert deck.steps[1].parameters == {"SOLVER": "MATRIXSTORAGE", "CYCMPC": "INACTIVE"}
-    assert (deck.skipped, deck.notes) == ((), ())
-
-
 def test_part_and_instance(tmp_path):
     deck = read_deck(write(tmp_path, PART))
     # shifted by 10 along x, then turned by 90 degrees about the line x = 10, y = 0
@@ -119,14 +105,6 @@ def test_part_and_instance(tmp_path):
         ("2", [2], 1),
         ("BLOCK-1.SET-1", [1, 2, 3, 4, 5], 3),
     ]
-
-
-def test_element_over_several_lines(tmp_path):
-    nodes = "\n".join(f"{n},{n * 0.1:.3f},0,0" for n in range(1, 41))
-    records = f"1,{','.join(map(str, range(1, 16)))},\n{','.join(map(str, range(16, 21)))}"
-    more = f"2,{','.join(map(str, range(40, 30, -1)))},\n{','.join(map(str, range(30, 20, -1)))}"
-    deck = read_deck(write(tmp_path, f"*NODE\n{nodes}\n*ELEMENT,TYPE=C3D20,ELSET=E\n{records}\n{more}\n"))
-    assert deck.blocks[0].nodes.tolist() == [list(range(1, 21)), list(range(40, 20, -1))]
 
 
 def test_included_files(tmp_path):

@@ -12,8 +12,6 @@ from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.assembly import (
     assemble_mass,
     assemble_stiffness,
-    assemble_tangent_stiffness,
-    centrifugal_load,
     spin_softening,
 )
 from studies.finite_element.elements.solid_mesh import Rotation
@@ -29,12 +27,12 @@ from studies.finite_element.joint_model import (
     Retainer,
     SetMotion,
 )
-from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scenes import dovetail_sector
 from studies.scenes.dovetail_sector import Parameters
-from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z, faces_where, wedge_shape
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
 
@@ -142,37 +140,6 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
     assert np.array_equal(present, np.arange(len(present)))
     assert (contact.dofs[:, 0] >= 0).all()
     check_model(scene.model)
-
-
-def test_prestress_is_that_of_the_glued_sector():
-    sector = Sector("C3D10", "C3D10", (1, 2, 2), (1, 2, 1))
-    joint = sector.joint()
-    prepared = prepare_model(sector.model(), joint)
-    stiffness, mass = assemble_stiffness(sector.mesh), assemble_mass(sector.mesh)
-    rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
-    load = centrifugal_load(mass, sector.mesh.coordinates, rotation)
-    forms = {"stiffness": stiffness, "mass": mass}
-    n_nodes = sector.mesh.n_nodes
-    pairs = prepared.pairs
-    rows = [
-        [(moving, np.eye(3)), *((node, -weights[node] * np.eye(3)) for node in np.flatnonzero(weights))]
-        for moving, weights in zip(pairs.moving, pairs.opposite.toarray(), strict=True)
-    ]
-    images = zip(joint.cut.left, joint.cut.right, strict=True)
-    cut = [[(right, np.eye(3)), (left, -joint.cut.rotation)] for left, right in images]
-    held = np.eye(3 * n_nodes)[joint.held.ravel()]
-    free = linalg.null_space(np.concatenate([node_blocks(n_nodes, rows + cut).real, held]))
-    glued = free @ np.linalg.solve(free.T @ (stiffness @ free), free.T @ load)
-    expected = assemble_tangent_stiffness(sector.mesh, glued) + spin_softening(mass, rotation)
-    own = prepared.reduction.forms["stiffness"]
-    assert np.abs(own - expected).max() < 1e-10 * np.abs(expected).max()
-    assert prepared.at_rest is not None
-    told = natural_frequencies(prepared)
-    assert told.nodal_diameters == tuple(range(N_SECTORS // 2 + 1))
-    own_first = prepared.reduction.reduce(2, 3, load[:, None]).frequencies / (2.0 * np.pi)
-    assert np.allclose(told.frequencies[2, :3], own_first, rtol=1e-9)
-    assert np.allclose(prepared.at_rest.solve_static(load), glued, rtol=0.0, atol=1e-9 * np.abs(glued).max())
-    assert forms.keys() <= prepared.reduction.forms.keys()
 
 
 def as_foreign_model(parameters):
@@ -355,15 +322,6 @@ def test_more_modes_than_a_singular_mass_has(kind, small, monkeypatch):
     # modes found among few are those found among many
     fewer = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=2, n_modes=3), 1)
     assert np.allclose(fewer.summary.glued_frequencies[2], frequencies[:3], rtol=1e-10)
-
-
-@pytest.mark.parametrize("small", [0, 900])
-def test_modes_by_dense_matrices_and_by_iteration(small, monkeypatch):
-    monkeypatch.setattr(reduction, "_SMALL", small)
-    sector = Sector("C3D20R", "C3D8", (1, 3, 2), (1, 2, 2))
-    prepared = prepare_model(sector.model(), sector.joint())
-    _, _, _, expected = dense_twin(sector, sector.joint(), prepared.pairs, prepared.reduction.forms, 2, 6)
-    assert np.allclose(prepared.reduction.frequencies(2, 6), expected, rtol=1e-8)
 
 
 def test_retainer_acts_on_the_mean_relative_displacement():

@@ -32,45 +32,28 @@ def refused(path: Path, sentence: str) -> None:
     assert len(said) < 300
 
 
-def test_least_deck(tmp_path):
-    assert read_deck(write(tmp_path, LEAST)).blocks[0].nodes.tolist() == [[1, 2, 3, 4]]
-
-
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "model: deck.inp: the file is empty"),
         ("** nothing\n", "deck.inp, line 1: no keyword"),
-        ("1, 2, 3\n", r"deck.inp, line 1: '1, 2, 3' before the first keyword"),
-        ("\x7fELF\x02\x01\x00\x00" * 100, "deck.inp, line 1: no text"),
         ("*NODE\n" + "1," * 10_000, "deck.inp, line 2: no text, or a very long line"),
-        ("*" + "a" * 9000 + "\n", "deck.inp has no nodes"),
-        ("*HEADING\n", "deck.inp has no nodes"),
         ("*,NODE\n", "deck.inp, line 1: a star without a keyword"),
         ('*NODE,"=\n', "deck.inp, line 1: .* is no parameter"),
         ("*NODE\n1,0,0,nan\n", "deck.inp, line 2: 'nan' in place of a number"),
         ("*NODE\n1,0,0,0\n2,0,1e999,0\n", "deck.inp, line 3: '1e999' in place of a number"),
-        ("*NODE\n1,0,0,0\n0,0,0,0\n", "deck.inp, line 3: '0' in place of a node number"),
-        ("*NODE\n99999999999,0,0,0\n", "deck.inp, line 2: '99999999999' in place of a node number"),
-        ("*NODE\n1,0,0,0\n1_0,0,0,0\n", "deck.inp, line 3: '1_0' in place of a node number"),
         ("*NODE\n1,0,0,0\n1,0,0,1\n", "deck.inp, line 1: node 1 is defined again at another position"),
         (LEAST + "2,1,2,3\n", r"deck.inp, line 8: 4 numbers for a C3D4 of 4 nodes with its number; give 5"),
-        (LEAST + "2,1,2,3,\n4,1,2\n", r"deck.inp, line 9: 7 numbers for a C3D4"),
         (LEAST + "2,1,2,3,4,\n", None),
-        (LEAST + "2,1,2,3,x\n", "deck.inp, line 8: 'x' in place of a whole number"),
         (LEAST + "2,1,2,3,9\n", r"deck.inp, line 6: element 2 has the node 9, which does not exist"),
-        (LEAST + "2,1,2,3,-4\n", "deck.inp, line 8: '-4' in place of"),
         (LEAST + "1,4,3,2,1\n", "deck.inp, line 6: element 1 is defined again"),
         (LEAST + "*ELEMENT,TYPE=S4R\n5,1,2,3,4\n", r"deck.inp, line 8: elements of type S4R; mesh the model with C3D4"),
         (LEAST + "*ELEMENT\n5,1,2,3,4\n", r"deck.inp, line 8: \*ELEMENT without TYPE"),
         (LEAST + "*NSET,NSET=A,GENERATE\n1,1000000000,1\n", None),
         (LEAST + "*NSET,NSET=A,GENERATE\n" + "1,2000000000\n" * 10_000, None),
-        (LEAST + "*NSET,NSET=A,GENERATE\n1,2,0\n", "deck.inp, line 9: '0' in place of a whole number"),
         (LEAST + "*NSET,NSET=A,GENERATE\n1\n", "deck.inp, line 9: 1 numbers below GENERATE"),
         (LEAST + "*NSET,NSET=A\nA\n", "deck.inp, line 9: the set A contains itself"),
         (LEAST + "*NSET,NSET=A\nB\n*NSET,NSET=B\n1,C\n*NSET,NSET=C\nA\n", "the set A contains itself"),
-        (LEAST + "*NSET,NSET=A\n5,6,7\n", None),
-        (LEAST + "*NSET,NSET=A\nE\n", "deck.inp, line 9: there is no set of nodes E"),
         (
             LEAST + "".join(f"*NSET,NSET=A{n}\nA{n + 1}\n" for n in range(5000)) + "*NSET,NSET=A5000\n1\n",
             "more than 100 sets within each other",
@@ -80,37 +63,24 @@ def test_least_deck(tmp_path):
             None,
         ),
         (LEAST + "*SURFACE,NAME=S\n1,S5\n", r"deck.inp, line 9: elements of 1 have no face S5"),
-        (LEAST + "*SURFACE,NAME=S\n1,SPOS\n", r"deck.inp, line 9: 'SPOS' in place of a face"),
-        (LEAST + "*SURFACE,NAME=S\nE\n", r"deck.inp, line 9: no face of E; give S1 to S6"),
         (LEAST + "*SURFACE,NAME=S\nF,S1\n", "deck.inp, line 9: there is no set of elements F"),
-        (LEAST + "*TIE,NAME=T\nA,B\n", "deck.inp, line 9: there is no surface A"),
-        (LEAST + "*TIE,NAME=T\nA\n", r"deck.inp, line 9: one surface below \*TIE"),
         (LEAST + "*CONTACT PAIR,INTERACTION=I\n", r"deck.inp, line 8: \*CONTACT PAIR without surfaces"),
+        (LEAST + "*TIE,NAME=T\nA\n", r"deck.inp, line 9: one surface below \*TIE"),
+        (LEAST + "*MATERIAL,NAME=M\n*DENSITY\n0\n", "deck.inp, line 10: a density of 0"),
+        (f"*INCLUDE,INPUT={'a' * 5000}\n", "deck.inp, line 1: .* no "),
         (LEAST + "*SURFACE INTERACTION,NAME=I\n*FRICTION\n-0.5\n", "deck.inp, line 10: a friction coefficient of -0.5"),
         (LEAST + "*CYCLIC SYMMETRY MODEL,N=1e9\n0,0,0,0,0,1\n", "deck.inp, line 8: N=1e9; give a number of sectors"),
-        (LEAST + "*CYCLIC SYMMETRY MODEL,N=9\n0,0,0,0,0\n", "deck.inp, line 9: 5 numbers below"),
         (LEAST + "*CYCLIC SYMMETRY MODEL,N=9\n0,0,1,0,0,1\n", "deck.inp, line 9: two equal points on the axis"),
         (LEAST + "*CYCLIC SYMMETRY MODEL,N=9,TIE=C\n0,0,0,0,0,1\n", "deck.inp, line 8: there is no tie C of cut faces"),
         (LEAST + "*MATERIAL,NAME=M\n*ELASTIC\n-1,0.3\n", "deck.inp, line 10: Young's modulus -1"),
-        (LEAST + "*MATERIAL,NAME=M\n*DENSITY\n0\n", "deck.inp, line 10: a density of 0"),
-        (LEAST + "*ELASTIC\n1,0.3\n", r"deck.inp, line 8: \*ELASTIC without a material"),
         (LEAST + "*SOLID SECTION,ELSET=E,MATERIAL=M\n", "deck.inp, line 8: there is no material M"),
-        (LEAST + "*BOUNDARY\nNALL\n", "deck.inp, line 9: a boundary condition without a dof"),
-        (LEAST + "*BOUNDARY\nZ,1,3\n", "deck.inp, line 9: there is no set of nodes Z"),
-        (LEAST + "*STEP\n*STEP\n", r"deck.inp, line 9: a \*STEP within the one before"),
-        (LEAST + "*STEP\n*DLOAD\nE,CENTRIF,1.,0,0\n", "deck.inp, line 10: 3 numbers behind CENTRIF"),
         (LEAST + "*STEP\n*DLOAD\nE,CENTRIF,1.,0,0,0,0,0,0\n", "deck.inp, line 10: CENTRIF without a direction"),
-        (LEAST + "*STEP\n*DLOAD\nE,CENTRIF,-1.,0,0,0,0,0,1\n", "deck.inp, line 10: CENTRIF without a direction"),
         ("*PART,NAME=A\n*END PART\n*PART,NAME=B\n", r"deck.inp, line 3: a second \*PART; write a flat deck"),
         (PART.replace("*End Assembly", "*Instance,name=B\n*End Instance"), r"a second \*INSTANCE; write a flat deck"),
-        ("*INCLUDE\n", r"deck.inp, line 1: \*INCLUDE without a file"),
         ("*INCLUDE,INPUT=deck.inp\n", "deck.inp, line 1: deck.inp includes itself"),
         ("*INCLUDE,INPUT=none.inp\n", "deck.inp, line 1: there is no file none.inp; copy it beside the deck"),
         ("*INCLUDE,INPUT=../../etc/passwd\n", "deck.inp, line 1: ../../etc/passwd is outside the deck's folder"),
-        ("*INCLUDE,INPUT=/etc/passwd\n", "deck.inp, line 1: /etc/passwd is outside the deck's folder"),
-        ("*INCLUDE,INPUT=.\n", "deck.inp, line 1: there is no file ."),
         ("*NODE,INPUT=/dev/zero\n", "deck.inp, line 1: /dev/zero is outside the deck's folder"),
-        (f"*INCLUDE,INPUT={'a' * 5000}\n", "deck.inp, line 1: .* no "),
         ("*NODE,SYSTEM=C\n1,0,0,0\n", "deck.inp, line 1: nodes in cylindrical"),
     ],
 )
@@ -122,12 +92,6 @@ def test_hostile_deck(tmp_path, text: str, sentence: str | None):
         assert time.process_time() - began < 2
     else:
         refused(path, sentence)
-
-
-def test_circle_of_files(tmp_path):
-    write(tmp_path, "*INCLUDE,INPUT=b.inp\n", "a.inp")
-    write(tmp_path, "*HEADING\n*INCLUDE,INPUT=deck.inp\n", "b.inp")
-    refused(write(tmp_path, "*INCLUDE,INPUT=a.inp\n"), "b.inp, line 2: deck.inp includes itself")
 
 
 def test_files_that_multiply(tmp_path):
@@ -174,19 +138,18 @@ def test_sets_that_grow(tmp_path, monkeypatch):
     refused(write(tmp_path, LEAST + "*SURFACE,NAME=S\n" + "E,S1\n" * 30), "more than 20 faces")
 
 
-@pytest.mark.parametrize("seed", range(0, 300, 100))
-def test_damaged_decks(tmp_path, seed: int):
+def test_damaged_decks(tmp_path):
     """A deck that is damaged anywhere is read, or refused in a sentence: nothing else is ever raised."""
     said: list[str] = []
-    for offset in range(100):
-        good = (CUBES, PART, SECTOR.read_text())[offset % 3].encode()
+    for seed in range(300):
+        good = (CUBES, PART, SECTOR.read_text())[seed % 3].encode()
         path = tmp_path / "deck.inp"
-        path.write_bytes(mutate(good, seed + offset))
+        path.write_bytes(mutate(good, seed))
         began = time.process_time()
         try:
             read_deck(path)
         except SceneError as error:
             said.append(str(error))
         assert time.process_time() - began < 2
-    assert len(said) > 20
+    assert len(said) > 60
     assert all(sentence.isprintable() for sentence in said)

@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 from studies.finite_element.elements.kinds import ELEMENT_KINDS
 from studies.finite_element.joint.closest_point import closest_points
 from studies.finite_element.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
-from studies.finite_element.joint.pairing import ContactSurfaces, build_contact_pairs, local_frames
-from studies.finite_element.joint.surfaces import describe_mesh, outer_faces, surface_of_faces, surface_of_nodes
+from studies.finite_element.joint.pairing import ContactSurfaces, build_contact_pairs
+from studies.finite_element.joint.surfaces import describe_mesh, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -40,14 +40,6 @@ def test_areas_and_normals_of_a_cylinder(kind):
     again = surface_of_nodes(mesh, "INSIDE", nodes)
     assert np.array_equal(again.nodes, nodes)
     assert np.allclose(again.areas_and_normals(mesh.coordinates)[0], area, rtol=1e-12)
-
-
-def test_outer_faces_of_a_block():
-    mesh, reference = block("C3D15", (2, 3, 2))
-    loops = outer_faces(mesh).loops
-    assert len(loops) == 2 * (2 * 3 * 2 + 3 * 2 + 2 * 2)
-    on_rim = ((reference == 0.0) | (reference == 1.0)).any(axis=1)
-    assert np.array_equal(np.unique(np.concatenate(loops)), np.flatnonzero(on_rim))
 
 
 def test_pictured_faces_close_the_body():
@@ -133,18 +125,6 @@ def test_a_coarse_surface_inside_a_finer_one_moves():
     pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up)], Z)
     assert pairs.moving_name == ("UP",)
     assert pairs.area.sum() == pytest.approx(0.25)
-
-
-def test_frames_are_right_handed_and_follow_a_direction():
-    rng = np.random.default_rng(2)
-    normals = rng.standard_normal((40, 3)) * [1.0, 1.0, 0.4]
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    frames = local_frames(normals, Z)
-    assert np.allclose(frames @ np.swapaxes(frames, 1, 2), np.eye(3), atol=1e-12)
-    assert np.allclose(np.linalg.det(frames), 1.0)
-    assert (frames[:, 1] @ Z > 0.0).all() == (np.abs(normals @ Z).max() < 0.9)
-    flat = local_frames(np.tile(Z, (3, 1)), Z)
-    assert np.allclose(np.abs(flat[:, 1] @ Z), 0.0)
 
 
 def test_wrong_surfaces_are_named():

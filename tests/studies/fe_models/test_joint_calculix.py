@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh
 
 from studies.fe_models.nodal_matrices import order_by_nodes
-from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
@@ -18,7 +15,6 @@ from tests.studies.calculix_deck import read_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import (
     EXPORT,
-    block,
     centrifugal,
     deck_lines,
     node_set,
@@ -77,19 +73,15 @@ def calculix_frequencies(folder, sector, nodal_diameters, prestress):
 @pytest.mark.parametrize(
     ("disk_kind", "blade_kind", "tolerance"),
     [
-        ("C3D8", "C3D8", 1e-5),
-        ("C3D20", "C3D20", 1e-5),
         ("C3D10", "C3D10", 1e-5),
         ("C3D20R", "C3D15", 1e-5),
-        # the incompatible modes are not those of CalculiX: elements as coarse as these differ by so much
-        ("C3D8I", "C3D8I", 2e-2),
     ],
 )
 def test_matching_sector_at_nodal_diameters(disk_kind, blade_kind, tolerance, tmp_path):
     sector = matching(disk_kind, blade_kind)
     prepared = prepare_model(sector.model(), sector.joint())
-    expected = calculix_frequencies(tmp_path, sector, range(4), prestress=True)
-    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in range(4)])
+    expected = calculix_frequencies(tmp_path, sector, (0, 3), prestress=True)
+    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in (0, 3)])
     assert np.abs(own / expected - 1.0).max() < tolerance
 
 
@@ -101,16 +93,14 @@ def matching(disk_kind, blade_kind):
         x, y, z = points.T
         return np.stack([0.2 + 0.1 * x, (0.2 * half) * (y - 0.5), 0.01 + 0.02 * z], axis=1)
 
-    return Sector(disk_kind, blade_kind, (2, 4, 4), (3, 2, 2), blade_shape=blade)
+    return Sector(disk_kind, blade_kind, (1, 4, 2), (2, 2, 1), blade_shape=blade)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("disk_kind", "blade_kind", "disk", "blade"),
     [
-        ("C3D8", "C3D8", (3, 6, 3), (4, 5, 4)),
         ("C3D20R", "C3D20R", (2, 6, 4), (3, 4, 5)),
-        ("C3D10", "C3D10", (3, 6, 4), (3, 5, 4)),
     ],
 )
 def test_meshes_that_do_not_match(disk_kind, blade_kind, disk, blade, tmp_path):
@@ -146,19 +136,3 @@ def test_matrices_of_calculix(kind, tmp_path):
         for name in ("stiffness", "mass", "load_static", "response"):
             ours, theirs = (getattr(each.model.linear[k], name) for each in (other, scene))
             assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
-
-
-@pytest.mark.parametrize("kind", ["C3D4", "C3D6", "C3D8", "C3D10", "C3D15", "C3D20", "C3D20R"])
-def test_free_block(kind, tmp_path):
-    mesh, _ = block(kind, (3, 2, 2), lambda points: points * [0.2, 0.08, 0.05] + 0.01 * points[:, [1, 2, 0]] ** 2)
-    run_ccx(tmp_path, [*deck_lines(mesh), "*STEP", "*FREQUENCY", "14", "*END STEP"])
-    table = (tmp_path / "job.dat").read_text()
-    number = r"(-?\d\.\d+E[+-]\d+)"
-    rows = re.findall(rf"^ +\d+ +{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
-    expected = np.array([float(row[2]) for row in rows])[6:14]
-    # the mass may be singular: M x = x K / w^2 in the subspace without rigid body motions
-    stiffness, mass = assemble_stiffness(mesh).toarray(), assemble_mass(mesh).toarray()
-    shifted = stiffness + 1e6 * mass
-    squares = 1.0 / eigh(mass, shifted, eigvals_only=True)[::-1][:14] - 1e6
-    own = np.sqrt(np.abs(squares[6:14])) / (2.0 * np.pi)
-    assert np.abs(own / expected - 1.0).max() < 1e-6

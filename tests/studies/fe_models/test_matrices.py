@@ -16,7 +16,6 @@ from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import (
     chain,
-    entries,
     needs_ccx,
     run_ccx,
     write_abaqus,
@@ -77,19 +76,15 @@ def edit(path: Path, old: str, new: str, count: int = 1) -> None:
     ("end", "old", "new", "sentence"),
     [
         ("sti", r"^2 2 .*", "2 2 nan", r"job.sti: line 3 is '2 2 nan'"),
-        ("sti", r"^2 2 .*", "2 2 1e999", "job.sti: line 3 is"),
         ("sti", r"^2 2 .*", "2 2", "job.sti: line 3 is '2 2'"),
         ("sti", r"^2 2 .*", "2 2 1.0 5", "job.sti: line 3 is '2 2 1.0 5'"),
-        ("sti", r"^2 2 ", "2.5 2 ", "job.sti: line 3 is"),
         ("sti", r"^2 2 ", "0 2 ", "job.sti: a row or column below 1"),
         ("sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1", "job.sti: 1 entries are given twice"),
         ("sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0", "job.sti: the matrix is not symmetric"),
         ("sti", r"^9 9 ", "1000000000 9 ", "job.sti: 1000000000 rows for 9 dofs in job.dof"),
-        ("mas", r"^9 9 .*", "", "job.mas: 8 rows for 9 dofs in job.dof"),
         ("dof", r"10.3\n", "", "job.sti: 9 rows for 8 dofs in job.dof"),
         ("dof", r"10.3", "10.4", r"job.dof: line 9 is 10.4"),
         ("dof", r"10.3", "10.2", r"job.sti: dof 2 of node 10 has two rows"),
-        ("dof", r"10.3", "10", r"job.dof: line 9 is '10'"),
     ],
 )
 def test_wrong_files_of_calculix(tmp_path, end: str, old: str, new: str, sentence: str):
@@ -113,7 +108,6 @@ def test_twice_the_size(tmp_path):
         (r"^1,1, 1,1, .*", "1,1, 1,1, 1e36", "1 entries of the diagonal are 1e36: boundary conditions were active"),
         (r"^1,1, 1,1,", "1,4, 1,4,", "node 1 has the dof 4"),
         (r"^1,1, 1,1,", "0,1, 0,1,", "a node with the number 0"),
-        (r"^1,1, 1,1,", "1,1, 1,", "job_STIF1.mtx: line 2 is"),
         (r"^1,1, 1,1,", "9999999999999,1, 1,1,", "job_STIF1.mtx: node 9999999999999"),
     ],
 )
@@ -131,9 +125,7 @@ def test_wrong_files_of_abaqus(tmp_path, old: str, new: str, sentence: str):
         ("KAAX           0       6       2", "KAAX           0       2       2", "KAAX is of form 2"),
         ("KAAX           0", "LAAX           0", "line 4 is a column of KAAX, whose header is missing"),
         (r"\*(\s+)1(\s+)1 ", r"*\g<1>1\g<2>4 ", "node 1 has the dof 4"),
-        (r"\*(\s+)1(\s+)1 ", r"*\g<1>1\g<2>0 ", "node 1 has the dof 0"),
         ("D[+]10", "D+10         1.0D+10", "has an imaginary part"),
-        ("D[+]10", "X+10", "in place of a number"),
         ("MAAX", "BAAX", "no matrix MAAX but KAAX, PAX, BAAX"),
     ],
 )
@@ -183,12 +175,3 @@ def test_large_fields_are_read_in_arrays(tmp_path, monkeypatch):
         job.with_suffix(".pch").write_text(text[:last] + new + text[last + len(old) :])
         with pytest.raises(SceneError, match=r"job.pch: (line \d+ |\d entries are given twice)"):
             read_matrices(job)
-
-
-def test_many_entries_are_read_in_parts(tmp_path, monkeypatch):
-    job = write_calculix(tmp_path)
-    monkeypatch.setattr("studies.fe_models.matrices.columns._ROWS_AT_ONCE", 7)
-    monkeypatch.setattr("studies.fe_models.matrices.nastran._AT_ONCE", 7)
-    assert len(entries(chain()[0])) > 14
-    check(read_matrices(job), (1, 2, 10), 1e-13)
-    check(read_matrices(write_nastran(tmp_path, "other")), (1, 2, 10), 1e-9)

@@ -1,0 +1,147 @@
+"""`worn` of [scene]: a joint that is worn before its history begins, by depths that are given or those of a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from pydantic import BeforeValidator, Field, TypeAdapter
+
+from studyrunner.study.scene_axes import SceneAxis
+from studyrunner.study.study_of_result import check_result_file
+from studyrunner.study.values import NotNegative, Section, Text, read
+from studyrunner.user_error import UserError, WrongValueError
+
+AXIS = "worn_cycle"
+"""Name of the axis of several worn states."""
+
+_DEPTH = TypeAdapter(NotNegative)
+_OWN_KEYS = ("result", "cycle", "depth")
+
+
+def _read_depths(value: object) -> tuple[tuple[float, ...], ...]:
+    """Depths of all pairs, one number or one for each, of one state or of a list of states."""
+    states = value if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple) else [value]
+    found = tuple(
+        tuple(read(_DEPTH, depth) for depth in (state if isinstance(state, list | tuple) else [state]))
+        for state in states
+    )
+    if not all(found):
+        raise WrongValueError(value, "give a depth in m, or a list with a depth of each pair")
+    return found
+
+
+def _read_counts(value: object) -> tuple[float, ...]:
+    counts = tuple(read(_DEPTH, count) for count in (value if isinstance(value, list | tuple) else [value]))
+    if len(set(counts)) < len(counts) or not counts:
+        raise WrongValueError(value, "give cycle counts, each once")
+    return counts
+
+
+class Worn(Section):
+    """Worn states of a joint.
+
+    depth: of each state, m, of each pair, or one number for all pairs. cycle: cycle count of each state; empty where
+    the depths are given. result: file that the depths are from.
+    """
+
+    depth: Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_read_depths)] = Field(
+        description="m, of each pair or of all pairs"
+    )
+    cycle: Annotated[tuple[float, ...], BeforeValidator(_read_counts)] = Field(
+        (), description="cycle counts of the result"
+    )
+    result: Text = Field("", description="result file")
+
+    def depths(self, n_contact: int) -> tuple[float, ...]:
+        """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
+        (depth,) = self.depth
+        if len(depth) not in (1, n_contact):
+            remedy = f"give one depth, or one for each of the {n_contact} contact pairs of the scene"
+            raise WrongValueError(len(depth), remedy)
+        return depth * n_contact if len(depth) == 1 else depth
+
+
+def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
+    """The table `worn` with depths, those of a result file read from the file.
+
+    table: as the study file has it: {result, cycle, ...}, where other keys select a point of the result by values of
+    its axes, or {depth}. folder: relative paths start here.
+
+    Raises
+    ------
+    UserError
+        Where the table or the result file is wrong.
+    """
+    if not isinstance(table, Mapping):
+        remedy = 'give {result = "OUT.nc", cycle = [...]} with the axes of a point, or {depth = ...}'
+        raise UserError(source, "scene.worn", table, remedy)
+    if "depth" in table:
+        return dict(table)
+    for key in ("result", "cycle"):
+        if key not in table:
+            raise UserError(source, f"scene.worn.{key}", None, "missing: give it, or depth in place of a result")
+    name = table["result"]
+    if not isinstance(name, str):
+        raise UserError(source, "scene.worn.result", name, "give the path of a result file, in quotes")
+    path = folder / name
+    check_result_file(path, str(path))
+    try:
+        cycle = _read_counts(table["cycle"])
+    except WrongValueError as error:
+        raise UserError(source, "scene.worn.cycle", error.value, error.remedy) from None
+    point = {key: value for key, value in table.items() if key not in _OWN_KEYS}
+    with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
+        depth = _depths_in(dataset, point, cycle, source)
+    return {"depth": depth.tolist(), "cycle": list(cycle), "result": name}
+
+
+def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
+    """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
+    if "wear_depth" not in dataset:
+        raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
+    depths = dataset["wear_depth"]
+    axes = [str(name) for name in depths.dims[:-2]]
+    for name in point:
+        if name not in axes:
+            remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
+            raise UserError(source, f"scene.worn.{name}", point[name], remedy)
+    for name in axes:
+        values = dataset[name].values.tolist()
+        if name not in point and len(values) > 1:
+            remedy = f"missing: give one of the values {', '.join(map(str, values[:10]))} of the result"
+            raise UserError(source, f"scene.worn.{name}", None, remedy)
+        depths = depths.isel({name: _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)})
+    counts = dataset["cycle"].values.tolist()
+    depths = depths.isel(cycle=[_place("scene.worn.cycle", counts, count, source) for count in cycle])
+    found = np.asarray(depths.values, dtype=np.float64)
+    for count, row in zip(cycle, found, strict=True):
+        if not np.isfinite(row).all():
+            remedy = "give an earlier cycle count: the result does not hold the depths of this one"
+            raise UserError(source, "scene.worn.cycle", count, remedy)
+    return found
+
+
+def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:
+    """Index of a value along an axis of a result."""
+    for place, value in enumerate(values):
+        number = isinstance(value, float | int) and isinstance(wanted, float | int)
+        if value == wanted or (number and math.isclose(value, wanted, rel_tol=1e-12)):
+            return place
+    numbers = [value for value in values if isinstance(value, float | int)]
+    near = min(numbers, key=lambda value: abs(value - wanted)) if numbers and isinstance(wanted, float | int) else None
+    remedy = f"the nearest value of the result is {near:.10g}" if near is not None else f"give one of {values[:10]}"
+    raise UserError(source, key, wanted, remedy)
+
+
+def worn_axis(table: Mapping[str, Any]) -> tuple[SceneAxis, ...]:
+    """The axis of worn states; none where their cycle counts are not known. table: as `read_worn` gives it."""
+    counts, depths = table.get("cycle", []), table.get("depth", [])
+    if not isinstance(counts, list) or not counts or not isinstance(depths, list) or len(depths) != len(counts):
+        return ()
+    meaning = "number of vibration cycles that have worn the joint before"
+    return (SceneAxis(AXIS, "scene", ("worn",), tuple(map(float, counts)), "1", meaning),)

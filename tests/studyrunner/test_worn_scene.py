@@ -1,0 +1,100 @@
+"""Joints that are worn before their history begins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.api import run_study
+from studyrunner.study.study_file import format_study, read_study
+from studyrunner.user_error import UserError
+
+SLIDER = {
+    "axes.frequency": [150.0],
+    "axes.wear_coefficient": 1e-10,
+    "axes.excitation_amplitude": 20.0,
+    "axes.scheme": "adaptive",
+    "slow_time.cycles": 1000,
+    "slow_time.outputs": 3,
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A history over twice the cycles, with the state in between."""
+    path = tmp_path_factory.mktemp("worn") / "whole.nc"
+    run_study("sdof_slider", path, overrides={**SLIDER, "slow_time.cycles": 2000}, progress=False).close()
+    return path
+
+
+def worn(path: Path, **changes: object) -> dict[str, object]:
+    return {**SLIDER, "scene.worn": {"result": str(path), "cycle": [0, 1000], **changes}}
+
+
+@pytest.mark.slow
+def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(whole: Path, tmp_path: Path) -> None:
+    with xr.open_dataset(whole) as first, run_study("sdof_slider", tmp_path / "w.nc", overrides=worn(whole)) as later:
+        before, states = first.squeeze(), later.squeeze()
+        np.testing.assert_array_equal(states.worn_cycle, [0.0, 1000.0])
+        np.testing.assert_array_equal(states.worn_depth, before.wear_depth.sel(cycle=[0.0, 1000.0]))
+        # the unworn state is the same study
+        np.testing.assert_allclose(
+            states.worn_volume.isel(worn_cycle=0, cycle=-1), before.worn_volume.sel(cycle=1000.0), rtol=1e-2
+        )
+        vibrates = states.response_amplitude.isel(worn_cycle=1, cycle=0)
+        np.testing.assert_allclose(vibrates, before.response_amplitude.sel(cycle=1000.0), rtol=1e-3)
+        assert vibrates > 1.002 * states.response_amplitude.isel(worn_cycle=0, cycle=0)
+        more = before.worn_volume.sel(cycle=2000.0) - before.worn_volume.sel(cycle=1000.0)
+        np.testing.assert_allclose(states.worn_volume.isel(worn_cycle=1, cycle=-1), more, rtol=1e-2)
+
+
+def test_the_effective_study_holds_the_depths(whole: Path, tmp_path: Path) -> None:
+    text = format_study(read_study("sdof_slider", worn(whole)))
+    path = tmp_path / "again.toml"
+    path.write_text(text, encoding="utf-8")
+    whole.rename(aside := tmp_path / "aside.nc")
+    try:
+        again = read_study(path)
+    finally:
+        aside.rename(whole)
+    assert format_study(again) == text
+    assert next(variant.scene.worn.depth[0] for variant in again.variants if variant.scene.worn) == (0.0,)
+    assert again.dimensions["worn_cycle"] == (0.0, 1000.0)
+
+
+def test_depths_may_be_given(tmp_path: Path) -> None:
+    study = read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 5e-6}})
+    assert study.scene.worn is not None
+    assert study.scene.worn.depths(3) == (5e-6,) * 3
+    assert "worn_cycle" not in study.dimensions
+    two = read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": [5e-6, 1e-6]}})
+    with pytest.raises(UserError, match=r"scene.worn.depth = 2: give one depth, or one for each of the 1 contact"):
+        run_study(two, tmp_path / "two.nc", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"frequency": 151.0}, "scene.worn.frequency = 151.0: the nearest value of the result is 150"),
+        ({"cycle": [10]}, "scene.worn.cycle = 10.0: the nearest value of the result is 0"),
+        ({"cycle": [0, 0]}, "give cycle counts, each once"),
+        ({"freq": 150.0}, "scene.worn.freq = 150.0: unknown key"),
+        ({"scheme": "explicit"}, "give one of ['adaptive']"),
+        ({"result": "none.nc"}, "there is none of this name"),
+        ({"depth": -1.0}, "scene.worn.depth = -1.0: give a finite number that is 0 or more"),
+        ({"result": 3}, "give the path of a result file, in quotes"),
+    ],
+)
+def test_what_is_wrong_is_said(changes: dict[str, object], said: str, whole: Path) -> None:
+    with pytest.raises(UserError) as error:
+        read_study("sdof_slider", worn(whole, **changes))
+    assert said in str(error.value)
+
+
+def test_a_table_law_counts_depths_from_the_unworn_joint() -> None:
+    law = {"law": "table", "pressure": [0.0], "depth": [0.0], "factor": [[1.0]]}
+    with pytest.raises(UserError, match=r'wear.law = "table": give another law'):
+        read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 1e-6}, "wear": law})
