@@ -311,7 +311,11 @@ class Result:
         fixed = [name for name in self.axes if name in sizes]
         if not fixed:
             return Choice(points, labels, "")
-        others = " and ".join(f"{count(sizes[name] - 1, 'other value')} of {name.replace('_', ' ')}" for name in fixed)
+        others = " and ".join(
+            count(sizes[name] - 1, "other sample" if name == SAMPLE else "other value")
+            + ("" if name == SAMPLE else f" of {name.replace('_', ' ')}")
+            for name in fixed
+        )
         sentence = f"Shown for {self.describe(shown, fixed)}; the file also holds {others}."
         return Choice(points, labels, sentence)
 
@@ -319,9 +323,7 @@ class Result:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         return ", ".join(
-            show_value(self.dataset[name], point[name])
-            for name in self.axes
-            if name in kept and name in point
+            show_value(self.dataset[name], point[name]) for name in self.axes if name in kept and name in point
         )
 
     def cycle_label(self, index: int) -> str:

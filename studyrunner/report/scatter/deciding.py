@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -72,9 +73,7 @@ def along_samples(result: Result, values: NDArray[np.generic], point: Point) -> 
     return np.asarray(values[tuple(slice(None) if name == SAMPLE else point[name] for name in result.axes)])
 
 
-def _draw_samples(
-    panel: Axes, result: Result, point: Point, found: xr.Dataset, name: str, scale: Scale
-) -> float:
+def _draw_samples(panel: Axes, result: Result, point: Point, found: xr.Dataset, name: str, scale: Scale) -> float:
     """The samples of one panel; the largest volume, m3, with some room for its error."""
     drawn, units, words = drawn_values(result, name, point)
     across = scale_for(units, drawn)
@@ -89,7 +88,12 @@ def _draw_samples(
     for number, label in enumerate(GROUPS):
         own = computed & (group == number)
         if own.any():
-            style = {"color": _COLOURS[number], "marker": _MARKERS[number], "edgecolors": "white", "linewidths": 0.4}
+            style: dict[str, Any] = {
+                "color": _COLOURS[number],
+                "marker": _MARKERS[number],
+                "edgecolors": "white",
+                "linewidths": 0.4,
+            }
             panel.scatter(at[own], scale(worn[own]), size, **style, label=label if number else "samples")
     early = ~computed & np.isfinite(worn)
     if early.any():
@@ -118,7 +122,8 @@ def _tell_groups(labels: Sequence[str], statistics: Sequence[xr.Dataset], scale:
         if not n_upper:
             continue
         lower, upper = (scale.show(float(end)) for end in point["group_gap"].values)
-        text = f"Two groups{f' at {label}' if label else ''}: {count(n_lower, 'sample')} up to {lower}, {n_upper} from {upper}"
+        where = f" at {label}" if label else ""
+        text = f"Two groups{where}: {count(n_lower, 'sample')} up to {lower}, {n_upper} from {upper}"
         contact = int(point["deciding_contact"])
         found.append(text if contact < 0 else f"{text}; the wear depth of pair {contact} tells them apart")
     return found

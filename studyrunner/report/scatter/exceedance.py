@@ -34,7 +34,10 @@ def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawing:
     panels[0, 0].set_ylabel("probability of more")
     if len(panels[0, 0].get_legend_handles_labels()[1]) > 1:
         add_legend(figure)
-    open_ended = any((ends(point, held[0][0], held[0][1])[:, 1] > ends(point, held[0][0], held[0][1])[:, 0]).any() for point in shown.statistics)
+    open_ended = any(
+        (ends(point, held[0][0], held[0][1])[:, 1] > ends(point, held[0][0], held[0][1])[:, 0]).any()
+        for point in shown.statistics
+    )
     text = as_sentences(
         f"Probability that more is worn than a volume {result.when(-1)}"
         + (", and that a pair is worn deeper than a depth until then" if len(held) > 1 else "")

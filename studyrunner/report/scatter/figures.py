@@ -22,7 +22,9 @@ def draw_scatter(result: Result) -> Iterator[Drawing | Missing]:
         return
     statistics = result.statistics
     if statistics is None:
-        sentence = result.lacks("worn_volume") or "The file holds more samples than the report takes: read it in Python."
+        sentence = (
+            result.lacks("worn_volume") or "The file holds more samples than the report takes: read it in Python."
+        )
         yield Missing("scatter", _TITLE, sentence)
         return
     if not float(result.read("worn_volume").max()) > NO_VOLUME:

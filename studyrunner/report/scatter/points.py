@@ -34,7 +34,9 @@ class Shown:
         return iter(zip(self.points, self.labels, self.statistics, strict=True))
 
 
-def choose_points(result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = MOST_PANELS) -> Shown:
+def choose_points(
+    result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = MOST_PANELS
+) -> Shown:
     """Combinations of the axes beside samples and `free`, at most `limit`; that of the shown point is among them."""
     choice = result.choose([SAMPLE, *free], limit)
     found = tuple(statistics_at(statistics, point) for point in choice.points)

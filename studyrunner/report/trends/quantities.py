@@ -30,7 +30,7 @@ class Quantity:
 
 
 def has_trends(result: Result) -> bool:
-    """Whether more than frequency, scheme and samples varies, which other figures show, and there is something to tell."""
+    """Whether there is something to tell, and more varies than what other figures show: frequency, scheme, samples."""
     return bool(result.computed.any()) and not all(name in _PLAIN for name in result.varying)
 
 
