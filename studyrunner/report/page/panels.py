@@ -16,13 +16,14 @@ MOST_PANELS = 6
 _FLAT = 1e-6
 
 
-def build_panels(result: Result, point: Point) -> list[dict[str, object]]:
-    """One panel a surface of the scene of a point: `title`, `kind`, and `pairs`, places of its pairs in the file.
+def build_panels(result: Result, point: Point | None = None) -> list[dict[str, object]]:
+    """One panel a surface, of the scene of a point or of the shown one: `title`, `kind`, and `pairs`, places of its pairs in the file.
 
     kind "grid": `x` and `y`, m, of the columns and rows, and `pairs` as rows; "scatter": `x` and `y`, m, of each pair
     in the plane of the surface; "bars": one bar a pair.
     """
     # places in the file, where other scenes may have more pairs
+    point = result.shown_point() if point is None else point
     places = pairs_of_scene(result, point)
     flanks = [replace(flank, pairs=places[flank.pairs]) for flank in find_flanks(of_scene(result, point))]
     if len(flanks) > MOST_PANELS:

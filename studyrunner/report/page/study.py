@@ -10,14 +10,15 @@ import numpy as np
 from studyrunner.report.reading.endings import Ending
 from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Result
-from studyrunner.report.reading.sample_statistics import DRAWN
+from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.statistics.sentence import sentences
+from studyrunner.report.scatter.points import last_of, statistics_at
+from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.system.progress import count
 from studyrunner.variables import COORDINATES
 
 _MOST_VALUES = 12
-_MOST_SENTENCES = 6
+_MOST_SENTENCES = 3
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,7 @@ def describe_study(result: Result) -> StudyFacts:
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     ]
-    said = [] if result.statistics is None else [f"{line}." for line in sentences(result.statistics)[:_MOST_SENTENCES]]
-    summary = " ".join(filter(None, (*said, tell_volumes(result), tell_ends(result))))
+    summary = " ".join(filter(None, (_tell_samples(result), tell_volumes(result), tell_ends(result))))
     return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
 
 
@@ -82,6 +82,17 @@ def _axis_values(result: Result, name: str) -> str:
     if len(values) > _MOST_VALUES:
         return f"{values[0]} to {values[-1]}{after}, {len(values)} values{told}"
     return ", ".join(values) + after + told
+
+
+def _tell_samples(result: Result) -> str:
+    """What the samples say at each combination of the other axes, or at the shown one alone of many."""
+    if result.statistics is None:
+        return ""
+    told = sentences(result.statistics)
+    if len(told) > _MOST_SENTENCES:
+        shown = {name: index for name, index in result.shown_point().items() if name != SAMPLE}
+        told = [f"{result.describe(shown)}: {sentence(last_of(statistics_at(result.statistics, shown)))}"]
+    return " ".join(f"{line}." for line in told)
 
 
 def _drawn(result: Result) -> list[tuple[str, str]]:
