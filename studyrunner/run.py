@@ -14,10 +14,9 @@ from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIn
 from studyrunner.checkpoint.database import StoreInUseError
 from studyrunner.checkpoint.records import layout_of, record_type
 from studyrunner.checkpoint.store import Store
+from studyrunner.crashed_tasks import crash_notes, take_crashes, tried_again
 from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
-    MOST_DEATHS,
-    Crash,
     count_crashes,
     forget_crashes,
     note_tasks,
@@ -211,7 +210,7 @@ def serve_study(
     """
     completion, writer = _prepare(study, scenes, target, progress, options)
     crashes = crash_folder(target.path)
-    with _crash_notes(crashes):
+    with crash_notes(crashes):
         n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
             if scenes.broadcast is not None:
@@ -265,19 +264,6 @@ def _older(target: Path) -> list[str]:
     return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]
 
 
-@contextlib.contextmanager
-def _crash_notes(folder: Path) -> Iterator[None]:
-    """The folder of the notes on crashes, which goes with the run where it is empty."""
-    # a disk that is full is met by what is written next
-    with contextlib.suppress(OSError):
-        folder.mkdir(exist_ok=True)
-    try:
-        yield
-    finally:
-        with contextlib.suppress(OSError):
-            folder.rmdir()
-
-
 def _begin(
     completion: CompletionIndex, folder: Path, n_points: int, options: RunOptions, progress: ProgressDisplay
 ) -> int:
@@ -298,49 +284,13 @@ def _begin(
 
 def _tidy(completion: CompletionIndex, folder: Path, *, prune: bool) -> None:
     """Removes what a finished study no longer needs. folder: of the notes on crashes."""
-    forget_crashes(folder, None if prune else completion.keys - _tried_again(completion, folder))
+    forget_crashes(folder, None if prune else completion.keys - tried_again(completion, folder))
     completion.prune(0.0 if prune else MOST_OF_OTHERS)
     # The result is written. The next run does what a signal interrupts.
     try:
         completion.store.shrink()
     except KeyboardInterrupt:
         begin_ending()
-
-
-def take_crashes(completion: CompletionIndex, folder: Path, *, fresh: bool = False) -> list[Crash]:
-    """Marks the points of tasks as failed that have ended two processes in earlier runs.
-
-    Parameters
-    ----------
-    completion
-        The finished tasks.
-    folder
-        Folder of the notes on crashes.
-    fresh
-        Whether earlier crashes of the tasks of this study do not count.
-
-    Returns
-    -------
-    list of Crash
-        New crashes of tasks that have crashed once.
-    """
-    own = completion.keys
-    new = count_crashes(folder)
-    if fresh:
-        forget_crashes(folder, own)
-    for key, crashes in read_tally(folder).items():
-        if key in own and len(crashes) >= MOST_DEATHS:
-            completion.take_as_failed(key, crashes[-1].position, Outcome.CRASHED, crashes[-1].message)
-            # The failure is on the disk. With --retry-failed counting begins anew.
-            forget_crashes(folder, {key})
-    tally = read_tally(folder)
-    return [crash for crash in new if crash.key in tally]
-
-
-def _tried_again(completion: CompletionIndex, folder: Path) -> set[str]:
-    """Tasks that had crashed too often, were tried again and have crashed once more."""
-    tally = {key for key, crashes in read_tally(folder).items() if len(crashes) < MOST_DEATHS}
-    return tally & completion.tasks_with(Outcome.CRASHED) if tally else set()
 
 
 def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: bool) -> RunSummary:

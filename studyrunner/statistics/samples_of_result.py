@@ -68,6 +68,11 @@ def is_column(dataset: xr.Dataset, name: str) -> bool:
     return sobol and dataset[f"{_DRAWN}{name}"].dims == (SAMPLE,)
 
 
+def is_of_pairs(dataset: xr.Dataset, name: str) -> bool:
+    """Whether an input has a draw for each contact pair, or for each surface."""
+    return "contact" in dataset[f"{_DRAWN}{name}"].dims
+
+
 def scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
     """[scatter] of the study of a result; None where it says none."""
     table = tomllib.loads(str(dataset.attrs.get("study", ""))).get("scatter")

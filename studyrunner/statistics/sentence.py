@@ -80,7 +80,13 @@ def _deciding(point: xr.Dataset) -> str:
     most = int(np.argmax(share[:, 0]))
     low, high = (f"{100.0 * each:.0f}" for each in share[most])
     name = str(point["input"].values[most]).replace("_", " ")
-    return f"; {name} decides {low if low == high else f'{low} to {high}'} %"
+    text = f"; {name} decides {low if low == high else f'{low} to {high}'} %"
+    untold = [
+        str(each)
+        for each, row in zip(point["input"].values, point["first_index"].values, strict=True)
+        if np.isnan(row).all()
+    ]
+    return f"{text} ({' and '.join(untold)} not told)" if untold else text
 
 
 def _show(coordinate: xr.DataArray) -> str:

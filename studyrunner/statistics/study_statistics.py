@@ -21,6 +21,7 @@ from studyrunner.statistics.samples_of_result import (
     depth_samples,
     inputs_of,
     is_column,
+    is_of_pairs,
     scatter_of,
     volume_samples,
 )
@@ -168,7 +169,7 @@ def _index_arrays(
     if layout is None:
         columns = np.array([is_column(dataset, name) for name in inputs])
         indices = plain_indices(table, values, confidence, columns)
-        comment = "Of an input with a draw for each pair: what its mean over the pairs decides."
+        comment = "NaN for an input with a draw for each pair: the method saltelli tells what all of them decide."
     else:
         indices = saltelli_indices(layout, table, values, confidence)
         comment = "Of an input with a draw for each pair: what all of them decide together."
@@ -179,6 +180,8 @@ def _index_arrays(
     for name, array in found.items():
         method = indices.first_method if name.startswith("first") else indices.total_method
         array.attrs |= {"method": method, "comment": comment}
+        if layout is None:
+            found[name] = array.where(xr.DataArray([not is_of_pairs(dataset, each) for each in inputs], dims="input"))
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -38,7 +39,7 @@ def check_scene(
     parameters = dict(table)
     if "worn" in parameters:
         worn = check_table(Worn, cast("Table", parameters.pop("worn")), source, "scene.worn")
-        section = check_scene(parameters, source, path, archived, kept)
+        section = check_scene(parameters, source, path, _without_wear(archived), _without_wear(kept))
         return section.model_copy(update={"worn": worn})
     model = parameters.pop("model", None)
     if model is None:
@@ -63,6 +64,13 @@ def check_scene(
         if checked == check_table(kind, before, source, "scene"):
             found = _find_scene(model, source, path, kept)
     return SceneSection(model=model, parameters=checked, **{**found, "offers": offers})
+
+
+def _without_wear(archived: Archived | None) -> Archived | None:
+    """A result whose scene is compared with one that is not worn."""
+    if archived is None:
+        return None
+    return replace(archived, scene={key: value for key, value in archived.scene.items() if key != "worn"})
 
 
 def _check_model(model: str, table: Table, source: str, path: Path, archived: Archived | None) -> SceneSection:

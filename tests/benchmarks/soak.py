@@ -3,9 +3,9 @@
     python -m tests.benchmarks.soak [COUNT [SEED]]
 
 Each trial is a study of the stand-in for the solver that is killed at some time, one in four of them twice, and then
-goes on to its end, on another number of ranks; one in eight goes on for so long that what it loses may be old. The
-stand-in notes when it has finished something: what it notes again after a kill was lost with it. The trial of a seed
-can be repeated. The tests do a few of these.
+goes on to its end, on another number of ranks; one in eight goes on for so long that what it loses may be old, and one
+in eight is computed by the solver itself. The stand-in notes when it has finished something: what it notes again after
+a kill was lost with it. The trial of a seed can be repeated. `tests/mpi/test_kills.py` does a few of these.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pathlib import Path
 
 from tests.mpi.launching import results, run_to_end
 from tests.mpi.losses import Losses, all_losses, find_losses
-from tests.mpi.test_kills import AT_ONCE, FAKED_STUDY, LONG_STUDY, kill_and_go_on
+from tests.mpi.test_kills import AT_ONCE, FAKED_STUDY, LONG_STUDY, REAL_STUDY, Disturbed, kill_and_go_on
 
-_LONG_EVERY = 8
+_EVERY = 8
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Soaked:
 
 def soak(count: int, seed: int, folder: Path) -> Soaked:
     """So many trials, with seeds from this one on."""
-    expected = []
-    for number, study in enumerate((FAKED_STUDY, LONG_STUDY)):
+    expected = {}
+    for number, study in enumerate((FAKED_STUDY, LONG_STUDY, REAL_STUDY)):
         arguments = [*study.arguments, "-o", f"whole{number}.nc"]
         assert run_to_end(0, arguments, folder, {**study.environment, "FAKE_SECONDS": "0"}).status == 0
-        expected.append(results(folder / arguments[-1]))
+        expected[study.arguments] = results(folder / arguments[-1])
     same, n_kills, wrong, losses = 0, 0, [], Losses()
     for first in range(seed, seed + count, AT_ONCE):
         seeds = range(first, min(first + AT_ONCE, seed + count))
@@ -50,7 +50,7 @@ def soak(count: int, seed: int, folder: Path) -> Soaked:
         # netCDF does not like threads: the files are opened here
         for one, how in zip(seeds, found, strict=True):
             path = folder / str(one)
-            if how.startswith("killed") and results(path / "out.nc").identical(expected[_is_long(one)]):
+            if how.startswith("killed") and results(path / "out.nc").identical(expected[_study_of(one).arguments]):
                 same += 1
                 n_kills += int(how.split()[1])
             else:
@@ -60,12 +60,12 @@ def soak(count: int, seed: int, folder: Path) -> Soaked:
     return Soaked(same, n_kills, tuple(wrong), losses)
 
 
-def _is_long(seed: int) -> bool:
-    return seed % _LONG_EVERY == _LONG_EVERY - 1
+def _study_of(seed: int) -> Disturbed:
+    return {_EVERY - 1: LONG_STUDY, _EVERY - 2: REAL_STUDY}.get(seed % _EVERY, FAKED_STUDY)
 
 
 def _trial(seed: int, folder: Path) -> str:
-    return kill_and_go_on(LONG_STUDY if _is_long(seed) else FAKED_STUDY, folder, seed)
+    return kill_and_go_on(_study_of(seed), folder, seed)
 
 
 def main() -> int:

@@ -67,22 +67,13 @@ def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi: OpenMpi, tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_launcher_in_a_job_of_several_processes(tmp_path: Path) -> None:
-    """That is no mistake, but rarely meant."""
-    done = run([sys.executable, FAKED, *STUDY], tmp_path, {"SLURM_NTASKS": "8", "SLURM_PROCID": "0"})
-    assert done.returncode == 0
-    (line,) = [line for line in done.stderr.splitlines() if "one process" in line]
-    assert "the job has room for 8: " in line
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("_version = lambda package: '0.0.1'", ["rank 1 on ", "runs fretwear 0.0.1, rank 0 on "]),
         ("_SOURCES = ('solver',)", ["runs source of run-study "]),
         ("report_version = lambda ranks: None", ["rank 1 has not said within 1 s what it runs"]),
     ],
-    ids=["another version", "another source", "one that does not answer"],
+    ids=["another source", "one that does not answer"],
 )
 def test_ranks_with_different_software(change: str, said: list[str], tmp_path: Path) -> None:
     program = tmp_path / "other.py"
@@ -91,7 +82,7 @@ def test_ranks_with_different_software(change: str, said: list[str], tmp_path: P
         change = "check_versions.__defaults__ = (1.0,)"
         lines = program.read_text(encoding="utf-8").replace("sys.argv =", f"version_check.{change}\nsys.argv =")
         program.write_text(lines, encoding="utf-8")
-    done = run([*launcher(3), sys.executable, str(program), *STUDY], tmp_path)
+    done = run([*launcher(2), sys.executable, str(program), *STUDY], tmp_path)
     assert_refused(done, *said, "install the same software for all ranks")
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
@@ -99,7 +90,7 @@ def test_ranks_with_different_software(change: str, said: list[str], tmp_path: P
 def test_more_ranks_than_tasks(tmp_path: Path) -> None:
     """Nothing is wrong with that."""
     study = ["two_masses", "-o", "out.nc", "--set", "axes.frequency=0.1"]
-    assert run([*launcher(6), sys.executable, FAKED, *study], tmp_path).returncode == 0
+    assert run([*launcher(3), sys.executable, FAKED, *study], tmp_path).returncode == 0
     assert run([sys.executable, FAKED, *study[:-3], "alone.nc", *study[-2:]], tmp_path).returncode == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), results(tmp_path / "alone.nc"))
 
@@ -140,16 +131,15 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
-@pytest.mark.parametrize("n_ranks", [0, 2])
-def test_an_output_that_cannot_be_written(n_ranks: int, read_only: Path, tmp_path: Path) -> None:
-    command = [*launcher(n_ranks), sys.executable, FAKED, *STUDY, "-o", str(read_only / "out.nc")]
+def test_an_output_that_cannot_be_written(read_only: Path, tmp_path: Path) -> None:
+    command = [*launcher(2), sys.executable, FAKED, *STUDY, "-o", str(read_only / "out.nc")]
     done = run(command, tmp_path)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "give a file that can be written: Read-only file system" in line
 
 
-HOSTS = (1, 2, 3)
+HOSTS = (1, 2)
 START = """\
 #!/bin/sh
 # what hydra calls in place of ssh: options, the host, the command
@@ -167,7 +157,7 @@ def tool(*command: str) -> None:
 
 @pytest.fixture
 def hosts() -> Iterator[str]:
-    """Three hosts on one network, each with its own processes, names and memory; what their names begin with."""
+    """Two hosts on one network, each with its own processes, names and memory; what their names begin with."""
     prefix = f"fw{os.getpid() % 100000}h"
     if shutil.which("ip") is None or shutil.which("unshare") is None or os.geteuid() != 0:
         pytest.skip("hosts are simulated with ip and unshare, by root only")
@@ -192,15 +182,15 @@ def hosts() -> Iterator[str]:
         tool("ip", "link", "del", f"{prefix}b")
 
 
-def test_three_hosts_and_one_shared_folder(hosts: str, tmp_path: Path) -> None:
+def test_two_hosts_and_one_shared_folder(hosts: str, tmp_path: Path) -> None:
     """The same as on one host, and what they say to each other goes over the network."""
     starter = tmp_path / "start"
     starter.write_text(START.replace("PREFIX", hosts), encoding="utf-8")
     starter.chmod(0o755)
     addresses = ",".join(f"10.199.77.{number}" for number in HOSTS)
-    several = [mpiexec(), "-launcher", "ssh", "-launcher-exec", str(starter), "-hosts", addresses, "-n", "6"]
+    several = [mpiexec(), "-launcher", "ssh", "-launcher-exec", str(starter), "-hosts", addresses, "-n", "4"]
     # all have something to do, however slow one of them is
-    faked = {"FAKE_SECONDS": "0.02", "FAKE_TOGETHER": "6"}
+    faked = {"FAKE_SECONDS": "0.02", "FAKE_TOGETHER": "4"}
     # hydra starts the processes of its own host without that command: it is already there
     command = " ".join(f"'{word}'" for word in [*several, sys.executable, FAKED, *STUDY])
     done = run([str(starter), "10.199.77.1", f"cd '{tmp_path}' && exec {command}"], tmp_path, faked)
@@ -209,6 +199,6 @@ def test_three_hosts_and_one_shared_folder(hosts: str, tmp_path: Path) -> None:
         sent = Path(f"/sys/class/net/{hosts}w{number}/statistics/rx_bytes").read_text(encoding="ascii")
         assert int(sent) > 20_000
     loads = {path.name for path in tmp_path.glob("rank*.txt")}
-    assert len(loads) == 6
+    assert len(loads) == 4
     assert run([sys.executable, FAKED, *STUDY, "-o", "alone.nc"], tmp_path).returncode == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), results(tmp_path / "alone.nc"))

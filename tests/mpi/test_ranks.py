@@ -40,7 +40,7 @@ def start(
 
 def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
     results, tables = {}, set()
-    for n_ranks in (0, 1, 2, 4):
+    for n_ranks in (0, 1, 3):
         done = start(n_ranks, [FAKED, *GRID, "-o", f"{n_ranks}.nc"], tmp_path)
         assert done.returncode == 0, done.stderr
         summary, *table = done.stdout.splitlines()
@@ -48,7 +48,7 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
         assert summary.startswith(f"{n_ranks}.nc: 312 points, 312 computed, 0 failed")
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results[n_ranks] = result.load().drop_vars("run_time")
-    for n_ranks in (1, 2, 4):
+    for n_ranks in (1, 3):
         xr.testing.assert_identical(results[n_ranks], results[0])
     assert tables == {results[0].attrs["certificate_summary"]}
 
@@ -56,7 +56,7 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
 def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> None:
     arguments = [
         *("-m", "studyrunner.cli", "dovetail"),
-        *("--set", "axes.frequency=[211.5, 212.5, 214]"),
+        *("--set", "axes.frequency=[211.5, 212.5]"),
         *("--set", "scene.mesh=1"),
         *("--set", "solver.harmonics=3"),
         *("--set", "solver.samples=64"),
@@ -65,7 +65,7 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
         *("--set", "outputs.loops=[0, 5]"),
     ]
     results = []
-    for n_ranks in (0, 3):
+    for n_ranks in (0, 2):
         done = start(n_ranks, [*arguments, "-o", f"{n_ranks}.nc"], tmp_path, {"PYTHONPATH": str(ROOT)})
         assert done.returncode in (0, 3), done.stderr
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
@@ -76,37 +76,18 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
     xr.testing.assert_identical(results[1], results[0])
 
 
-def test_uneven_tasks_are_balanced_while_running(tmp_path: Path) -> None:
-    """The most even of some tries counts: a rank that something else on the machine holds up gets less to do."""
-    n_ranks, tries = 4, []
-    for attempt in range(3):
-        folder = tmp_path / str(attempt)
-        folder.mkdir()
-        done = start(n_ranks, [FAKED, *GRID], folder, {"FAKE_SECONDS": "0.08"})
-        assert done.returncode == 0, done.stderr
-        loads = [sum(map(float, path.read_text().split())) for path in folder.glob("rank*.txt")]
-        assert len(loads) == n_ranks
-        tries.append(max(loads) / (sum(loads) / n_ranks))
-        if tries[-1] < 1.25:
-            break
-    print(f"{n_ranks} ranks: the longest takes {min(tries):.2f} of the mean")
-    assert min(tries) < 1.25
-
-
-@pytest.mark.parametrize(("n_ranks", "sweeps"), [(2, "['up']"), (3, "['up', 'down']")], ids=["one", "one a rank"])
-def test_marches_are_done_while_their_branch_goes_on(n_ranks: int, sweeps: str, tmp_path: Path) -> None:
+def test_marches_are_done_while_their_branch_goes_on(tmp_path: Path) -> None:
     """Every branch stands still after its first start state until a march from it is done, which no rank but one has
     time for."""
-    arguments = [FAKED, *GRID, "--set", f"axes.sweep={sweeps}"]
-    done = start(n_ranks, arguments, tmp_path, {"FAKE_SECONDS": "0.01", "FAKE_PATIENCE": "120"})
+    arguments = [FAKED, *GRID, "--set", "axes.sweep=up"]
+    done = start(2, arguments, tmp_path, {"FAKE_SECONDS": "0.01", "FAKE_PATIENCE": "120"})
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("failing", [0, 1])
-def test_an_exception_on_one_rank_ends_all(failing: int, tmp_path: Path) -> None:
-    done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": str(failing)})
+def test_an_exception_on_one_rank_ends_all(tmp_path: Path) -> None:
+    done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": "1"})
     assert done.returncode == 1
-    assert f"unexpected failure on rank {failing} of 2" in done.stderr
+    assert "unexpected failure on rank 1 of 2" in done.stderr
     assert re.search(r"ValueError: not \d results from MarchTask", done.stderr)
     # What was finished is kept, and the result is written when the run ends in good order only.
     left = {path.name for path in tmp_path.iterdir()}
@@ -123,10 +104,7 @@ def default_signals() -> Iterator[None]:
 
 
 # the launcher of MPICH ends by itself at SIGHUP, and all ranks with it
-@pytest.mark.parametrize(
-    ("n_ranks", "number"),
-    [(0, signal.SIGINT), (0, signal.SIGHUP), (2, signal.SIGINT), (2, signal.SIGTERM), (2, signal.SIGUSR1)],
-)
+@pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGHUP), (2, signal.SIGINT), (2, signal.SIGUSR1)])
 def test_an_interrupted_run_ends_at_once(
     n_ranks: int, number: signal.Signals, tmp_path: Path, default_signals: None
 ) -> None:
@@ -146,9 +124,8 @@ def test_an_interrupted_run_ends_at_once(
         assert (result.outcome == Outcome.NOT_COMPUTED).any()
 
 
-@pytest.mark.parametrize("n_ranks", [0, 2])
-def test_bad_input_is_said_once(n_ranks: int, tmp_path: Path) -> None:
-    done = start(n_ranks, [FAKED, "sdof_slider", "--set", "axes.frequency=-1"], tmp_path)
+def test_bad_input_is_said_once(tmp_path: Path) -> None:
+    done = start(2, [FAKED, "sdof_slider", "--set", "axes.frequency=-1"], tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
@@ -156,30 +133,24 @@ def test_bad_input_is_said_once(n_ranks: int, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("option", ["--plan", "--help"])
-def test_printed_once(option: str, tmp_path: Path) -> None:
-    alone, together = (start(n_ranks, [FAKED, *CHEAP, option], tmp_path).stdout for n_ranks in (0, 2))
+def test_the_plan_is_printed_once(tmp_path: Path) -> None:
+    alone, together = (start(n_ranks, [FAKED, *CHEAP, "--plan"], tmp_path).stdout for n_ranks in (0, 2))
     assert alone
     # a plan tells the time with that of its own process
     assert re.sub(r"[0-9.]+ s\b", "seconds", together) == re.sub(r"[0-9.]+ s\b", "seconds", alone)
 
 
-@pytest.mark.parametrize(
-    "environment",
-    [{"PMI_SIZE": "3"}, {"SLURM_STEP_NUM_TASKS": "3"}],
-    ids=["more than MPI knows of", "srun without MPI"],
-)
-def test_launcher_of_another_mpi(environment: dict[str, str], tmp_path: Path) -> None:
+def test_processes_of_srun_without_mpi(tmp_path: Path) -> None:
     """Processes that do not find each other say so once and compute nothing."""
 
     def start_rank(rank: int) -> subprocess.CompletedProcess[str]:
-        return start(0, [FAKED, *GRID], tmp_path, {**environment, "SLURM_PROCID": str(rank)})
+        return start(0, [FAKED, *GRID], tmp_path, {"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": str(rank)})
 
     with ThreadPoolExecutor() as pool:
-        ranks = list(pool.map(start_rank, range(3)))
-    assert [done.returncode for done in ranks] == [2, 2, 2]
+        ranks = list(pool.map(start_rank, range(2)))
+    assert [done.returncode for done in ranks] == [2, 2]
     (line,) = ranks[0].stderr.splitlines()
-    assert "3 processes were started" in line
+    assert "2 processes were started" in line
     assert "mpiexec" in line
-    assert [done.stderr for done in ranks[1:]] == ["", ""]
+    assert [done.stderr for done in ranks[1:]] == [""]
     assert list(tmp_path.iterdir()) == []

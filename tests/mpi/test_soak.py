@@ -1,4 +1,4 @@
-"""A few of the random kills of the soak, and how it tells what was lost."""
+"""How tests and soak tell what was lost with a run that was killed."""
 
 from __future__ import annotations
 
@@ -8,17 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks.soak import soak
 from tests.mpi.losses import DONE, find_losses, note_end, note_kill
-
-
-def test_a_few_random_kills_lose_nothing(tmp_path: Path) -> None:
-    done = soak(8, 1000, tmp_path)
-    print(done.losses)
-    assert done.wrong == ()
-    assert done.same == 8
-    assert done.n_kills >= 8
-    assert done.losses.broken.total() == 0
 
 
 def test_what_is_finished_again_after_a_kill_was_lost_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,9 +28,3 @@ def test_what_is_finished_again_after_a_kill_was_lost_with_it(tmp_path: Path, mo
     assert losses.broken == Counter(result=1)
     assert losses.oldest == {"step": 4.0, "result": 10.5}
     assert str(losses).splitlines()[0].startswith("1 of 3 results finished more than 5 s before a kill were lost; ")
-
-
-def test_nothing_is_lost_where_nothing_is_killed(tmp_path: Path) -> None:
-    (tmp_path / DONE).write_text("101 step a 0\n102 step a 0\n", encoding="ascii")
-    note_end(tmp_path)
-    assert find_losses(tmp_path).at_risk.total() == find_losses(tmp_path).broken.total() == 0

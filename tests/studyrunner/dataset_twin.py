@@ -66,11 +66,7 @@ def build_dataset(
     for name in map(str, dataset.variables):
         entry = COORDINATES.get(name) or variables[name]
         content = "coordinate" if name in COORDINATES else entry.content
-        dataset[name].attrs = {
-            "units": entry.units,
-            "long_name": entry.long_name,
-            "coverage_content_type": content,
-        }
+        dataset[name].attrs = {"units": entry.units, "long_name": entry.long_name, "coverage_content_type": content}
         if entry.comment:
             dataset[name].attrs["comment"] = entry.comment
         if entry.flags:

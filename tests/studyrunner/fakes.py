@@ -37,10 +37,7 @@ def no_keep(progress: Packed) -> None:
 
 
 def fake_evaluate(
-    task: BranchTask | MarchTask,
-    keep: Keep = no_keep,
-    facts: SceneFacts = FACTS,
-    seconds: float = 0.0,
+    task: BranchTask | MarchTask, keep: Keep = no_keep, facts: SceneFacts = FACTS, seconds: float = 0.0
 ) -> Iterator[StartResult | MarchResult]:
     """Results that depend on everything in the task but its cost; a march takes up to `seconds`, unevenly."""
     if isinstance(task, BranchTask):
@@ -76,7 +73,7 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
             pairs = 1e3 * np.array(task.loops, dtype=float)[:, None, None] + (name == "loop_force")
             values[name] = fingerprint + pairs + 1e-3 * np.arange(float(np.prod(shape))).reshape(shape)
             continue
-        shape = (len(task.cycles), *(sizes[dimension] for dimension in ASKED[name].dimensions[1:]))
+        shape = tuple({"cycle": len(task.cycles), **sizes}[dimension] for dimension in ASKED[name].dimensions)
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
         if ASKED[name].flags:
             values[name] = values[name] >= 0.0

@@ -78,11 +78,6 @@ def test_response_is_the_complex_amplitude_of_the_first_harmonic(result):
     assert response.attrs["units"] == "m"
 
 
-def test_surfaces_are_in_the_order_of_their_first_pairs(result):
-    first = str(result.contact_surface.values[0])
-    assert result.fretwear.surfaces == (first, *(each for each in SURFACES if each != first))
-
-
 @pytest.mark.parametrize("surface", SURFACES)
 def test_flank_puts_every_value_where_its_pair_is(result, surface):
     flank = result.fretwear.flank("wear_depth", surface)
@@ -97,22 +92,6 @@ def test_flank_puts_every_value_where_its_pair_is(result, surface):
     assert set(result.contact_surface.sel(contact=flank.contact).values.ravel()) == {surface}
     assert flank.across.attrs["units"] == flank.along.attrs["units"] == "m"
     assert flank.attrs == result.wear_depth.attrs
-
-
-def test_flanks_of_one_shape_can_be_subtracted(result):
-    flanks = [result.fretwear.flank("wear_depth", surface).drop_vars("contact") for surface in SURFACES]
-    assert (flanks[0] - flanks[1]).sizes == flanks[0].sizes
-
-
-def test_flank_of_a_selection_is_the_selection_of_the_flank(result):
-    where = {"frequency": 1, "cycle": 1}
-    of_selection = result.isel(where).fretwear.flank("wear_depth", "back")
-    xr.testing.assert_identical(of_selection, result.fretwear.flank("wear_depth", "back").isel(where))
-
-
-def test_dimensions_after_the_pair_stay_before_the_grid(result):
-    result["loop_force"] = result.wear_depth.expand_dims(component=["normal"], axis=-1)
-    assert result.fretwear.flank("loop_force", "back").dims[-3:] == ("component", "across", "along")
 
 
 def test_flank_says_what_is_wrong(result):
@@ -162,17 +141,6 @@ def test_grids_are_found_in_any_orientation_and_order(name, seed):
     z = points.reshape(*shape, 3)[0, :, 2]
     np.testing.assert_allclose(grid.along, z - z[0] if upwards else (z[-1] - z)[::-1], rtol=0, atol=1e-7)
     assert grid.across[0] == grid.along[0] == 0.0
-
-
-def test_square_grid_is_found_whatever_the_order():
-    points = flat(np.linspace(0, 0.03, 4), np.linspace(0, 0.03, 4))
-    for seed in range(20):
-        order = np.random.default_rng(seed).permutation(16)
-        assert np.array_equal(order[find_grid(points[order]).pair], np.arange(16).reshape(4, 4))
-
-
-def test_single_pair_is_a_grid():
-    assert find_grid(np.array([[1.0, 2.0, 3.0]])).pair.tolist() == [[0]]
 
 
 def moved(points, shift):
@@ -256,29 +224,6 @@ def test_later_results_win_point_by_point(result):
     assert join_results([later, result]).drop_vars("jump_cycle").equals(result)
 
 
-def test_points_of_no_result_are_marked(result):
-    joined = join_results([result.isel(frequency=[0], scheme=[0]), result.isel(frequency=[2], scheme=[1])])
-    assert joined.outcome.values.tolist() == [[0, Outcome.NOT_COMPUTED], [Outcome.NOT_COMPUTED, 0]]
-    assert joined.newton_iterations.values.tolist() == [[0, 0], [0, 5]]
-    assert joined.worn_volume.isnull().sum() == 4
-    assert joined.outcome.attrs["flag_values"].tolist() == [0, 1, Outcome.NOT_COMPUTED]
-    assert joined.outcome.attrs["flag_meanings"].split() == ["converged", "singular", "not_computed"]
-    assert len(joined.outcome.attrs["sentences"].splitlines()) == 3
-
-
-def test_axes_that_differ_by_round_off_are_one(result):
-    other = result.assign_coords(frequency=np.nextafter(result.frequency.values, 1e3))
-    assert join_results([result, other]).sizes == result.sizes
-
-
-def test_other_cycles_leave_gaps_and_nothing_of_an_earlier_result(result):
-    later = result.isel(frequency=[0]).assign_coords(cycle=[0.0, 500.0])
-    joined = join_results([result, later])
-    assert joined.cycle.values.tolist() == [0.0, 500.0, 1000.0]
-    assert joined.worn_volume[0, 0].isnull().values.tolist() == [False, False, True]
-    assert joined.worn_volume[1, 0].isnull().values.tolist() == [False, True, False]
-
-
 def test_a_key_of_the_study_becomes_an_axis(result):
     slippery = result.assign_attrs(study="[scene]\nfriction_coefficient = 0.1\n[solver]\nrtol = 0.1", scene_sha256="1")
     for key in ("friction_coefficient", "scene.friction_coefficient"):
@@ -311,3 +256,13 @@ def test_a_study_that_was_made_to_do_harm(study):
     result.attrs["study"] = study
     with pytest.raises(ValueError, match="study"):
         join_results([result], dim="friction_coefficient")
+
+
+def test_points_of_no_result_are_marked(result):
+    joined = join_results([result.isel(frequency=[0], scheme=[0]), result.isel(frequency=[2], scheme=[1])])
+    assert joined.outcome.values.tolist() == [[0, Outcome.NOT_COMPUTED], [Outcome.NOT_COMPUTED, 0]]
+    assert joined.newton_iterations.values.tolist() == [[0, 0], [0, 5]]
+    assert joined.worn_volume.isnull().sum() == 4
+    assert joined.outcome.attrs["flag_values"].tolist() == [0, 1, Outcome.NOT_COMPUTED]
+    assert joined.outcome.attrs["flag_meanings"].split() == ["converged", "singular", "not_computed"]
+    assert len(joined.outcome.attrs["sentences"].splitlines()) == 3

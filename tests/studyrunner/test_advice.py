@@ -44,31 +44,6 @@ def test_nothing_is_advised_that_is_in_use_or_not_used(used: Used) -> None:
             assert "smaller step" not in text
 
 
-def test_there_is_advice_where_something_is_left_to_try() -> None:
-    for used in ALL:
-        for word in ("march_failed", "sensitive", "start_failed", "branch_lost", "unstable", "certificate_failed"):
-            assert advise(word, used).startswith("Try ")
-        assert advise_error(0.013, [], used)
-    assert advise("branch_lost", Used("adaptive", "up", sweeps=SWEEPS)) == ""
-
-
-def test_words_that_are_not_known_are_no_error() -> None:
-    assert advise("of a later version", ALL[0]) == ""
-
-
-def test_harmonics_that_are_given_are_what_is_wrong_with_the_states() -> None:
-    given = Used("adaptive", "up", harmonics=1)
-    assert advise_error(0.05, [0.04, 0.0], given) == 'harmonics = "auto"'
-    # what comes later may be an error of the steps
-    assert advise_error(0.05, [0.005, 0.04], given) == "rtol = 0.002"
-
-
-def test_an_end_is_asked_for_that_is_none_yet() -> None:
-    assert advise("no_final_state", Used("implicit", "up")) == "Try an end in slow_time.cycles or slow_time.until."
-    assert "until" not in advise("no_final_state", Used("implicit", "up", until=True))
-    assert advise("no_final_state", Used("final", "up")).startswith("Try another scheme with an end")
-
-
 def test_settings_of_a_point_are_its_own() -> None:
     changes = ("axes.scheme=['implicit', 'explicit']", "axes.harmonics=['auto', 5]", "axes.rtol=[1e-2, 1e-3]")
     study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
@@ -106,11 +81,6 @@ def test_an_error_is_shown_on_its_side_of_rtol(error: float, rtol: float, text: 
     if error < 1.0:
         shown, limit = float(text.removesuffix(" %")), float(show_rtol(rtol).removesuffix(" %"))
         assert (shown <= limit) == (error <= rtol)
-
-
-def test_without_rtol_two_digits_are_enough() -> None:
-    assert show_percent(0.0100001) == "1 %"
-    assert show_percent(0.0100001, float("nan")) == "1 %"
 
 
 def test_what_is_not_finite_is_not_known() -> None:

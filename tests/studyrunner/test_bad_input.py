@@ -24,95 +24,52 @@ harmonics = 5
 """
 
 WRONG_KEYS = {
+    "key in place of a table": ("slow_time=3", "slow_time", "3", "table"),
+    "variables in one word": ("outputs.variables=default", "outputs.variables", '"default"', "list of names"),
+    "target 0": ("slow_time.until={wear_depth = 0.0}", "slow_time.until", "0.0", "above 0"),
+    "half a harmonic in a list": ("solver.harmonics=[1, 1.5]", "solver.harmonics", "1.5", "whole"),
+    "half a harmonic in a list of one": ("solver.harmonics=[1.5]", "solver.harmonics", "1.5", "whole"),
+    "descending pressures": ("wear.pressure=[2.0, 1.0]", "wear.pressure", "[2.0, 1.0]", "ascending"),
+    "negative factor": ("wear.factor=[[-1.0]]", "wear.factor", "-1.0", "0 or more"),
     "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
     "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
     "a name of the literature": ("axes.k_w=1", "axes.k_w", "1", "unknown key, give wear_coefficient"),
-    "a short name": ("axes.amplitude=1", "axes.amplitude", "1", "unknown key, give excitation_amplitude"),
-    "mu": ("scene.mu=0.4", "scene.mu", "0.4", "unknown key, give friction_coefficient"),
-    "a scene key as an axis": (
-        "axes.friction_coeff=1",
-        "axes.friction_coeff",
-        "1",
-        "give friction_coefficient",
-    ),
     "values for a key that is no axis": (
         "scene.mass=[1.0, 2.0]",
         "scene.mass",
         "[1.0, 2.0]",
         "the list as axes.mass",
     ),
-    "unknown scene key": ("scene.masss=1", "scene.masss", "1", "mass"),
-    "key in place of a table": ("slow_time=3", "slow_time", "3", "table"),
     "wrong type": ("axes.frequency=fast", "axes.frequency", '"fast"', "number"),
-    "boolean": ("axes.step=true", "axes.step", "true", "number"),
-    "text for a scene's number": ("scene.mass='1'", "scene.mass", '"1"', "number"),
     "NaN": ("axes.wear_coefficient=nan", "axes.wear_coefficient", "nan", "finite"),
-    "infinity": ("axes.excitation_amplitude=[1.0, inf]", "axes.excitation_amplitude", "inf", "finite"),
-    "NaN in the scene": ("scene.stiffness=nan", "scene.stiffness", "nan", "finite"),
     "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "greater than 0"),
-    "negative friction": ("scene.friction_coefficient=-0.1", "scene.friction_coefficient", "-0.1", "or equal to 0"),
     "frequency 0": ("axes.frequency=0", "axes.frequency", "0", "above 0"),
-    "negative frequency": ("axes.frequency=[1, -2]", "axes.frequency", "-2", "above 0"),
     "empty axis": ("axes.frequency=[]", "axes.frequency", "[]", "at least one"),
-    "empty word axis": ("axes.scheme=[]", "axes.scheme", "[]", "at least one"),
     "duplicates": ("axes.frequency=[1, 2, 1.0]", "axes.frequency", "1.0", "once"),
-    "duplicate words": ("axes.sweep=['up', 'up']", "axes.sweep", '"up"', "once"),
     "unfinished range": ("axes.frequency={start = 1, stop = 2}", "axes.frequency", "start", "{start, stop, num}"),
-    "empty range": ("axes.frequency={start = 1, stop = 2, num = 0}", "axes.frequency", "0", "at least 1"),
     "huge range": ("axes.frequency={start = 1, stop = 2, num = 1e9}", "axes.frequency", "1000000000.0", "at most"),
     "unknown word": ("axes.scheme=euler", "axes.scheme", '"euler"', "explicit"),
     "word for shortcuts": ("solver.shortcuts=no", "solver.shortcuts", '"no"', "true or false"),
-    "number for shortcuts": ("solver.shortcuts=1", "solver.shortcuts", "1", "true or false"),
-    "shortcuts as an axis": ("axes.shortcuts=true", "axes.shortcuts", "true", "unknown key"),
     "word for harmonics": ("solver.harmonics=automatic", "solver.harmonics", '"automatic"', 'or "auto"'),
-    "word for samples": ("solver.samples=many", "solver.samples", '"many"', 'or "auto"'),
-    "word for the tolerance": ("solver.tolerance=auto", "solver.tolerance", '"auto"', "number"),
-    "word for rtol": ("axes.rtol=['auto']", "axes.rtol", '"auto"', "number"),
-    "automatic in quotes twice": ("axes.harmonics=['auto', 3, 'auto']", "axes.harmonics", '"auto"', "once"),
     "half a harmonic": ("solver.harmonics=1.5", "solver.harmonics", "1.5", "whole"),
-    "no harmonic": ("solver.harmonics=0", "solver.harmonics", "0", "at least 1"),
     "too few samples": ("solver.samples=10", "solver.samples", "10", "at least 11"),
-    "too few samples on an axis": ("axes.samples=[8, 64]", "axes.samples", "8", "at least 11"),
-    "too few samples beside automatic ones": ("axes.samples=['auto', 10]", "axes.samples", "10", "at least 11"),
-    "half a harmonic in a list": ("solver.harmonics=[1, 1.5]", "solver.harmonics", "1.5", "whole"),
-    "half a harmonic in a list of one": ("solver.harmonics=[1.5]", "solver.harmonics", "1.5", "whole"),
-    "no harmonics": ("solver.harmonics=[]", "solver.harmonics", "[]", "at least one"),
-    "harmonics twice in a list": ("solver.harmonics=[3, 5, 3]", "solver.harmonics", "3", "once"),
-    "too few samples in a list": ("solver.samples=[8, 64]", "solver.samples", "8", "at least 11"),
-    "list of shortcuts": ("solver.shortcuts=[true, false]", "solver.shortcuts", "[True, False]", "true or false"),
     "tolerance 0": ("solver.tolerance=0", "solver.tolerance", "0", "between 0 and 1"),
-    "rtol": ("solver.rtol=2", "solver.rtol", "2", "between 0 and 1"),
     "rtol 0": ("axes.rtol=[0, 0.1]", "axes.rtol", "0", "between 0 and 1"),
-    "step 0": ("axes.step=0.0", "axes.step", "0.0", "above 0"),
     "negative cycles": ("slow_time.cycles=-1", "slow_time.cycles", "-1", "0 or more"),
     "descending outputs": ("slow_time.outputs=[2, 1]", "slow_time.outputs", "[2, 1]", "ascending"),
     "outputs beyond the end": ("slow_time.outputs=[0, 10]", "slow_time.outputs", "10.0", "at most"),
-    "no outputs": ("slow_time.outputs=[]", "slow_time.outputs", "[]", "ascending"),
-    "half an output": ("slow_time.outputs=2.5", "slow_time.outputs", "2.5", "whole"),
     "unknown law": ("wear.law=reye", "wear.law", '"reye"', '"archard" or "energy" or "threshold" or "table"'),
     "law without its key": ("wear.law=threshold", "wear.law", '"threshold"', "give wear.threshold beside it"),
     "key of another law": ("wear.threshold=1.0", "wear.threshold", "1.0", 'only the law "threshold"'),
-    "descending pressures": ("wear.pressure=[2.0, 1.0]", "wear.pressure", "[2.0, 1.0]", "ascending"),
-    "negative factor": ("wear.factor=[[-1.0]]", "wear.factor", "-1.0", "0 or more"),
     "factors in no rows": ("wear.factor=[1.0]", "wear.factor", "[1.0]", "rows"),
-    "word for a factor": ("wear.surfaces={support = 'x'}", "wear.surfaces", '"x"', "0 or more"),
     "factor of no surface": ("wear.surfaces={disk = 1.0}", "wear.surfaces", "disk", "of the surfaces support"),
     "target of what is not": ("slow_time.until={hours = 1}", "slow_time.until", "hours", "{wear_depth = ...}"),
     "two targets": ("slow_time.until={wear_depth = 1, worn_volume = 1}", "slow_time.until", "wear_depth", "one of"),
-    "target 0": ("slow_time.until={wear_depth = 0.0}", "slow_time.until", "0.0", "above 0"),
-    "depth 0": ("slow_time.largest_depth=0", "slow_time.largest_depth", "0", "above 0"),
     "unknown variable": ("outputs.variables=['wear']", "outputs.variables", '"wear"', "wear_depth"),
-    "default twice": ("outputs.variables=['default', 'tension', 'default']", "outputs.variables", '"default"', "once"),
-    "variables in one word": ("outputs.variables=default", "outputs.variables", '"default"', "list of names"),
     "a table among the variables": ("outputs.variables=[{a = 1}]", "outputs.variables", "{'a'", "default"),
     "harmonics of no computer": ("solver.harmonics=1e9", "solver.harmonics", "1000000000.0", "at most 1000"),
-    "samples of no computer": ("axes.samples=[64, 1e9]", "axes.samples", "1000000000.0", "at most 100000"),
-    "outputs of no computer": ("slow_time.outputs=1e18", "slow_time.outputs", "1e+18", "at most 1000000"),
     "loops": ("outputs.loops=0", "outputs.loops", "0", "list of contact indices"),
     "loops of a pair that is not there": ("outputs.loops=[0, 1]", "outputs.loops", "1", "from 0 to 0"),
-    "negative loop": ("outputs.loops=[-1]", "outputs.loops", "-1", "at least 0"),
-    "half a loop": ("outputs.loops=[0.5]", "outputs.loops", "0.5", "whole"),
-    "a loop twice": ("outputs.loops=[0, 0]", "outputs.loops", "0", "once"),
     "mesh of a scene without one": ("outputs.variables=['mesh']", "outputs.variables", '"mesh"', "has none"),
     "natural frequencies of nothing": (
         "outputs.variables=['natural_frequency']",
@@ -124,7 +81,6 @@ WRONG_KEYS = {
     "missing scene file": ("scene.model=missing.h5", "scene.model", "missing.h5", "no such file"),
     "scene is a number": ("scene.model=3", "scene.model", "3", "in quotes"),
     "name with a slash": ("study.name='a/b'", "study.name", "a/b", "slash"),
-    "empty name": ("study.name=''", "study.name", '""', "file name"),
 }
 
 
@@ -167,14 +123,6 @@ def test_loops_that_no_message_holds(folder: Path, capsys: pytest.CaptureFixture
     assert "1.2 GB" in line
 
 
-@pytest.mark.parametrize("option", [["--plan"], ["--write-scene", "s.h5"]])
-def test_nothing_is_planned_or_written_of_a_pair_that_is_not_there(
-    option: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    line = line_of(["s.toml", *option, "--set", "outputs.loops=[2]"], capsys)
-    assert "outputs.loops = 2" in line
-
-
 @pytest.mark.parametrize(
     ("removed", "key"),
     [
@@ -192,7 +140,7 @@ def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.Captur
     assert key in line
 
 
-@pytest.mark.parametrize("value", ["5", "[5]", "[5, 7]"])
+@pytest.mark.parametrize("value", ["5", "[5, 7]"])
 def test_solver_key_given_twice(value: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[slow_time]")
     text = text.replace("harmonics = 5", f"harmonics = {value}")
@@ -219,8 +167,6 @@ def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pyte
         (["unheard_of"], ("unheard_of", "dovetail")),
         (["."], (".", "folder")),
         (["s.toml", "--bogus"], ("command line", "--bogus", "--help")),
-        (["s.toml", "-o"], ("command line", "-o", "--help")),
-        (["s.toml", "more.toml"], ("command line", "more.toml")),
         (["s.toml", "--set", "axes.step"], ("command line", "--set", "axes.step", "KEY=VALUE")),
         (["s.toml", "--set", "axes.step=[1,"], ("command line", "axes.step", "[1,", "TOML")),
         (["s.toml", "--set", "axes.step=1\nb=2"], ("command line", "axes.step", "one TOML value")),
@@ -228,10 +174,8 @@ def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pyte
         (["s.toml", "-o", "."], ("command line", "-o", "folder")),
         (["s.toml", "-o", "nowhere/out.nc"], ("command line", "nowhere/out.nc", "folder that exists")),
         (["s.toml", "-o", "/dev/null"], ("command line", "/dev/null", "ordinary file")),
-        (["s.toml", "-o", "/proc/out.nc"], ("command line", "/proc/out.nc", "can be written")),
         (["s.toml", "-o", "x" * 300], ("command line", "-o", "can be written")),
         (["s.toml", "-o", "s.toml/out.nc"], ("command line", "folder that exists", "s.toml is no folder")),
-        (["s.toml", "-o", "/dev/stdout"], ("command line", "/dev/stdout", "ordinary file")),
         (["s.toml", "-o", "\udcff.nc"], ("command line", r"\udcff.nc", "give a name in UTF-8")),
         (["s.toml", "-o", "s.toml"], ("command line", "s.toml", "read by the run")),
         (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),
@@ -250,11 +194,3 @@ def test_write_protected_output(
 ) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert "write-protected" in line_of(["s.toml"], capsys)
-
-
-def test_scene_file_that_is_none(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "text.h5").write_text("no HDF5", encoding="utf-8")
-    (folder / "s.toml").write_text(STUDY.replace("sdof_slider", "text.h5"), encoding="utf-8")
-    line = line_of(["s.toml", "--set", "scene.friction_coefficient=0.1"], capsys)
-    assert "text.h5" in line
-    assert "HDF5" in line

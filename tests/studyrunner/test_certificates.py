@@ -98,30 +98,6 @@ def test_order_of_the_results_does_not_matter() -> None:
     assert summarise_certificates(study, shuffled) == forwards
 
 
-def test_nothing_special() -> None:
-    study, results = study_with_results()
-    table = table_of(study, results)
-    assert table["worst certificate of"] == "96 points computed to the end"
-    labels = ("folds in the sweeps", "jumps while wearing", "explicit steps too long", "oscillating wear rate")
-    for label in (*labels, "unstable states"):
-        assert table[label] == "none"
-
-
-def test_points_of_one_sweep_share_its_fold() -> None:
-    study, results = study_with_results()
-    sweep, harmonics = 5, 6
-    folded = [
-        changed(result, fold_frequency=157.5, branch=1)
-        if any((point[0], point[sweep], point[harmonics]) == (0, 1, 1) for point in result.points)
-        else result
-        for result in results
-    ]
-    assert sum(not np.isnan(result.values["fold_frequency"]) for result in folded) > 1
-    assert table_of(study, folded)["folds in the sweeps"] == "1, at 157.5 Hz"
-    both = [changed(result, fold_frequency=140.0) if result.points[0][sweep] == 0 else result for result in folded]
-    assert table_of(study, both)["folds in the sweeps"] == "7, at 140 Hz, 157.5 Hz"
-
-
 def test_jumps_oscillation_and_unstable_states_are_counted() -> None:
     study, results = study_with_results(("axes.frequency=[150, 160]", "axes.scheme=implicit", "slow_time.outputs=3"))
     results[0] = changed(results[0], jump_cycle=900.0)
@@ -145,25 +121,3 @@ def test_explicit_steps_beyond_their_limit_are_counted() -> None:
     study, results = study_with_results((*overrides, "slow_time.largest_depth=1e-6"))
     limited = [changed(result, step_limit=500.0) for result in results]
     assert table_of(study, limited)["explicit steps too long"] == "none"
-
-
-def test_no_point_was_computed() -> None:
-    study, results = study_with_results(("axes.frequency=150", "axes.scheme=implicit"))
-    table = table_of(study, [without_values(result, 4) for result in results])
-    assert table["worst certificate of"] == "0 points computed to the end"
-    assert table["scaled residual"] == "none"
-
-
-def test_estimates_that_were_not_made() -> None:
-    study, (result,) = study_with_results(("axes.frequency=150", "axes.scheme=implicit", "slow_time.outputs=2"))
-    missing = np.full(2, np.nan)
-    table = table_of(study, [changed(result, response_error=missing, residual=np.array([np.nan, 3e-9]))])
-    assert table["estimated error of the response"] == "not estimated"
-    assert table["scaled residual"] == "3.0e-09 at cycle 20000"
-
-
-def test_round_off_is_none_and_has_no_place() -> None:
-    study, (result,) = study_with_results(("axes.frequency=150", "axes.scheme=implicit", "slow_time.outputs=2"))
-    for tension, said in ((1.9e-23, "none"), (3e-9, "3.0e-09 at cycle 0")):
-        table = table_of(study, [changed(result, tension=np.full(2, tension))])
-        assert table["tension"] == said

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -11,7 +9,6 @@ import numpy as np
 import pytest
 
 from solver.model import ReducedModel
-from solver.packed_model import pack_model
 from solver.packing import Packed, pack
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
@@ -25,7 +22,6 @@ from studyrunner.study.study_file import read_study
 SCENES: dict[str, tuple[str, list[str]]] = {
     "sector": ("dovetail", ["scene.mesh=1"]),
     "travelling wave": ("dovetail", ["scene.mesh=1", "scene.nodal_diameter=3"]),
-    "half-space": ("cylinder_on_flat", []),
     "finite-element model": ("blade_root", []),
     "masses": ("two_masses", []),
 }
@@ -81,15 +77,6 @@ def key_of(study: Study) -> set[str]:
     return {computed_module._key("model", study, scene_module.harmonics_to_build(study))}
 
 
-@pytest.mark.parametrize(
-    "overrides", [["scene.mesh=2"], ["scene.rotation_speed=3000.0000000001"], ["solver.harmonics=21"]]
-)
-def test_another_scene_is_another_one(overrides: Sequence[str]) -> None:
-    own = ["scene.mesh=1"]
-    assert key_of(read_study("dovetail", own)) == key_of(read_study("dovetail", [*own, "axes.frequency=200"]))
-    assert key_of(read_study("dovetail", own)) != key_of(read_study("dovetail", [*own, *overrides]))
-
-
 def test_a_changed_file_or_source_makes_another_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = key_of(read_study("blade_root"))
     from studies.fe_models.from_files import scene as from_files
@@ -110,9 +97,3 @@ def test_what_is_no_model_is_built_again(wrong: Packed) -> None:
     kept[key] = wrong
     assert memory(build_study_scene(study, computed=kept)) == memory(built)
     assert kept[key] is not wrong
-
-
-def test_matrices_by_columns_are_not_kept() -> None:
-    model = build_study_scene(read_study("two_masses"))
-    turned = replace(model.linear[0], stiffness=np.asfortranarray(model.linear[0].stiffness))
-    assert pack_model(replace(model, linear={0: turned})) is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import netCDF4
@@ -10,7 +9,7 @@ import pytest
 
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.netcdf.creation_date import check_date, describe_date
+from studyrunner.netcdf.creation_date import check_date
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL, Solver
 
@@ -47,14 +46,6 @@ def test_a_wrong_date_is_bad_input(wrong: str, capsys: pytest.CaptureFixture[str
     assert list(Path().iterdir()) == []
     with pytest.raises(UserError, match="run_study: date"):
         run_study("sdof_slider", date=wrong)
-
-
-def test_now_is_a_moment_in_utc() -> None:
-    before = datetime.now(UTC) - timedelta(seconds=1)
-    text = describe_date("now")["date_created"]
-    assert text.endswith("Z")
-    assert before <= datetime.fromisoformat(text) <= datetime.now(UTC)
-    assert describe_date(None) == {}
 
 
 def test_a_date_changes_nothing_else(solver: Solver) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import pytest
 
 from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import AHEAD_SECONDS, WATCH_SECONDS, Dispatcher
+from studyrunner.mpi.dispatch import AHEAD_SECONDS, Dispatcher
 from studyrunner.plan.cost_model import CostModel
 
 
@@ -84,14 +83,6 @@ def test_nothing_waits_behind_a_long_task_or_a_row_of_results() -> None:
         assert len(handed_out(dispatcher)) == n_held
 
 
-def test_near_the_end_nobody_holds_two() -> None:
-    short = Job("a", 0.5 * AHEAD_SECONDS)
-    dispatcher, _ = make(3, *[short] * 6)
-    assert len(handed_out(dispatcher)) == 3
-    dispatcher, _ = make(3, *[short] * 9)
-    assert len(handed_out(dispatcher)) == 6
-
-
 def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """A branch does not go first where more waits than all ranks have use for."""
     monkeypatch.setattr(dispatch, "_WAITING", 10)
@@ -113,19 +104,6 @@ def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     assert most < 10 + 4
 
 
-def test_measured_times_change_the_order() -> None:
-    # After 16 measurements: a takes a tenth of what was said, and of b that is less certain.
-    jobs = [Job("a", 2.0)] * 30 + [Job("b", 1.9)] * 30
-    dispatcher, _ = make(1, *jobs)
-    kinds = []
-    for _ in range(20):
-        ((rank, number),) = handed_out(dispatcher)
-        kinds.append(jobs[number].kind)
-        dispatcher.deliver(rank, number, 0.2 if jobs[number].kind == "a" else 10.0)
-    assert kinds[:16] == ["a"] * 16
-    assert kinds[16:] == ["b"] * 4
-
-
 def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does() -> None:
     jobs = [Job("a", 2.0), *[Job("b", 2.0)] * 20, *[Job("a", 1.5)] * 20]
     dispatcher, clock = make(2, *jobs)
@@ -145,66 +123,6 @@ def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does() -> Non
     dispatcher.deliver(first[0], first[1], 2.0)
     assert costs.measured("a") == 2.0
     assert costs.correction((("all", "a"),)) < 2.0 < late
-
-
-def test_tasks_that_run_are_looked_at_now_and_then_only() -> None:
-    dispatcher, clock = make(1, *[Job("a", 0.1)] * 5)
-    handed_out(dispatcher)
-    clock.now = 0.9 * WATCH_SECONDS
-    dispatcher.watch()
-    assert dispatcher._costs.measured("a") == 0.0
-    clock.now = 1.1 * WATCH_SECONDS
-    dispatcher.watch()
-    assert dispatcher._costs.measured("a") == pytest.approx(2.2 * WATCH_SECONDS)
-
-
-def test_a_message_costs_the_same_with_any_number_of_ranks() -> None:
-    def seconds(n_ranks: int) -> float:
-        dispatcher, _ = make(n_ranks, *[Job("a", 1.0)] * (n_ranks + 3000))
-        busy = handed_out(dispatcher)
-        times = []
-        for _ in range(2000):
-            rank, number = busy.pop(0)
-            began = time.perf_counter()
-            dispatcher.deliver(rank, number, 1.0)
-            busy.extend(handed_out(dispatcher))
-            times.append(time.perf_counter() - began)
-        return sorted(times)[len(times) // 2]
-
-    assert seconds(20_000) < 20.0 * seconds(1)
-
-
-def test_a_correction_is_the_ratio_of_sums_with_the_parent_as_one_more() -> None:
-    costs = CostModel()
-    costs.learn((("all", "a"),), 1.0, 3.0)
-    costs.learn((("all", "a"),), 3.0, 5.0)
-    # mean estimate 2 s; the parent of "all" says 1: (8 + 2) / (4 + 2); that of "a" says 10 / 6.
-    of_all = 10.0 / 6.0
-    assert costs.correction((("all",),)) == pytest.approx(of_all)
-    assert costs.correction((("all", "a"),)) == pytest.approx((8.0 + 2.0 * of_all) / 6.0)
-    assert costs.correction((("all", "b"),)) == pytest.approx(of_all)
-    assert costs.correction((("other",),)) == 1.0
-
-
-def test_two_respects_multiply_and_are_told_apart() -> None:
-    costs = CostModel()
-    truth = {"cheap": 1.0, "dear": 8.0, "fine": 5.0, "coarse": 1.0}
-    for _ in range(200):
-        for place in ("cheap", "dear"):
-            for scheme in ("fine", "coarse"):
-                costs.learn(((place,), (scheme,)), 1.0, truth[place] * truth[scheme])
-    for place, scheme in (("cheap", "coarse"), ("dear", "fine")):
-        found = costs.correction(((place,), (scheme,)))
-        assert found == pytest.approx(truth[place] * truth[scheme], rel=0.1)
-
-
-def test_forgetting_takes_everything_back() -> None:
-    costs = CostModel()
-    cost_keys = (("all", "a"), ("scheme",))
-    costs.learn(cost_keys, 1.0, 3.0)
-    before = costs.correction(cost_keys)
-    costs.forget(costs.learn(cost_keys, 2.0, 70.0))
-    assert costs.correction(cost_keys) == pytest.approx(before)
 
 
 def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
@@ -234,18 +152,6 @@ def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
             dispatcher.add([task for task, _ in lost])
     assert n_done == 100
     assert len(holds) == 2
-
-
-def test_what_a_lost_rank_has_taught_by_being_late_is_forgotten() -> None:
-    jobs = [Job("a", 1.0), *[Job("b", 0.9)] * 20]
-    dispatcher, clock = make(1, *jobs)
-    handed_out(dispatcher)
-    costs = dispatcher._costs
-    clock.now += 1000.0 * WATCH_SECONDS
-    dispatcher.watch()
-    assert costs.correction(jobs[0].cost_keys) > 10.0
-    dispatcher.lose(0)
-    assert costs.correction(jobs[0].cost_keys) == 1.0
 
 
 def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from solver.model import ContactInterface, FloatArray
-from solver.outcome import Outcome
 from studies import build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.study.study_file import read_study
@@ -43,12 +42,6 @@ def test_a_structured_mesh_has_the_edge_of_its_rows_and_columns(side: float, ske
     assert found.tolist() == expected.ravel().tolist()
 
 
-def test_a_ring_has_an_edge_inside_and_outside() -> None:
-    radius, angle = np.meshgrid(np.arange(6.0, 13.0), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False), indexing="ij")
-    found = edge_pairs(contact_at(turned(radius * np.cos(angle), radius * np.sin(angle))))
-    assert np.count_nonzero(found != ((radius == 6.0) | (radius == 12.0)).ravel()) <= 1
-
-
 def test_an_unstructured_mesh_has_its_edge_and_its_hole() -> None:
     random, kept = np.random.default_rng(0), []
     for place in random.random((1500, 2)):
@@ -63,37 +56,11 @@ def test_an_unstructured_mesh_has_its_edge_and_its_hole() -> None:
     assert not found[(from_side > 0.08) & (from_hole > 0.08)].any()
 
 
-def test_every_surface_has_an_edge_of_its_own() -> None:
-    contact = build_scene("dovetail_sector").contact
-    by_row = edge_pairs(contact).reshape(2, 8, 3)
-    assert by_row[:, [0, -1]].all()
-    assert by_row[:, :, [0, -1]].all()
-    assert not by_row[:, 1:-1, 1].any()
-
-
 def test_a_scene_that_says_its_edge_is_believed() -> None:
     contact = build_scene("cylinder_on_flat", strips=12).contact
     assert edge_pairs(contact).tolist() == [False] * 5 + [True]
     # along a line the ends are the edge
     assert edge_pairs(replace(contact, edge=None)).tolist() == [True] + [False] * 4 + [True]
-
-
-def test_nothing_is_said_of_what_is_all_edge_or_not_known_or_not_flat() -> None:
-    angle, z = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False), np.arange(5.0), indexing="ij")
-    pin = turned(np.cos(angle), np.sin(angle), z)
-    two_rows = turned(*np.meshgrid(np.arange(6.0), np.arange(2.0), indexing="ij"))
-    unknown = np.full((9, 3), np.nan)
-    one_place = np.zeros((4, 3))
-    for position in (pin, two_rows, unknown, one_place, one_place[:1], two_rows[:2]):
-        assert not edge_pairs(contact_at(position)).any()
-
-
-def test_pairs_at_one_place_are_alike() -> None:
-    i, j = np.meshgrid(np.arange(5.0), np.arange(5.0), indexing="ij")
-    places = turned(i, j)
-    found = edge_pairs(contact_at(np.concatenate([places, places])))
-    assert found[:25].tolist() == found[25:].tolist()
-    assert found.sum() == 32
 
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=adaptive", "outputs.variables=['wear_depth']")
@@ -142,13 +109,3 @@ def test_the_surface_with_most_at_its_edge_is_named() -> None:
         (LABEL, "up to 20 % of the wear of left (50 % of its area), at 211.25 Hz")
     ]
     assert row_of([0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) == [(LABEL, "none")]
-
-
-def test_a_surface_that_hardly_wears_and_points_that_failed_have_no_say() -> None:
-    assert row_of([1e-3, 0.0, 0.0, 0.0, 1.0, 0.0]) == [(LABEL, "none")]
-    assert row_of([3.0, 1.0, 1.0, 0.0, 3.0, 0.0], at=int(Outcome.CONTACT_CUT_OFF)) == [(LABEL, "none")]
-
-
-def test_without_edges_there_is_no_row() -> None:
-    assert row_of([3.0, 1.0, 1.0, 0.0, 3.0, 0.0], edge=None) == []
-    assert row_of([3.0, 1.0, 1.0, 0.0, 3.0, 0.0], edge=np.zeros(6, bool)) == []

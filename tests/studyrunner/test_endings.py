@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from studyrunner.system import endings
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending, take_endings, uninterrupted
 
 ROOT = Path(__file__).parents[2]
@@ -91,22 +90,6 @@ def test_an_ending_that_a_library_has_lost_is_raised_again(end: Callable[[], Non
         raise_ending()
 
 
-def test_one_more_ends_the_process_at_once_after_a_while(
-    end: Callable[[], None], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    ended: list[int] = []
-    monkeypatch.setattr(endings.os, "_exit", ended.append)
-    endings.say_at_last("the last words")
-    with pytest.raises(KeyboardInterrupt):
-        end()
-    end()
-    assert not ended
-    monkeypatch.setattr(endings, "SECONDS_OF_GRACE", 0.0)
-    end()
-    assert ended == [130]
-    assert capfd.readouterr().err == "the last words\n"
-
-
 def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[], None]) -> None:
     done = []
 
@@ -144,7 +127,6 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(
         pass
 
 
-@pytest.mark.slow
 def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", WRITER], cwd=ROOT, capture_output=True, text=True, timeout=200.0, check=False

@@ -49,10 +49,6 @@ def lines_of(
     return lines
 
 
-def test_nothing_is_said_of_points_to_tolerance() -> None:
-    assert lines_of({}) == ()
-
-
 def test_point_cycle_and_error_are_named() -> None:
     message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
     assert lines_of({(1, 1): INACCURATE}, {(1, 1): message}) == (
@@ -85,13 +81,6 @@ def test_points_that_were_computed_otherwise_have_advice_of_their_own() -> None:
     ]
 
 
-def test_outcomes_in_their_order_and_points_in_that_of_the_file() -> None:
-    found = lines_of({(2, 1): MARCH_FAILED, (0, 0): INACCURATE, (2, 0): MARCH_FAILED}, {(0, 0): "why"})
-    heads = [line.split(":")[0] for line in found]
-    reached = ["  212.5 Hz, implicit", "  212.5 Hz, explicit"]
-    assert heads == ["2 x march_failed", *reached, "1 x inaccurate", "  210 Hz, implicit"]
-
-
 def test_no_more_than_some_are_named() -> None:
     many = "axes.frequency=" + str(list(range(100, 125)))
     outcomes = {(place, 0): INACCURATE for place in range(20)}
@@ -102,18 +91,3 @@ def test_no_more_than_some_are_named() -> None:
     both = lines_of(outcomes | {(22, 0): MARCH_FAILED}, None, many, "axes.scheme=implicit")
     assert len(both) == 1 + 1 + 1 + MOST_NAMED // 2 + 1
     assert both[-1] == f"  and {20 - MOST_NAMED // 2} more"
-
-
-def test_a_study_of_one_point_says_what_is_there_to_say() -> None:
-    one = ("axes.frequency=100", "axes.scheme=implicit")
-    assert lines_of({(0, 0): INACCURATE}, {(0, 0): "why"}, *one)[1:] == ("  why",)
-    assert lines_of({(0, 0): INACCURATE}, None, *one)[1:] == ()
-
-
-def test_nodal_diameters_are_spoken_of_where_the_scene_lacks_them_only() -> None:
-    inaccurate, failed = {(0, 0): INACCURATE}, {(0, 0): MARCH_FAILED}
-    assert "nodal diameters" not in lines_of(inaccurate)[0]
-    assert "nodal diameters of 13 harmonics" in lines_of(inaccurate, largest_harmonics=13)[0]
-    assert "nodal diameters" not in lines_of(failed, largest_harmonics=13)[0]
-    given = lines_of(inaccurate, None, *GRID, "solver.harmonics=3", largest_harmonics=13)
-    assert "nodal diameters" not in given[0]

@@ -23,27 +23,20 @@ from tests.studyrunner.reading_process import ReadingProcess
 # all files but those of the command alone
 pytestmark = pytest.mark.usefixtures("reader")
 
-IN_A_RESULT = (
-    *("huge matrix", "bomb within the limit", "inflating chunk", "external link", "circle of groups"),
-    *("many objects", "virtual dataset", "ragged rows", "long name", "not a number", "attribute of text"),
-)
+IN_A_RESULT = (*("huge matrix", "inflating chunk", "external link", "many objects", "not a number"),)
 """One of each kind of harm: behind this door is the same reader of scenes."""
 
-STUDIES_IN_A_RESULT = ("nested arrays", "dotted key", "huge integer", "escape sequence in a key", "points without end")
-"""The same for texts of studies."""
-
 VALUES_ONLY = {
-    *("huge matrix", "huge vector", "bomb of zeros", "bomb within the limit", "huge extent without storage"),
-    *("64 bit overflow", "name with a path", "label with an escape sequence", "not a number", "infinite", "denormal"),
-    *("next to the largest", "denormal area", "wrong byte order", "huge number of sectors", "long texts", "objects"),
+    *("huge matrix", "bomb of zeros", "64 bit overflow", "label with an escape sequence", "not a number"),
     *(
-        "infinite number of sectors",
-        "attribute of text",
-        "attribute of another type",
-        "fixed texts",
-        "circle of groups",
+        "bomb within the limit",
+        "denormal area",
+        "next to the largest",
+        "wrong byte order",
+        "huge number of sectors",
+        "long texts",
     ),
-    "name with an escape sequence",
+    *("objects", "attribute of text", "circle of groups", "name with an escape sequence"),
 }
 """No harm to a program that reads parts of what it knows."""
 
@@ -130,7 +123,6 @@ def put_scene_into_result() -> None:
             pytest.skip("the library cannot copy it")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", IN_A_RESULT)
 def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -139,7 +131,6 @@ def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
     assert not line or "result: " in line
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
 def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     check_result_file(folder / "result", "result")
@@ -151,14 +142,6 @@ def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     assert str(caught.value).isprintable()
 
 
-def test_damaged_result_file_for_those_who_open_it(folder: Path) -> None:
-    content = (folder / "result").read_bytes()
-    for share in (0.0, 0.01, 0.5, 0.99):
-        (folder / "result").write_bytes(content[: int(share * len(content))])
-        with pytest.raises(UserError, match="give a result file"):
-            check_result_file(folder / "result", "result")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("case", TEXTS)
 def test_study_file(case: str, folder: Path, refused: Refused) -> None:
@@ -166,18 +149,8 @@ def test_study_file(case: str, folder: Path, refused: Refused) -> None:
     refused(["study", "--plan"])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", STUDIES_IN_A_RESULT)
-def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
-    with h5py.File("result", "r+", libver="latest") as result:
-        del result.attrs["study"]
-        result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))
-    (folder / "scene.h5").unlink()
-    refused(["result", "--plan"])
-
-
 @pytest.mark.parametrize("place", ["study", "scene.h5", "result"])
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.999])
+@pytest.mark.parametrize("share", [0.3])
 def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> None:
     content = (folder / place).read_bytes()
     (folder / place).write_bytes(content[: int(share * len(content))])
@@ -185,6 +158,7 @@ def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> 
     refused(["result" if place == "result" else "study", "--plan"], allowed=place == "study" and share > 0.99)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
 def test_sparse_terabyte(place: str, folder: Path, refused: Refused) -> None:
     sparse_file(folder / place)
@@ -230,3 +204,13 @@ def test_the_command_alone(case: str, folder: Path) -> None:
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) == (status == 2)
     assert 1024 * largest < LARGEST
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["nested arrays", "escape sequence in a key"])
+def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
+    with h5py.File("result", "r+", libver="latest") as result:
+        del result.attrs["study"]
+        result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))
+    (folder / "scene.h5").unlink()
+    refused(["result", "--plan"])

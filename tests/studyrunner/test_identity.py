@@ -92,23 +92,6 @@ def test_what_changes_a_history_only_leaves_its_start_state(changes: dict[str, s
     assert before[1] != after[1]
 
 
-def test_loops_of_another_pair_are_not_those() -> None:
-    """As many of them, so the records look the same."""
-    assert hashes(outputs__loops="[0]")[POINT][1] != hashes(outputs__loops="[1]")[POINT][1]
-
-
-@pytest.mark.parametrize(
-    ("point", "changes"),
-    [
-        ((155.0, 10.0, 2e-11, 100.0), {"axes__wear_coefficient": "[2e-11]"}),
-        ((155.0, 10.0, 1e-11, 50.0), {"axes__step": "[50]"}),
-        ((155.0, 11.0, 1e-11, 100.0), {"axes__excitation_amplitude": "[11]"}),
-    ],
-)
-def test_values_of_a_point_are_in_its_hash(point: tuple[float, ...], changes: dict[str, str]) -> None:
-    assert hashes(**changes)[point][1] != hashes()[POINT][1]
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -147,17 +130,6 @@ def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.parametrize("sweep", ["up", "down", "ramp"])
-def test_a_start_state_is_known_by_its_own_frequency(sweep: str) -> None:
-    """Whatever others are asked for, so that another study takes it over."""
-    few, many = (
-        {where[0]: start for where, (start, _) in hashes(axes__sweep=f"['{sweep}']", axes__frequency=text).items()}
-        for text in ("[150, 155]", "[140, 150, 152.5, 155, 190]")
-    )
-    assert len(set(many.values())) == 5
-    assert few == {frequency: many[frequency] for frequency in few}
-
-
 def test_all_points_have_hashes_of_their_own() -> None:
     changes = {
         "axes__excitation_amplitude": "[9, 10]",
@@ -171,29 +143,6 @@ def test_all_points_have_hashes_of_their_own() -> None:
     assert len({history for _, history in found}) == len(found) > 100
     starts = {start for start, _ in found}
     assert len(starts) == 3 * 2 * 3 * 2
-
-
-def test_a_history_that_is_read_from_another_one_is_not_one_of_its_own() -> None:
-    """It differs in the last bits."""
-    changes = {"axes__scheme": "['adaptive']", "axes__wear_coefficient": "[1e-12, 1e-11]"}
-    both = hashes(**changes)
-    alone = hashes(**changes, solver__shortcuts="false")
-    read, own = (155.0, 10.0, 1e-12, 100.0), (155.0, 10.0, 1e-11, 100.0)
-    assert both[own] == alone[own]
-    assert both[read][0] == alone[read][0]
-    assert both[read][1] != alone[read][1]
-
-
-def test_the_step_matters_to_those_who_take_it_only() -> None:
-    for scheme, largest, matters in (
-        ("implicit", None, True),
-        ("explicit", None, True),
-        ("explicit", "1e-6", False),
-        ("adaptive", None, False),
-    ):
-        more = {"axes__scheme": f"['{scheme}']", **({"slow_time__largest_depth": largest} if largest else {})}
-        one, other = (hashes_of_all(**more, axes__step=step) for step in ("[100]", "[200]"))
-        assert (one != other) is matters
 
 
 def plan_and_identities() -> tuple[TaskPlan, Identities]:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import h5py
 import pytest
 import xarray as xr
 
-from solver.outcome import Outcome
 from studyrunner.cli import main
 from studyrunner.netcdf.provenance import POINTS_LEFT
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
@@ -50,31 +48,6 @@ def test_a_finished_result_is_not_replaced_by_less(
         assert result.attrs[POINTS_LEFT] == 0
 
 
-def test_an_unfinished_result_is_replaced_by_any(solver: Solver) -> None:
-    solver.disturb = interrupt
-    assert main(APART) == 130
-    with xr.open_dataset("out.nc") as result:
-        n_left = int((result.outcome == Outcome.NOT_COMPUTED).sum())
-        assert 0 < n_left <= N_POINTS
-        assert result.attrs[POINTS_LEFT] == n_left
-    solver.begin_again()
-    solver.disturb = interrupt
-    assert main(VARIANT) == 130
-    with xr.open_dataset("out.nc") as result:
-        assert result.excitation_amplitude == 11
-
-
-def test_a_result_of_an_earlier_version_counts_as_finished(solver: Solver) -> None:
-    assert main(APART) == 0
-    with h5py.File("out.nc", "r+") as file:
-        del file.attrs[POINTS_LEFT]
-    before = Path("out.nc").read_bytes()
-    solver.begin_again()
-    solver.disturb = interrupt
-    assert main(VARIANT) == 130
-    assert Path("out.nc").read_bytes() == before
-
-
 @pytest.mark.slow
 def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert main(APART) == 0
@@ -88,17 +61,6 @@ def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert main(VARIANT) == 0
     assert solver.tasks == []
     assert main(APART) == 0
-    assert len(solver.tasks) > N_POINTS
-
-
-@pytest.mark.slow
-def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
-    assert main(APART) == 0
-    assert main([*VARIANT, "--fresh"]) == 0
-    solver.begin_again()
-    assert main(APART) == 0
-    assert solver.tasks == []
-    assert main([*APART, "--fresh"]) == 0
     assert len(solver.tasks) > N_POINTS
 
 
@@ -127,11 +89,6 @@ def test_a_file_of_something_else_is_not_overwritten(
     assert solver.tasks == []
 
 
-def test_an_empty_file_is_nobodys(solver: Solver) -> None:
-    Path("out.nc").touch()
-    assert main(APART) == 0
-
-
 def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Path) -> None:
     """Also with the number of this process, as in containers, where all have the same."""
     for name in (f".out.nc.{os.getpid()}.partial", ".out.nc.4711.partial", ".out.nc.0123456789ab.partial"):
@@ -143,3 +100,14 @@ def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Pat
     left = {path.name for path in folder.iterdir()}
     foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
     assert left == {"out.nc", "out.nc.progress", *foreign}
+
+
+@pytest.mark.slow
+def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
+    assert main(APART) == 0
+    assert main([*VARIANT, "--fresh"]) == 0
+    solver.begin_again()
+    assert main(APART) == 0
+    assert solver.tasks == []
+    assert main([*APART, "--fresh"]) == 0
+    assert len(solver.tasks) > N_POINTS

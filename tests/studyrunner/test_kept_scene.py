@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -13,7 +12,6 @@ import pytest
 import xarray as xr
 
 from studies.scene_file import read_scene
-from studies.scenes import build_scene
 from studyrunner.cli import main
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.scene import build_study_scene, describe_scene
@@ -82,24 +80,6 @@ def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], 
 
 
 @pytest.mark.slow
-def test_other_parameters_build_the_scene_anew() -> None:
-    start = ["--set", "slow_time.cycles=0", "--set", "axes.frequency=150"]
-    assert main(["sdof_slider", *start, *KEEP, "-o", "kept.nc"]) == 0
-    before = read_study("kept.nc")
-    assert (before.scene.path, before.scene.group, before.scene.is_bundled) == (Path("kept.nc"), "scene", True)
-    assert read_study("kept.nc", ["outputs.scene=false"]).scene.path is None
-    heavy = read_study("kept.nc", ["scene.mass=0.11"])
-    assert heavy.scene.path is None
-    expected = build_scene("sdof_slider", heavy.scene.parameters, 5)
-    assert describe_scene(build_study_scene(heavy)).digest == describe_scene(expected).digest
-    assert main(["kept.nc", "--set", "scene.mass=0.11", "-o", "heavy.nc"]) == 0
-    with netCDF4.Dataset("heavy.nc") as file:
-        assert file["scene/mass"][-1, -1] == 0.11
-    # another study altogether takes nothing from the file
-    assert read_study("kept.nc", ["scene={model = 'two_masses'}"]).scene.path is None
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("wave", [(), ("scene.nodal_diameter=3", "scene.n_sectors=20")], ids=["standing", "travelling"])
 def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave: tuple[str, ...], not_built: Callable[[], None]) -> None:
     coarse = ("scene.mesh=1", "scene.stuck_modes=5", "axes.frequency=211.5", "slow_time.cycles=0", "outputs.scene=true")
@@ -120,10 +100,3 @@ def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave: tuple[str, ...], 
         assert "mesh/quad" in file
         assert set(file.get("nd", ())) == ({str(number) for number in model.linear} if wave else set())
         assert not wave or {0, 3, 6} <= set(model.linear)
-
-
-def test_it_is_yes_or_no(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sdof_slider", "--set", "outputs.scene=some"]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1
-    assert "outputs.scene" in said[0]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.results.loops import LOOP_PHASES, loop_phases
+from solver.results.loops import LOOP_PHASES
 from studyrunner import variables
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
@@ -21,7 +21,6 @@ from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
-AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 
 
 def wide(n_contact: int) -> SceneFacts:
@@ -56,27 +55,6 @@ def write(tmp_path: Path) -> Callable[[int, str], Path]:
     return write_file
 
 
-def test_both_sides_have_the_same_phases() -> None:
-    assert variables.LOOP_PHASES == LOOP_PHASES
-
-
-def test_loops_are_labelled(write: Callable[[int, str], Path]) -> None:
-    with xr.open_dataset(write(5, "[3, 1]")) as result:
-        assert result.phase.values.tolist() == loop_phases().tolist()
-        assert result.component.values.tolist() == ["normal", "tangent_1", "tangent_2"]
-        assert result.phase.attrs["units"] == "rad"
-        for name, units in (("loop_displacement", "m"), ("loop_force", "N")):
-            loop = result[name]
-            assert loop.dims == (*AXES, "cycle", "contact", "phase", "component")
-            assert loop.attrs["units"] == units
-            assert loop.shape[-4:] == (3, 5, LOOP_PHASES, 3)
-            there = loop.sel(frequency=150.0).squeeze().notnull().any(["cycle", "phase", "component"])
-            assert there.values.tolist() == [False, True, False, True, False]
-            assert loop.sel(frequency=160.0).isnull().all()
-            assert loop.sel(frequency=150.0, contact=[1, 3]).notnull().all()
-        assert "contact_area" in result.loop_force.coords
-
-
 def test_pairs_without_loops_take_no_room(write: Callable[[int, str], Path]) -> None:
     files = {
         (n_contact, loops): write(n_contact, loops).stat().st_size
@@ -90,12 +68,6 @@ def test_pairs_without_loops_take_no_room(write: Callable[[int, str], Path]) -> 
     # what loops add does not grow with the pairs: a chunk takes more than this in the index of the file alone
     added = [files[n_contact, "[1]"] - files[n_contact, "[]"] for n_contact in (3, 300)]
     assert abs(added[1] - added[0]) < 16 * 2 * (300 - 3)
-
-
-def test_without_loops_there_are_no_such_names(write: Callable[[int, str], Path]) -> None:
-    with xr.open_dataset(write(5, "[]")) as result:
-        assert not {"loop_force", "loop_displacement", "phase", "component"} & set(result.variables)
-        assert not {"phase", "component"} & set(result.sizes)
 
 
 @pytest.mark.slow

@@ -72,17 +72,6 @@ def test_a_branch_goes_on_behind_what_it_has_given(completion: CompletionIndex) 
     assert_finished(progress, completion)
 
 
-def test_a_march_gives_all_its_histories_again(completion: CompletionIndex) -> None:
-    progress, _, marches = begin(completion, 5)
-    march = next(task for task in marches if task.n_results > 1)
-    progress.take(march, fake_march(march))
-    completion.keep(march, Packed("progress", (np.ones(3),)))
-    (again,) = progress.take_back([(march, march.n_results - 1)], {})
-    assert (again, again.resume is not None) == (march, True)
-    finish(progress, [again, *(task for task in marches if task != march)])
-    assert_finished(progress, completion)
-
-
 @pytest.mark.parametrize("earlier", [0, 1])
 def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion: CompletionIndex) -> None:
     progress, _, (first, crashed, *others) = begin(completion, 5)
@@ -97,21 +86,6 @@ def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion:
     finish(progress, [again, *others])
     assert_finished(progress, completion)
     assert len(completion.store.with_outcome({Outcome.CRASHED.meaning})) == crashed.n_results
-
-
-def test_a_branch_that_crashed_twice_ends_there(completion: CompletionIndex) -> None:
-    """What it has computed before and not yet sent is computed again."""
-    progress, branch, marches = begin(completion, 2)
-    (again,) = progress.take_back([(branch, 3)], {branch.key: Crash(branch.key, branch.order[3], "Aborted")})
-    assert isinstance(again, BranchTask)
-    assert again.order_left == branch.order[2:]
-    (again,) = progress.take_back([(branch, 3)], {branch.key: Crash(branch.key, branch.order[3], "Aborted")})
-    assert isinstance(again, BranchTask)
-    assert again.order_left == (branch.order[2],)
-    finish(progress, [again, *marches])
-    completion.store.flush()
-    assert progress.n_points == completion.n_points_finished == completion.plan.n_points
-    assert progress.n_starts_left == 0
 
 
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import subprocess
 import sys
 import time
@@ -14,24 +13,17 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from solver.outcome import Outcome, describe_error
+from solver.outcome import Outcome
 from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
+from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.system.machine_faults import is_fault_of_machine, tells_of_machine
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
 pytestmark = pytest.mark.usefixtures("folder")
 
-FAULTS = [
-    OSError(122, "Disk quota exceeded"),
-    MemoryError(),
-    pickle.UnpicklingError("pickle data was truncated"),
-    EOFError("Ran out of input"),
-    PermissionError(13, "Permission denied"),
-]
+FAULTS = [OSError(122, "Disk quota exceeded"), MemoryError()]
 
 
 def load() -> xr.Dataset:
@@ -86,15 +78,6 @@ def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) 
         xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
 
 
-def test_what_the_solver_says_of_an_error_tells_which_it_was() -> None:
-    for error in FAULTS:
-        assert is_fault_of_machine(error)
-        assert tells_of_machine(describe_error(error))
-    for error in (ZeroDivisionError("OSError"), ValueError("MemoryError: no"), FloatingPointError("x")):
-        assert not is_fault_of_machine(error)
-        assert not tells_of_machine(describe_error(error))
-
-
 def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself, whose histories break off in their midst."""
     from solver.wear.wearing_joint import WearingJoint
@@ -146,25 +129,6 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
     assert {rank for rank, _ in dispatcher.assign()} == {2}
 
 
-def test_a_task_that_broke_off_teaches_nothing_of_those_like_it(
-    solver: Solver, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own, measurements = CostModel.learn, []
-
-    def learn(self: CostModel, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:
-        measurements.append(measured)
-        return own(self, cost_keys, estimated, measured)
-
-    monkeypatch.setattr(CostModel, "learn", learn)
-    assert main([*SMALL[:-1], "whole.nc"]) == 0
-    n_whole = len(measurements)
-    solver.begin_again()
-    measurements.clear()
-    solver.disturb = failing(FAULTS[0], 1, MarchTask)
-    assert main(SMALL) == 0
-    assert len(measurements) == n_whole > 0
-
-
 KERNELS = """
 from studyrunner.system.machine_faults import guard_kernel_cache
 guard_kernel_cache()
@@ -200,12 +164,3 @@ def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], fol
         path.write_bytes(path.read_bytes()[:-20])
         assert kernel() == "6.0 0"
         assert kernel() == "6.0 1"
-
-
-@pytest.mark.slow
-def test_kernels_without_a_place_for_their_cache_are_compiled_all_the_same(
-    kernel: Callable[[], str], folder: Path
-) -> None:
-    # a file in place of the folder
-    (folder / "cache").write_text("no folder", encoding="utf-8")
-    assert kernel().startswith("6.0")

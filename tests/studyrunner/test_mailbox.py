@@ -6,8 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from studyrunner.system.mailbox import Mailbox
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +36,6 @@ os._exit(0)
 """
 
 
-@pytest.mark.slow
 def test_a_wait_that_signals_interrupt_past_its_deadline_ends() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", BUSY], cwd=ROOT, capture_output=True, text=True, timeout=100, check=False

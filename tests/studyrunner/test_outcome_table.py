@@ -41,17 +41,6 @@ def test_a_row_for_each_wear_coefficient_and_a_column_for_each_excitation() -> N
     ]
 
 
-def test_without_cycles_no_worn_volume_is_counted() -> None:
-    rows = rows_of({}, "slow_time.cycles=0")
-    assert rows[0][0] == "outcomes"
-    assert rows[1][1] == "2 converged                | 2 converged"
-
-
-def test_what_is_not_computed_is_counted_as_such() -> None:
-    texts = " ".join(text for _, text in rows_of({}, n_left_out=1))
-    assert texts.count("1 converged, 1 not_computed") == 1
-
-
 def test_every_point_is_counted_once() -> None:
     def pick(point: Index) -> int:
         return sum(point) % 5

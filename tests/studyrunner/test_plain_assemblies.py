@@ -8,42 +8,10 @@ import xarray as xr
 
 from studies.finite_element.elements.solid_mesh import Material
 from studyrunner.cli import main
-from studyrunner.scene.scene import build_study_scene
-from studyrunner.study.study_file import read_study
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set
-from tests.studies.static_contact import solve_static_contact
 
 MM_STEEL = Material(210e3, 0.3, 7.8e-9)  # MPa, t/mm3
-
-STRAP = """
-[study]
-name = "strap"
-
-[scene]
-model = "strap.inp"
-units = "mm-t-s"
-load = {set = "END", direction = [1, 0, 0]}
-response = {end = {set = "END", direction = [1, 0, 0]}}
-preload = [
-  {set = "BOLT_A", direction = [0, 0, -1], force = 500.0},
-  {set = "BOLT_B", direction = [0, 0, -1], force = 300.0},
-]
-
-[axes]
-frequency = 200.0
-wear_coefficient = 1e-9
-excitation_amplitude = 100.0
-
-[slow_time]
-cycles = 1e4
-outputs = 3
-
-[solver]
-harmonics = "auto"
-samples = "auto"
-rtol = 5e-2
-"""
 
 CYLINDER = """
 [study]
@@ -81,35 +49,6 @@ def face_set(mesh, name, inside):
     return [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(*faces_where(mesh, inside), strict=True))]
 
 
-def strap_deck():
-    """A strap 60 x 20 x 6 mm of quadratic tetrahedra on two lugs of hexahedra, bolted down at both."""
-    lugs = [
-        block("C3D8I", (2, 2, 1), lambda points, at=at: points * [20.0, 20.0, 10.0] + [at, 0.0, -10.0], MM_STEEL)[0]
-        for at in (0.0, 40.0)
-    ]
-    strap, _ = block("C3D10", (3, 1, 1), lambda points: points * [60.0, 20.0, 6.0], MM_STEEL)
-    mesh = joined(joined(*lugs), strap)
-    x, _, z = mesh.coordinates.T
-    of_strap = np.arange(mesh.n_nodes) >= mesh.n_nodes - strap.n_nodes
-    a, b, level = x < 20.0 + 1e-6, x > 40.0 - 1e-6, np.abs(z) < 1e-6
-    sets = {
-        "GROUND": z < -10.0 + 1e-6,
-        "BOLT_A": (z > 6.0 - 1e-6) & (np.abs(x - 10.0) < 1e-6),
-        "BOLT_B": (z > 6.0 - 1e-6) & (np.abs(x - 50.0) < 1e-6),
-        "END": of_strap & (x > 60.0 - 1e-6),
-    }
-    lines = deck_lines(mesh)
-    for name, inside in sets.items():
-        lines += node_set(name, mesh.numbers[inside])
-    for name, inside in (("A", a), ("B", b)):
-        lines += face_set(mesh, f"FOOT_{name}", of_strap & level & inside)
-        lines += face_set(mesh, f"LUG_{name}", ~of_strap & level & inside)
-    for name, friction in (("A", 0.3), ("B", 0.1)):
-        lines += [f"*SURFACE INTERACTION, NAME=I{name}", "*FRICTION", f"{friction}, 1e5"]
-        lines += [f"*CONTACT PAIR, INTERACTION=I{name}, TYPE=SURFACE TO SURFACE", f"FOOT_{name}, LUG_{name}"]
-    return "\n".join([*lines, "*BOUNDARY", "GROUND, 1, 3"]) + "\n"
-
-
 def cylinder_deck(radius=10.0, n=16):
     """The lowest part of a cylinder on a block, in plane strain: one layer of elements that is held along the axis."""
 
@@ -143,8 +82,6 @@ def cylinder_deck(radius=10.0, n=16):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "strap.toml").write_text(STRAP)
-    (tmp_path / "strap.inp").write_text(strap_deck())
     (tmp_path / "cylinder.toml").write_text(CYLINDER)
     (tmp_path / "cylinder.inp").write_text(cylinder_deck())
     return tmp_path
@@ -155,39 +92,6 @@ def run(name, *overrides):
     assert main([f"{name}.toml", *words, "-o", f"{name}.nc"]) == 0
     with xr.open_dataset(f"{name}.nc") as result:
         return result.load().squeeze()
-
-
-@pytest.mark.slow
-def test_strap_on_two_lugs(folder):
-    result = run("strap")
-    at_a = (result.contact_surface == "FOOT_A-LUG_A").values
-    assert at_a.sum() == 9
-    model = build_study_scene(read_study("strap.toml"))
-    friction = model.contact.friction_coefficient
-    assert friction.tolist() == np.where(at_a, 0.3, 0.1).tolist()
-    # a force along x at half the height, 3 mm: none in the mean
-    normal = (result.mean_pressure * result.contact_area).isel(cycle=0).values
-    x, y = result.contact_x.values, result.contact_y.values
-    assert normal.sum() == pytest.approx(800.0, rel=1e-6)
-    assert normal @ x == pytest.approx(500.0 * 0.01 + 300.0 * 0.05, rel=1e-4)
-    assert normal @ y == pytest.approx(800.0 * 0.01, rel=1e-4)
-    # B slips at 30 N, A holds 150 N
-    wear = result.wear_depth.isel(cycle=-1).values
-    assert wear[~at_a].min() > 2.0 * wear[at_a].max()
-    volume = result.worn_volume.values
-    assert 0.0 < volume[1] < volume[2]
-    assert result.outcome == 0
-    assert result.error_estimate < 0.06
-
-
-@pytest.mark.slow
-def test_static_forces_are_those_of_another_solution(folder):
-    """Pair by pair, where the excitation is next to nothing."""
-    result = run("strap", *NEXT_TO_NOTHING)
-    model = build_study_scene(read_study("strap.toml"))
-    force = solve_static_contact(model, model.contact.friction_coefficient)
-    normal = (result.mean_pressure * result.contact_area).values
-    assert normal == pytest.approx(force[:, 0], abs=1e-3 * force[:, 0].max())
 
 
 @pytest.mark.slow

@@ -7,12 +7,9 @@ import itertools
 import re
 import time
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from rich.console import Console
 
 from studyrunner import run
@@ -68,56 +65,6 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
     assert 2.0 - 1e-6 <= min(gaps) <= max(gaps) <= 30.2
     # not more often than that either
     assert len(lines) < 3600 / 30 + 12
-
-
-def test_what_came_before_the_tasks_does_not_count(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
-    with ProgressDisplay() as shown:
-        shown.say("finding the natural frequencies")
-        clock.now += 300.0
-        shown.begin_tasks()
-        clock.now += 10.0
-        shown.tick(lambda: Standing(0, 4, 90.0, ("ramp to 5 Hz",)))
-    line = capsys.readouterr().err.splitlines()[-1]
-    assert "0 of 4 points, 10 %, about 1.5 min left" in line
-
-
-def test_all_is_done_at_the_end_only() -> None:
-    assert Standing(3, 4, 0.0, ()).fraction(50.0) == 0.99
-    assert Standing(4, 4, 0.0, ()).fraction(50.0) == 1.0
-    assert Standing(4, 4, 0.0, ()).describe(1.0) == "4 of 4 points, 100 %"
-    assert Standing(0, 4, 0.0, ()).fraction(0.0) < 0.01
-
-
-@given(
-    st.lists(
-        st.tuples(st.integers(0, 9), st.integers(9, 12), st.floats(0.0, 1e9), st.floats(0.0, 1e4)),
-        min_size=2,
-        max_size=30,
-    )
-)
-def test_the_percent_that_is_shown_never_falls(reports: list[tuple[int, int, float, float]]) -> None:
-    """Whatever is expected, found out to be left, taken back from a rank that is lost, and whenever that is told."""
-    clock, shown = Clock(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stderr(shown):
-        patch.setattr("studyrunner.system.progress.time.monotonic", clock)
-        display = ProgressDisplay()
-        display.begin_tasks()
-        for n_done, n_points, left, seconds in reports:
-            clock.now += progress.LONGEST_SILENCE + seconds
-            display.tick(lambda told=(n_done, n_points, left): Standing(*told, ()))  # type: ignore[misc]
-    percents = [int(found["percent"]) for found in map(LINE.match, shown.getvalue().splitlines()) if found]
-    assert len(percents) == len(reports)
-    assert percents == sorted(percents)
-    assert percents[-1] <= 100
-
-
-def test_of_many_tasks_some_are_named() -> None:
-    names = tuple(f"{place} Hz implicit" for place in range(64))
-    assert (
-        Standing(0, 99, 1.0, names)
-        .describe(1.0)
-        .endswith("running: 0 Hz implicit, 1 Hz implicit, 2 Hz implicit and 61 more")
-    )
 
 
 def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studies import build_scene, read_scene
-from studyrunner import read_study, run_study
+from studyrunner import read_study
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene, describe_scene, write_study_scene
 from studyrunner.study.room_for_wear import describe_room, expected_wear
@@ -74,18 +74,6 @@ def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path: 
     assert describe_scene(build_scene("cylinder_on_flat", **given)).digest == digest
 
 
-@pytest.mark.slow
-def test_a_result_that_keeps_its_scene_keeps_the_edge_and_is_run_again_from_it(path: Path) -> None:
-    unworn = {"slow_time.cycles": 0, "slow_time.outputs": 1, "outputs.scene": True, "scene.half_width": 1e-5}
-    with run_study(path, path.with_name("kept.nc"), overrides=unworn, progress=False) as result:
-        assert result.outcome.values.item() == Outcome.CONTACT_CUT_OFF
-    assert main([str(path.with_name("kept.nc")), "-o", str(path.with_name("again.nc"))]) == 3
-    again = read_study(path.with_name("again.nc"))
-    assert again.scene.path is not None
-    assert build_study_scene(again).contact.edge is not None
-    assert build_study_scene(again).contact.edge.tolist() == [False] * 5 + [True]
-
-
 @pytest.mark.parametrize(
     ("overrides", "factor"),
     [
@@ -115,26 +103,6 @@ def test_it_is_the_most_that_any_point_wears(path: Path, overrides: dict[str, An
     assert (expected.amplitude, expected.volume, expected.depth) == (1.0, math.inf, math.inf)
     # b^3 - a^3 of the segment is proportional to it
     assert half_width(study) == pytest.approx(half_width(read_study(path)) * factor ** (1.0 / 3.0), rel=0.08)
-
-
-def test_amplitudes_and_targets_count(path: Path) -> None:
-    assert expected_wear(read_study(path, {"axes.excitation_amplitude": [0.5, 2.0]})).amplitude == 2.0
-    endless = {"slow_time.cycles": math.inf}
-    assert expected_wear(read_study(path, endless)).per_slip_work == math.inf
-    assert dict(read_study(path, endless).scene.parameters)["half_width"] is None
-    deep = read_study(path, {**endless, "slow_time.until": {"wear_depth": 1e-6}})
-    large = read_study(path, {**endless, "slow_time.until": {"worn_volume": 1e-11}})
-    assert (expected_wear(deep).depth, expected_wear(large).volume) == (1e-6, 1e-11)
-    assert half_width(deep) < half_width(read_study(path, {**endless, "slow_time.until": {"wear_depth": 2e-6}}))
-    assert half_width(large) < half_width(read_study(path, {**endless, "slow_time.until": {"worn_volume": 2e-11}}))
-    # nothing wears
-    unworn = read_study(path, {"slow_time.cycles": 0, "slow_time.outputs": 1})
-    assert dict(unworn.scene.parameters)["half_width"] is None
-
-
-def test_bundled_studies_in_partial_slip_have_no_width_of_their_own() -> None:
-    for name in ("cylinder_on_flat", "sphere_on_flat"):
-        assert dict(read_study(name).scene.parameters)["half_width"] is None
 
 
 def test_the_remedy_names_width_and_number_of_pairs(path: Path) -> None:
@@ -167,20 +135,3 @@ def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path: Path, caps
     with xr.open_dataset(output) as result:
         assert not result.mean_pressure.values[..., -1].any()
         assert float(result.wear_depth.isel(cycle=-1).max()) < cut
-
-
-@pytest.mark.slow
-def test_mccoll_ding_and_leen_have_room_by_default(path: Path) -> None:
-    # 0.9382e-3 mm2 and 2.713 um of the flat after 18 000 cycles. With 40, 80 and 160 strips: 2.932, 2.936, 2.936 um and
-    # 0.9502, 0.9514, 0.9516e-3 mm2; the finite elements slide by 24.3 um, these half-planes 24.6
-    overrides = {"scene.P": 18.5e3, "scene.stroke": 25e-6, "scene.strips": 32, "scene.friction_coefficient": 0.9}
-    overrides |= {"axes.wear_coefficient": 1.0, "wear.surfaces": {"flat": 2.9e-14, "cylinder": 1.9e-14}}
-    overrides |= {"slow_time.cycles": 18_000, "slow_time.outputs": 2, "solver.harmonics": "auto"}
-    overrides |= {"solver.samples": "auto"}
-    with run_study(path, path.with_name("mccoll.nc"), overrides=overrides, progress=False) as result:
-        assert not result.outcome.any()
-        last = result.isel(cycle=-1).squeeze(drop=True).load()
-    assert not last.mean_pressure.values[-1]
-    share = 2.9 / 4.8
-    assert share * float(last.worn_volume) / 0.01 == pytest.approx(0.9382e-9, rel=0.015)
-    assert share * float(last.wear_depth.max()) == pytest.approx(2.713e-6, rel=0.1)

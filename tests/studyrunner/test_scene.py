@@ -48,27 +48,9 @@ def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics: int) -> 
     assert largest_harmonics(holding(wave, n_harmonics)) == n_harmonics
 
 
-def test_any_number_of_harmonics_where_all_nodal_diameters_are_held() -> None:
-    # Of 12 sectors in a wave of nodal diameter 4 the harmonics see 0 and 4 only, in turn.
-    assert largest_harmonics(holding(replace(sector(), n_sectors=12, nodal_diameter=4), 1)) is None
-    assert largest_harmonics(holding(replace(sector(), n_sectors=12, nodal_diameter=5), 12)) is None
-
-
-def test_any_number_of_harmonics_where_there_is_no_wave() -> None:
-    assert largest_harmonics(plain()) is None
-    assert largest_harmonics(replace(plain(), n_sectors=47)) is None
-
-
 def test_a_wave_is_built_for_automatic_harmonics() -> None:
     study = read_study("dovetail", WAVE)
     assert describe_scene(build_study_scene(study)).largest_harmonics == AUTOMATIC_HARMONICS_OF_A_WAVE
-
-
-@pytest.mark.parametrize(("harmonics", "largest"), [("[2, 4]", 11), ("['auto', 2]", 13), ("['auto', 14]", None)])
-def test_a_wave_is_built_for_the_most_harmonics_of_an_axis(harmonics: str, largest: int | None) -> None:
-    # those two levels up are there, too, which show the error
-    study = read_study("dovetail", (*WAVE, f"axes.harmonics={harmonics}"))
-    assert describe_scene(build_study_scene(study)).largest_harmonics == largest
 
 
 @pytest.fixture(scope="module")
@@ -140,12 +122,3 @@ def test_the_friction_coefficient_is_given_once(rough_file: str, capsys: pytest.
     (line,) = capsys.readouterr().err.splitlines()
     assert "s.toml: scene.friction_coefficient" in line
     assert "missing: give it, or contact/friction_coefficient in the scene file" in line
-
-
-@pytest.mark.slow
-def test_a_written_scene_with_automatic_harmonics_is_the_same_scene(tmp_path: Path) -> None:
-    model = build_study_scene(read_study("dovetail", WAVE))
-    write_scene(model, tmp_path / "wave.h5")
-    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
-    again = build_study_scene(read_study(str(tmp_path / "s.toml")))
-    assert describe_scene(again).digest == describe_scene(model).digest

@@ -85,36 +85,6 @@ def test_another_number_of_results_than_said_is_a_bug(given: int, said: int) -> 
         serve([Job("a", 1.0, n_results=said)], lambda _: range(given))
 
 
-def test_no_tasks() -> None:
-    serve([], lambda job: [job])
-
-
-def test_what_tasks_take_is_learnt() -> None:
-    taken = 0.0
-
-    def run(job: Job) -> Iterator[object]:
-        nonlocal taken
-        # the second result takes what the first one has not
-        for seconds in (0.2, 0.05):
-            began = time.perf_counter()
-            time.sleep(seconds)
-            taken += time.perf_counter() - began
-            yield None
-
-    began = time.perf_counter()
-    measured = serve([Job("a", 1.0, n_results=2)], run).measured("job")
-    assert taken <= measured <= time.perf_counter() - began
-
-
-def test_an_exception_in_a_task_is_raised() -> None:
-    def fail(job: Job) -> Iterator[object]:
-        yield "a result"
-        raise ZeroDivisionError(job.name)
-
-    with pytest.raises(ZeroDivisionError, match="a"):
-        serve([Job("a", 1.0, n_results=2)], fail)
-
-
 @pytest.mark.parametrize(
     ("environment", "size", "rank"),
     [
@@ -130,21 +100,11 @@ def test_what_the_launcher_says(environment: dict[str, str], size: int, rank: in
     assert (launcher_size(environment), launcher_rank(environment)) == (size, rank)
 
 
-def test_without_a_launcher_a_process_is_alone() -> None:
-    assert isinstance(start_ranks(), Alone)
-
-
 def test_several_processes_without_mpi_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PMI_SIZE", "2")
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     with pytest.raises(LauncherError, match="2 processes were started that cannot talk"):
         start_ranks()
-
-
-def test_one_process_of_a_launcher_needs_no_mpi(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PMI_SIZE", "1")
-    monkeypatch.setitem(sys.modules, "mpi4py", None)
-    assert isinstance(start_ranks(), Alone)
 
 
 class Losing:

@@ -97,9 +97,8 @@ REPORT = [sys.executable, "-m", "studyrunner.report.cli"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [["study.toml", "--plan"], ["study.toml"], ["result.nc", "-o", "again.nc"]])
-def test_run_study(arguments: list[str], hostile: Path) -> None:
-    assert_nothing_taken(hostile, run([*MODULE, *arguments], hostile, str(ROOT)))
+def test_run_study(hostile: Path) -> None:
+    assert_nothing_taken(hostile, run([*MODULE, "result.nc", "-o", "again.nc"], hostile, str(ROOT)))
 
 
 @pytest.mark.slow
@@ -109,11 +108,7 @@ def test_study_report(hostile: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("module", "python_path"),
-    [
-        *(("studyrunner.cli", python_path) for python_path in (f":{ROOT}", f".:{ROOT}", f"{ROOT}:")),
-        ("studyrunner.report.cli", f":{ROOT}"),
-    ],
+    ("module", "python_path"), [("studyrunner.cli", f".:{ROOT}"), ("studyrunner.report.cli", f":{ROOT}")]
 )
 def test_commands_as_they_are_installed(module: str, python_path: str, hostile: Path, tmp_path: Path) -> None:
     """A PYTHONPATH with an empty entry, as scripts that extend it leave it, means the current folder."""
@@ -135,14 +130,6 @@ def test_a_cache_of_compiled_code_is_no_data_either(hostile: Path) -> None:
     (hostile / ".numba_config.yaml").write_text(f"cache_dir: {hostile / 'cache'}\n", encoding="utf-8")
     assert_nothing_taken(hostile, run([*MODULE, "study.toml"], hostile, str(ROOT)))
     assert not (hostile / "cache").exists()
-
-
-@pytest.mark.slow
-def test_the_style_of_figures_is_the_reports_own(hostile: Path) -> None:
-    (hostile / "matplotlibrc").write_text(
-        "text.usetex: True\nfont.size: 40\nbackend: module://numpy\n", encoding="utf-8"
-    )
-    assert_nothing_taken(hostile, run([*REPORT, "result.nc"], hostile, str(ROOT)))
 
 
 def test_folders_of_python_path_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

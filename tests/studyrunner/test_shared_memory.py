@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import queue
 import signal
 import subprocess
 import sys
 import threading
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,17 +91,6 @@ def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed() -> N
             assert float(other.stdout.readline()) == 99999.0 * 50000.0
         with pytest.raises(FileNotFoundError):
             open_shared(pickle.loads(address))
-
-
-def test_a_number_that_has_become_another_file_is_no_shared_object(tmp_path: Path) -> None:
-    shared = SharedObject({"a": np.arange(4.0)})
-    with pytest.raises(OSError, match="another file"):
-        open_shared(replace(shared.address, inode=shared.address.inode + 1))
-    with (tmp_path / "else").open("wb") as other:
-        os.dup2(other.fileno(), shared.address.descriptor)
-        with pytest.raises(OSError, match="another file"):
-            open_shared(shared.address)
-    shared.close()
 
 
 class Threads:
@@ -199,16 +186,6 @@ def test_every_rank_gets_it_and_those_of_a_machine_share(
     for value in got.values():
         assert isinstance(value, dict)
         np.testing.assert_array_equal(value["a"], np.arange(5.0))
-
-
-def test_without_shared_memory_every_rank_has_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: object) -> None:
-        raise OSError("no space left")
-
-    monkeypatch.setattr(broadcast, "SharedObject", refuse)
-    got, mapped = hand_to_all(monkeypatch, "aabb")
-    assert mapped == 0
-    assert len(got) == 4
 
 
 def test_a_lost_rank_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

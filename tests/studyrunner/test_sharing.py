@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -16,20 +15,15 @@ from hypothesis import strategies as st
 from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import pack
-from solver.results.cut_off import describe_cut_off
-from solver.results.history import StartState, WearHistory
+from solver.results.history import StartState
 from solver.settings import Resolution
-from solver.wear.solutions import SlowTime
-from studyrunner.evaluate import integrate
 from studyrunner.history_result import build_result
 from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import ScaledHistory, describe_left_out, march_counts, share_histories
 from studyrunner.plan.tasks import MarchTask
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from studyrunner.variables import KEPT
-from tests.studyrunner.fakes import no_keep, totals_of
+from tests.studyrunner.fakes import totals_of
 from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
@@ -96,20 +90,6 @@ def test_histories_are_shared_where_they_are_the_same(
         assert found.held == (descending[0] == 0.0)
 
 
-@given(some(WEARS), some(STEPS), some(SCHEMES), st.sampled_from(["0", "20000"]))
-def test_without_shortcuts_every_point_has_its_own_march(
-    wears: list[str], steps: list[str], schemes: list[str], cycles: str
-) -> None:
-    overrides = ("solver.shortcuts=false", f"slow_time.cycles={cycles}", "slow_time.largest_depth=1e-6")
-    plan = build_tasks(study_with(wears, steps, schemes, *overrides), 2)
-    (line,) = plan.marches
-    assert plan.left_out == ()
-    assert len(line) == plan.n_points == len(wears) * len(steps) * len(schemes)
-    assert {len(task.points) for task in line} == {1}
-    assert not any(task.held for task in line)
-    assert all(task.cost > 0.0 for task in line)
-
-
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
@@ -143,13 +123,6 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
         assert n - 1 < count / step <= n * (1.0 - 5e-13)
         assert count / step == pytest.approx(n, rel=2e-12)
     assert march_counts(cycles, own, own, steps_of_given_length=True) == cycles
-
-
-def test_counts_of_other_wear_coefficients_are_as_many_times_larger() -> None:
-    own, other = ScaledHistory(1e-11, 100.0, ((0,),)), ScaledHistory(2.5e-12, 400.0, ((1,),))
-    for steps_of_given_length in (False, True):
-        counts = march_counts((0.0, 10.0, 130.0), other, own, steps_of_given_length)
-        assert counts == pytest.approx((0.0, 2.5, 32.5), rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -217,18 +190,6 @@ def test_each_history_has_its_own_counts_and_rates_back() -> None:
     assert all(totals_of(result, "newton_iterations", "run_time", "branch") == [7, 0.5, 2] for result in found)
 
 
-@pytest.mark.parametrize(("jump", "expected"), [(1.0, [1, 2.5, 5]), (2.0, [2, 5, np.nan]), (9.0, [9, np.nan, np.nan])])
-def test_a_scaled_history_does_not_know_of_jumps_after_its_last_count(jump: float, expected: list[float]) -> None:
-    jumped = replace(history(COUNTS), jump_cycle=jump)
-    found = [build_result(shared_task(), jumped, place).values["jump_cycle"] for place in range(3)]
-    np.testing.assert_allclose(found, expected)
-
-
-def test_the_error_of_a_scaled_history_is_that_at_its_own_end() -> None:
-    found = [build_result(shared_task(), history(COUNTS), place).values["error_estimate"] for place in range(3)]
-    np.testing.assert_allclose(found, [0.12, 0.06, 0.03])
-
-
 @pytest.mark.parametrize(
     ("last", "outcomes", "lasts"),
     [
@@ -277,79 +238,3 @@ def test_a_scaled_history_is_inaccurate_by_its_own_counts(first: float, ended: O
     for result, slower in zip(results[1:], (0.4, 0.2), strict=True):
         said = f"from cycle {first / slower:.0f} on the wear rate is known to 4 % only"
         assert result.message == (said if result.outcome else "")
-
-
-@pytest.mark.parametrize(
-    ("first", "expected"), [(0.0, [18, 18, 18]), (2.0, [18, 18, 18]), (3.0, [18, 18, 0]), (9.0, [18, 0, 0])]
-)
-def test_a_scaled_history_is_cut_off_by_its_own_counts(first: float, expected: list[int]) -> None:
-    cut = replace(history(COUNTS, Outcome.CONTACT_CUT_OFF), cut_off_cycle=first, message="of the march")
-    results = [build_result(shared_task(), cut, place) for place in range(3)]
-    assert [result.outcome for result in results] == expected
-    assert results[0].message == "of the march"
-    # 4 cycles of the march are 10 of the second, 2 of them 10 of the third
-    for result, at in zip(results[1:], (2.5 * first, 5.0 * first), strict=True):
-        assert result.message == ("" if result.outcome == 0 else describe_cut_off(at))
-        # what was computed is kept
-        assert np.isfinite(result.values["worn_volume"]).all()
-        assert result.values["last_cycle"] == 10.0
-
-
-def test_a_scaled_history_is_sensitive_by_its_own_last_count() -> None:
-    errors = np.array([0.0, 0.2, 0.7, 0.4, 0.9])
-    found = replace(history(COUNTS, Outcome.SENSITIVE), worn_volume_error=errors, message="of the march")
-    results = [build_result(shared_task(), found, place) for place in range(3)]
-    assert [result.outcome for result in results] == [15, 15, 0]
-    said = "worn volume 2e+09 mm3, but 3e+09 mm3 with longer steps, fewer harmonics and a coarser sweep: "
-    assert [result.message for result in results] == ["of the march", said + "known to 70 % only", ""]
-
-
-def integrated(
-    monkeypatch: pytest.MonkeyPatch, change: Callable[[WearHistory, float], WearHistory]
-) -> tuple[list[MarchResult], list[tuple[float, list[float]]]]:
-    """Results of the shared task with a stand-in for the solver; wear coefficient and counts of all integrations."""
-    calls = []
-
-    def fake(model: object, friction: object, settings: object, start: object, asked: SlowTime, *_: object) -> object:
-        assert isinstance(asked.cycles, np.ndarray)
-        calls.append((asked.wear_coefficient, asked.cycles.tolist()))
-        return change(history(asked.cycles.tolist()), asked.wear_coefficient)
-
-    monkeypatch.setattr("solver.wear.history.integrate_wear", fake)
-    return list(integrate(None, shared_task(), no_keep)), calls  # type: ignore[arg-type]
-
-
-def test_one_march_gives_all_histories(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, calls = integrated(monkeypatch, lambda at, _: replace(at, oscillates=False))
-    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
-    assert [result.values["worn_volume"][-1] for result in found] == [3.0, 2.0, 1.0]
-
-
-def test_a_march_that_fails_is_not_done_again_for_its_histories(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail_late(at: WearHistory, wear: float) -> WearHistory:
-        return replace(at, outcome=Outcome.MARCH_FAILED, last_cycle=3.0, oscillates=False)
-
-    found, calls = integrated(monkeypatch, fail_late)
-    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0])]
-    assert [result.outcome for result in found] == [4, 4, 0]
-
-
-def test_what_oscillates_late_does_not_where_it_ends_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    def oscillate_late(at: WearHistory, wear: float) -> WearHistory:
-        return replace(at, oscillates=wear >= 1e-11)
-
-    found, calls = integrated(monkeypatch, oscillate_late)
-    assert calls == [(1e-11, [0.0, 2.0, 4.0, 10.0]), (4e-12, [0.0, 10.0]), (2e-12, [0.0, 10.0])]
-    assert [result.values["oscillates"] for result in found] == [True, False, False]
-    assert [result.place for result in found] == [0, 1, 2]
-    for result in found[1:]:
-        assert result.values["worn_volume"].tolist() == result.values["wear_rate"].tolist() == [0.0, 1.0]
-        assert result.values["step_limit"] == 250.0
-
-
-def test_only_what_is_asked_for_and_the_certificates_are_sent() -> None:
-    study = study_of("outputs.variables=['worn_volume']", "slow_time.outputs=2", "axes.scheme=implicit")
-    ((task,),) = build_tasks(study, 2).marches
-    sent = build_result(task, history([0.0, 20000.0])).values
-    assert sent.keys() == {*task.variables, *KEPT}
-    assert not {"wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_amplitude"} & set(sent)

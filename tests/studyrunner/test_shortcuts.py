@@ -10,7 +10,7 @@ import xarray as xr
 
 from studyrunner.cli import main
 from studyrunner.study.study_file import read_study
-from studyrunner.variables import ASKED, CERTIFICATE, KEPT
+from studyrunner.variables import CERTIFICATE, KEPT, USUAL
 
 STUDY = [
     "axes.frequency=[100.0, 160.0]",
@@ -50,7 +50,7 @@ def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=round_off, err_msg=name)
 
 
-COMPARED = [name for name in (*ASKED, *KEPT) if name not in EFFORT]
+COMPARED = [name for name in (*USUAL, *KEPT) if name not in EFFORT]
 
 
 def test_what_is_shared_is_the_same_and_no_row_of_zeros(tmp_path: Path) -> None:

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies import build_scene
-from studyrunner.scene.scene import SceneFacts, describe_scene
+from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.small_wear import SMALL, SmallWear, contact_width
 from tests.studyrunner.fakes import FACTS
@@ -45,14 +44,6 @@ def test_large_wear_says_where_and_asks_for_the_unit() -> None:
     assert "points" not in line_of({(1, 1): 0.014})
 
 
-def test_no_unit_is_asked_about_where_the_coefficient_is_sensible() -> None:
-    sensible = (GRID[0], "axes.wear_coefficient=[1e-14, 1e-11]", GRID[2])
-    assert line_of({(1, 1): 0.014}, grid=sensible).endswith("wear_coefficient 1e-11 1/Pa: take fewer cycles")
-    # one that is far too small does not wear too much
-    tiny = (GRID[0], "axes.wear_coefficient=[1e-25, 1e-11]", GRID[2])
-    assert line_of({(1, 1): 0.014}, grid=tiny).endswith(": take fewer cycles")
-
-
 def test_points_without_a_state_say_nothing() -> None:
     nowhere = {(place, wear): float("nan") for place in range(3) for wear in range(2)}
     assert line_of(nowhere) == "nothing was computed"
@@ -70,30 +61,3 @@ def test_the_width_is_that_of_the_surface_however_finely_it_is_divided(n_along: 
     # a single pair, or a row of pairs across, does not say how long it is
     expected = 0.007 if n_along > 1 else 0.007 if n_across > 1 else np.sqrt(0.04 * 0.007)
     assert contact_width(facts) == pytest.approx(expected, rel=0.2 if min(n_along, n_across) == 2 else 0.02)
-
-
-def test_two_strip_widths_of_a_cylinder_have_one_verdict_and_one_number() -> None:
-    """10 um of wear on a contact of twice 0.5 mm; strips of 25 and 12.5 um were told 0.41 and 0.81."""
-    lines = []
-    for strips in (40, 80):
-        facts = describe_scene(build_scene("cylinder_on_flat", strips=strips, half_width=0.5e-3))
-        assert contact_width(facts) == pytest.approx(0.5e-3, rel=2e-3)
-        lines.append(line_of({(1, 0): 10.18e-6}, facts))
-    assert lines == ["depth over contact width at most 0.02"] * 2
-    facts = describe_scene(build_scene("cylinder_on_flat", strips=40, half_width=0.5e-3))
-    assert line_of({(1, 0): 60e-6}, facts).startswith("NOT MET: depth over contact width (0.0005 m) is 0.12 at")
-
-
-def test_the_narrowest_surface_counts() -> None:
-    position = np.zeros((8, 3))
-    position[:4, 0], position[4:, 1] = 1e-3 * np.arange(4), 5e-3 * np.arange(4)
-    facts = replace(FACTS, position=position, area=np.full(8, 1e-5), surface=("a",) * 4 + ("b",) * 4)
-    # b is 20 mm long, so that its 40 mm2 are 2 mm wide
-    assert contact_width(facts) == pytest.approx(2e-3, rel=0.05)
-
-
-def test_without_positions_it_is_the_side_of_a_square() -> None:
-    facts = replace(FACTS, position=np.full((2, 3), np.nan), surface=("a", "a"))
-    assert contact_width(facts) == pytest.approx(np.sqrt(3e-4))
-    at_one_place = replace(FACTS, position=np.ones((2, 3)), surface=("a", "a"))
-    assert contact_width(at_one_place) == pytest.approx(np.sqrt(3e-4))

@@ -12,7 +12,7 @@ import pytest
 
 from studyrunner.cli import main
 from studyrunner.netcdf import software
-from studyrunner.netcdf.software import CHANGED, commit_of, describe_software, published_at
+from studyrunner.netcdf.software import CHANGED, commit_of, describe_software
 from tests.studyrunner.faked_runs import SMALL, Solver
 
 WHO = ("-c", "user.name=a", "-c", "user.email=b")
@@ -48,36 +48,6 @@ def test_the_commit_is_that_of_git(checkout: Path) -> None:
     tree = checkout.parent / "tree"
     git(checkout, "worktree", "add", "-q", str(tree), head)
     assert commit_of(tree) == head
-
-
-def test_an_environment_in_a_checkout_is_none(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    inside = checkout / "lib"
-    inside.mkdir()
-    assert commit_of(inside) == ""
-    # and a hook of another repository does not lead away
-    monkeypatch.setenv("GIT_DIR", str(checkout / "nowhere"))
-    assert len(commit_of(checkout)) == 40
-
-
-def test_whatever_is_wrong_is_left_out(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (checkout / ".git" / "HEAD").write_text("garbage", encoding="utf-8")
-    assert commit_of(checkout) == ""
-    monkeypatch.setenv("PATH", str(checkout))
-    assert commit_of(checkout) == ""
-    monkeypatch.undo()
-
-    def hang(command: list[str], **_: object) -> None:
-        raise subprocess.TimeoutExpired(command, 5.0)
-
-    monkeypatch.setattr(subprocess, "run", hang)
-    assert commit_of(checkout) == ""
-
-
-def test_the_url_is_that_of_the_source() -> None:
-    urls = ["Changelog, https://a.example/log", "Homepage, https://a.example", "Repository, https://b.example/r"]
-    assert published_at(urls) == "https://b.example/r"
-    assert published_at(urls[:2]) == "https://a.example"
-    assert published_at([*urls[:1], "homepage, "]) == ""
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import sqlite3
 import subprocess
 import sys
 import threading
-import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -123,11 +122,6 @@ def test_arrays_are_kept_to_the_last_bit(array: np.ndarray) -> None:
         assert one.flags.writeable
 
 
-def test_objects_are_not_kept() -> None:
-    with pytest.raises(TypeError, match="arrays of object are not kept"):
-        contents.compress(Packed("", (np.array([{}], dtype=object),)), 1)
-
-
 def raw(head: bytes, body: bytes = b"", length: int | None = None) -> tuple[int, bytes]:
     content = (len(head) if length is None else length).to_bytes(8, "little") + head + body
     return len(content), zlib.compress(content)
@@ -135,21 +129,12 @@ def raw(head: bytes, body: bytes = b"", length: int | None = None) -> tuple[int,
 
 HOSTILE = {
     "a bomb": (1000, zlib.compress(bytes(10**7))),
-    "a size beyond all": (10**12, zlib.compress(bytes(10**3))),
-    "no size": (0, b""),
     "no zlib": (10, b"x" * 10),
     "half of it": (raw(b'["", []]')[0], raw(b'["", []]')[1][:-6]),
     "no JSON": raw(b"[["),
-    "nested JSON": raw(b"[" * 10**5),
-    "no layout": raw(b'["", 7]'),
-    "no text": raw(b"[7, []]"),
     "a long head": raw(b'["", []]', length=2**63),
     "objects": raw(b'["", [["|O", [1]]]]', bytes(8)),
-    "a structure": raw(b'["", [["f8,f8", [1]]]]', bytes(16)),
-    "no type": raw(b'["", [["spam", [1]]]]', bytes(8)),
     "too many numbers": raw(b'["", [["<f8", [100000000000]]]]', bytes(8)),
-    "negative numbers": raw(b'["", [["<f8", [-1]]]]', bytes(8)),
-    "no whole numbers": raw(b'["", [["<f8", [1.0]]]]', bytes(8)),
     "more than it says": raw(b'["", [["<f8", [1]]]]', bytes(9)),
     "too many dimensions": raw(b'["", [["<f8", [' + b"1," * 99 + b"1]]]]", bytes(8)),
 }
@@ -253,17 +238,6 @@ def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_
         assert store.on_disk(COMPUTED) == {"natural frequencies"}
 
 
-def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
-    opened: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(store_module, "LARGEST", 10)
-    opened.keep_computed("scene", kept(1))
-    opened.keep_progress(key(1), kept(1))
-    assert (opened.read_computed("scene"), opened.read_progress(key(1))) == (None, None)
-    with pytest.raises(StorageError, match="bytes in one entry: use a smaller model"):
-        put(opened, RESULTS, 1)
-
-
 def test_what_is_forgotten_is_replaced_by_what_comes(path: Path) -> None:
     fill(path)
     with contextlib.closing(Store(path)) as store:
@@ -281,24 +255,6 @@ def test_what_is_forgotten_is_replaced_by_what_comes(path: Path) -> None:
         store.remove_forgotten()
     with contextlib.closing(Store(path)) as store:
         assert not store.has(STARTS, key(2))
-
-
-def test_pruning_keeps_what_is_named(path: Path) -> None:
-    fill(path, range(6))
-    with contextlib.closing(Store(path)) as store:
-        store.prune({RESULTS: {key(0), key(3)}, STARTS: {key(5), key(99)}}, 0.0)
-    with contextlib.closing(Store(path)) as store:
-        assert entries_of(store).keys() == {(RESULTS, key(0)), (RESULTS, key(3)), (STARTS, key(5))}
-
-
-def test_of_what_is_not_named_the_latest_stays(path: Path) -> None:
-    for number in range(6):
-        fill(path, range(number, number + 1), (RESULTS,))
-    with contextlib.closing(Store(path)) as store:
-        (size,) = store._database.execute("SELECT max(length(content)) FROM results").fetchone()
-        store.prune({RESULTS: {key(1)}}, 2.5 * size)
-    with contextlib.closing(Store(path)) as store:
-        assert store.on_disk(RESULTS) == {key(1), key(4), key(5)}
 
 
 def test_room_is_given_back_at_the_end(path: Path) -> None:
@@ -323,42 +279,6 @@ def test_a_transaction_survives_a_loss_of_power(opened: Store) -> None:
     assert settings == {"synchronous": 2, "journal_mode": "delete", "locking_mode": "exclusive"}
 
 
-WRITER = """
-import itertools, sys
-from pathlib import Path
-import numpy as np
-from solver.packing import Packed
-from studyrunner.checkpoint.store import Store
-store = Store(Path(sys.argv[1]))
-for number in itertools.count(int(sys.argv[2])):
-    for table in ("results", "start_states"):
-        store.put(table, f"{number:032x}", Packed("", (np.full(20_000, float(number)),)), {})
-    store.keep_progress("a" * 32, Packed("", (np.random.default_rng(number).random(1000 * (number % 50)),)))
-    store.flush()
-    print(number, flush=True)
-"""
-
-
-@pytest.mark.slow
-def test_nothing_that_was_reported_as_written_is_lost_to_kills(path: Path) -> None:
-    chance, first = random.Random(0), 0
-    for _ in range(12):
-        with subprocess.Popen([sys.executable, "-c", WRITER, str(path), str(first)], stdout=subprocess.PIPE) as run:
-            assert run.stdout is not None
-            assert run.stdout.readline()
-            time.sleep(chance.uniform(0.0, 0.3))
-            run.kill()
-            written = first + len(run.stdout.read().split())
-        with contextlib.closing(Store(path)) as store:
-            assert store.notes == []
-            assert len(store.on_disk(RESULTS)) > written
-            assert store.on_disk(RESULTS) == store.on_disk(STARTS)
-            for (table, name), packed in entries_of(store).items():
-                assert packed is not None
-                assert table == UNDER_WAY or (packed.arrays[0] == int(name, 16)).all()
-            first = len(store.on_disk(RESULTS))
-
-
 # what is damaged
 
 
@@ -377,20 +297,15 @@ def change_tables(path: Path, *commands: str) -> None:
 DAMAGES = {
     "cut off": lambda path: os.truncate(path, path.stat().st_size // 2),
     "a page": lambda path: change_bytes(path, 4096, os.urandom(4096)),
-    "all pages": lambda path: change_bytes(path, 4096, bytes(path.stat().st_size - 4096)),
-    "other content": lambda path: path.write_bytes(b"x" * 1000),
     "another file": lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(1000)),
     "its tables": lambda path: change_tables(path, "DROP TABLE tasks"),
     "another table": lambda path: change_tables(path, "CREATE TABLE spam (egg)"),
-    "another column": lambda path: change_tables(path, "ALTER TABLE results ADD COLUMN spam"),
     "a view": lambda path: change_tables(path, "CREATE VIEW spam AS SELECT load_extension('egg')"),
     "a trigger": lambda path: change_tables(
         path, "CREATE TRIGGER spam AFTER DELETE ON tasks BEGIN DELETE FROM results; END"
     ),
-    "an index": lambda path: change_tables(path, "CREATE INDEX spam ON results (length(content))"),
     "a write-ahead log": lambda path: change_tables(path, "PRAGMA journal_mode=WAL"),
     "another version": lambda path: change_tables(path, "PRAGMA user_version=99"),
-    "another program": lambda path: change_tables(path, "PRAGMA application_id=99"),
 }
 
 
@@ -433,14 +348,6 @@ def test_a_damaged_entry_is_forgotten_with_a_line_and_nothing_else(path: Path) -
         assert len(entries_of(store)) == 4 * len(TABLES) - 3
 
 
-def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
-    fill(path)
-    change_tables(path, "UPDATE results SET size=900000000", "UPDATE start_states SET size=NULL")
-    with contextlib.closing(Store(path)) as store:
-        assert (store.read(RESULTS, key(1)), store.read(STARTS, key(1))) == (None, None)
-        assert not store.has(RESULTS, key(1))
-
-
 @pytest.mark.slow
 def test_any_bit_of_a_file_matters(path: Path) -> None:
     """None makes anything but what was there before, or nothing; none ends in a traceback."""
@@ -449,7 +356,7 @@ def test_any_bit_of_a_file_matters(path: Path) -> None:
     with contextlib.closing(Store(path)) as store:
         expected = entries_of(store)
     chance = random.Random(1)
-    for _ in range(400):
+    for _ in range(100):
         bit = chance.randrange(8 * len(content))
         flipped = bytearray(content)
         flipped[bit // 8] ^= 1 << bit % 8
@@ -468,7 +375,7 @@ def test_any_bit_of_a_file_matters(path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["", "-journal"])
-@pytest.mark.parametrize("what", ["fifo", "folder", "endless", "link", "link to nowhere"])
+@pytest.mark.parametrize("what", ["fifo", "endless", "link", "link to nowhere"])
 def test_only_plain_files_are_opened(what: str, suffix: str, path: Path, tmp_path: Path) -> None:
     precious = tmp_path / "precious"
     fill(precious)
@@ -577,22 +484,6 @@ def test_two_runs_are_kept_apart(path: Path) -> None:
     Store(path).close()
 
 
-def test_two_runs_of_one_process_are_kept_apart(path: Path, opened: Store) -> None:
-    with pytest.raises(StoreInUseError, match=rf"process {os.getpid()} on "):
-        Store(path)
-    # the lock of the first one holds
-    with pytest.raises(AssertionError), another_run(path, 0.0):
-        pass
-    put(opened, RESULTS, 1)
-    opened.flush()
-
-
-def test_a_run_waits_for_the_end_of_one_that_is_just_dying(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(database, "_SECONDS_TO_DIE", 30.0)
-    with another_run(path, 0.5):
-        Store(path).close()
-
-
 def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store) -> None:
     assert database.read_study(path) is None
     opened.note_study(
@@ -606,3 +497,27 @@ def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store)
     assert shutil.which("sqlite3") is None or b"two_masses" in subprocess.check_output(
         ["sqlite3", str(path), "SELECT * FROM study"]
     )
+
+
+def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
+    fill(path)
+    change_tables(path, "UPDATE results SET size=900000000", "UPDATE start_states SET size=NULL")
+    with contextlib.closing(Store(path)) as store:
+        assert (store.read(RESULTS, key(1)), store.read(STARTS, key(1))) == (None, None)
+        assert not store.has(RESULTS, key(1))
+
+
+def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
+    opened: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store_module, "LARGEST", 10)
+    opened.keep_computed("scene", kept(1))
+    opened.keep_progress(key(1), kept(1))
+    assert (opened.read_computed("scene"), opened.read_progress(key(1))) == (None, None)
+    with pytest.raises(StorageError, match="bytes in one entry: use a smaller model"):
+        put(opened, RESULTS, 1)
+
+
+def test_objects_are_not_kept() -> None:
+    with pytest.raises(TypeError, match="arrays of object are not kept"):
+        contents.compress(Packed("", (np.array([{}], dtype=object),)), 1)

@@ -111,23 +111,6 @@ def groups(path: Path | str) -> dict[str, object]:
 
 
 @pytest.mark.slow
-def test_a_result_keeps_the_friction_coefficient_of_each_pair(made: Path, folder: Path) -> None:
-    shutil.copy(made / "slider.nc", "one.nc")
-    shutil.copy(made / "slider.h5", folder)
-    with h5py.File("slider.h5", "r+") as file:
-        file["contact/friction_coefficient"] = [0.5]
-    Path("slider.toml").write_text(SLIDER.replace("friction_coefficient = 0.5\n", ""), encoding="utf-8")
-    assert main(["slider.toml", "-o", "own.nc"]) == 0
-    assert groups("own.nc")["contact/friction_coefficient"] == [0.5]
-    Path("slider.h5").unlink()
-    assert main(["own.nc", "-o", "again.nc"]) == 0
-    one, own, again = (contents(name) for name in ("one.nc", "own.nc", "again.nc"))
-    for name in one.data_vars:
-        np.testing.assert_array_equal(own[name], one[name])
-    xr.testing.assert_identical(again.drop_attrs(), own.drop_attrs())
-
-
-@pytest.mark.slow
 def test_a_written_scene_gives_the_same_result(folder: Path) -> None:
     assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS)]) == 0
     Path("files").mkdir()
@@ -201,40 +184,6 @@ def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.Capt
     Path("link.nc").symlink_to("slider.nc")
     assert main(["link.nc", "-o", "slider.nc"]) == 2
     assert slider.read_bytes() == before
-
-
-@pytest.mark.slow
-def test_a_result_of_an_interrupted_run_is_enough(slider: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It opens like any other, holds its scene, and its study runs to its end."""
-    from studyrunner import run
-
-    def ended(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(run, "run_tasks", ended)
-        patch.setattr("studyrunner.cli.take_endings", lambda: None)
-        assert main(["slider.nc", "-o", "part.nc"]) == 130
-    assert set(np.ravel(contents("part.nc").outcome)) != {0}
-    assert main(["part.nc", "-o", "whole.nc"]) == 0
-    xr.testing.assert_identical(contents("whole.nc"), contents(slider))
-
-
-@pytest.mark.slow
-def test_overrides_apply_and_another_scene_takes_the_place_of_the_kept_one(
-    slider: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["slider.nc", "-o", "less.nc", *options("axes.frequency=150", "slow_time.cycles=0")]) == 0
-    assert contents("less.nc").sizes["frequency"] == 1
-    assert main(["slider.nc", "-o", "x.nc", *options("scene.model=none.h5")]) == 2
-    assert "scene.model" in capsys.readouterr().err
-    assert main(["sdof_slider", "--write-scene", "heavy.h5", *options("scene.mass=0.11")]) == 0
-    capsys.readouterr()
-    assert main(["slider.nc", "-o", "heavy.nc", *options("scene.model=heavy.h5")]) == 0
-    warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
-    assert len(warned) == 1
-    assert "slider.nc: its scene_sha256 is" in warned[0]
-    assert contents("heavy.nc").attrs["scene_sha256"] != contents(slider).attrs["scene_sha256"]
 
 
 def change(path: Path, work: Callable[[h5py.File], None]) -> None:

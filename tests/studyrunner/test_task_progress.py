@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from studyrunner.plan.planning import build_tasks
@@ -11,7 +9,6 @@ from studyrunner.plan.results import StartResult
 from studyrunner.plan.tasks import BranchTask, TaskPlan
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
-from tests.benchmarks.scheduling import SHAPES, replay_shape
 from tests.benchmarks.simulation import MemoryIndex, Overheads, replay
 from tests.studyrunner.fakes import fake_branch, fake_march
 
@@ -60,36 +57,6 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
     assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
 
 
-def test_a_sweep_says_where_it_is_until_it_gives_a_state() -> None:
-    plan = plan_of()
-    progress = TaskProgress(MemoryIndex(plan))
-    up = plan.branches[0]
-    progress.keep(up, "at 0.7 Hz, 3 of 9 pairs slip or open")
-    running = [(up, up.n_results, 0.0)]
-    assert progress.look(running).running == ("sweep up to 1 Hz (at 0.7 Hz, 3 of 9 pairs slip or open)",)
-    progress.take(up, next(iter(fake_branch(up))))
-    assert progress.look(running).running == ("sweep up to 1 Hz",)
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_the_way_to_the_first_state_is_most_of_a_sweep(number: int) -> None:
-    branch = plan_of().branches[number]
-    first, other = branch.cost_of(first=True), branch.cost_of(first=False)
-    assert first > 5.0 * other > 0.0
-    assert first + (branch.n_results - 1) * other == pytest.approx(branch.cost)
-    alone = replace(branch, known=frozenset(branch.order[1:]))
-    assert alone.cost_of(first=True) == pytest.approx(alone.cost)
-
-
-def test_a_sweep_on_its_way_to_the_first_state_is_not_late() -> None:
-    plan = plan_of()
-    progress = TaskProgress(MemoryIndex(plan))
-    branch = plan.branches[0]
-    first = branch.cost_of(first=True)
-    before, now = (progress.look([(branch, branch.n_results, share * first)]) for share in (0.0, 0.7))
-    assert before.seconds_left - now.seconds_left == pytest.approx(0.7 * first)
-
-
 def test_finished_marches_are_kept_with_their_results() -> None:
     plan = plan_of()
     completion = MemoryIndex(plan)
@@ -122,16 +89,3 @@ def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks: int) -> None:
     assert shortest - 1e-9 <= found.makespan <= shortest + 10.0
     if n_ranks in (1, 1000):
         assert found.makespan == pytest.approx(shortest)
-
-
-@pytest.mark.slow
-def test_a_thousand_ranks_are_busy_with_ten_thousand_uneven_points() -> None:
-    found = replay_shape(SHAPES["steps"], 1024, Overheads())
-    assert found.n_unfinished == 0
-    assert found.efficiency >= 0.95
-
-
-@pytest.mark.slow
-def test_costs_with_a_long_tail_keep_256_ranks_busy() -> None:
-    """Some marches take a hundred times as long as most, which shows only while they run."""
-    assert replay_shape(SHAPES["usual"], 256, Overheads()).efficiency >= 0.93

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import base64
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from solver.settings import ToTheEnd
 from studyrunner import UserError, open_result, run_study
 from studyrunner.accessor import join_results
-from studyrunner.netcdf.attributes import attributes, coordinate_entry
-from studyrunner.plan.identity import Identities
-from studyrunner.plan.plan_text import format_plan
 from studyrunner.plan.planning import build_tasks
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_numbers
 from studyrunner.study.study import Study
-from studyrunner.study.study_file import format_study, read_study
-from tests.studyrunner.fakes import FACTS
+from studyrunner.study.study_file import read_study
 
 END = (
     "axes.frequency=160",
@@ -35,17 +29,6 @@ END = (
 
 def study_with(*overrides: str) -> Study:
     return read_study("sdof_slider", (*END, "axes.scheme=adaptive", *overrides))
-
-
-def test_the_effective_study_is_to_the_end_too(tmp_path: Path) -> None:
-    study = study_with("slow_time.final_share=1e-3")
-    (tmp_path / "again.toml").write_text(format_study(study))
-    again = read_study(tmp_path / "again.toml")
-    assert again.to_the_end
-    assert again.slow_time == study.slow_time
-    assert again.cycles_kept == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
-    assert build_tasks(again, 2).marches[0][0].to_the_end == ToTheEnd(6, 1e-3)
-    assert not read_study("sdof_slider").to_the_end
 
 
 @pytest.mark.parametrize(
@@ -72,27 +55,6 @@ def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remed
         study_with(override, *others.get(override, ()))
     assert caught.value.key == key
     assert remedy in caught.value.remedy
-
-
-def test_the_plan_says_how_far_it_goes() -> None:
-    study = study_with()
-    text = format_plan(study, FACTS, build_tasks(study, FACTS.n_displacements), 0.0)
-    assert "until the wear rate of every pair is below 0.0001 of its largest; 6 states are kept" in text
-
-
-def test_a_history_is_known_by_how_it_ends() -> None:
-    keys = []
-    for overrides in ((), ("slow_time.final_share=1e-3",), ("slow_time.outputs=7",), ("slow_time.cycles=5",)):
-        study = study_with(*overrides)
-        plan, of = build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
-        keys.append(of.of_histories(plan.branches[0], plan.marches[0][0]))
-    assert len(set(keys)) == 4
-
-
-def test_the_coordinate_is_a_number_of_outputs_there_only() -> None:
-    ended, counted = study_with(), read_study("sdof_slider")
-    assert "number of the output" in attributes("cycle", coordinate_entry(ended, "cycle"))["long_name"]  # type: ignore[operator]
-    assert "vibration cycles" in attributes("cycle", coordinate_entry(counted, "cycle"))["long_name"]  # type: ignore[operator]
 
 
 @pytest.mark.slow
@@ -130,25 +92,6 @@ def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Pa
     shown.close()
     with pytest.raises(ValueError, match="joins only those"):
         join_results([result, result.drop_vars("cycle_count")])
-
-
-@pytest.mark.slow
-def test_the_report_draws_it(tmp_path: Path) -> None:
-    from studyrunner.report.figures.volume import draw_history
-    from studyrunner.report.page.data import build_page_data
-    from studyrunner.report.reading.units import scale_for
-
-    with run_study(study_with('axes.scheme=["adaptive", "implicit"]', "axes.step=500"), tmp_path / "end.nc"):
-        pass
-    result = open_for_report(tmp_path / "end.nc")
-    with warnings.catch_warnings():
-        drawing = draw_history(result, scale_for("m3", 1e-8), 1e-8)
-    lines = drawing.figure.axes[0].get_lines()
-    last = [float(line.get_xdata()[-1]) for line in lines]  # type: ignore[index, arg-type]
-    ends = result.dataset.cycle_count.isel(cycle=-1).values.ravel()
-    assert np.array(last) / np.array(ends) == pytest.approx(last[0] / ends[0])
-    assert any("spaced evenly in worn volume and cycles" in note for note in build_page_data(result, 1e6).notes)
-    result.close()
 
 
 @pytest.mark.slow
@@ -193,19 +136,6 @@ def test_the_report_shows_a_final_state_as_one(tmp_path: Path) -> None:
     assert content is not None
     assert content["cycles"] == [0.0, 5.0]
     alone.close()
-
-
-@pytest.mark.slow
-def test_gross_slip_is_told_with_its_rate_for_every_coefficient(tmp_path: Path) -> None:
-    study = study_with("scene.normal_stiffness=0", "axes.wear_coefficient=[1e-11, 1e-12]")
-    with run_study(study, tmp_path / "end.nc") as opened:
-        result = opened.squeeze(drop=True).load()
-    words = dict(zip(result.outcome.attrs["flag_values"], result.outcome.attrs["flag_meanings"].split(), strict=True))
-    assert [words[number] for number in result.outcome.values] == ["no_final_state"] * 2
-    rates = result.wear_rate.isel(cycle=-1).values
-    assert rates[0] == pytest.approx(10.0 * rates[1])
-    for message, rate in zip(result.message.values, rates, strict=True):
-        assert f"at {rate:.6g} m3 a cycle" in message or f"rate of {rate:.6g} m3 a cycle" in message
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from solver.settings import WearTarget
 from studyrunner import run_study
 from studyrunner.plan.identity import Identities
@@ -17,37 +16,11 @@ from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
 
 SHORT = ("axes.frequency=160", "axes.scheme=adaptive", "slow_time.cycles=20000", "slow_time.outputs=3")
-TABLE = (
-    "wear.law=table",
-    "wear.pressure=[1e4, 1e5]",
-    "wear.depth=[0, 1e-5]",
-    "wear.factor=[[1, 2], [0.5, 1]]",
-)
+TABLE = ("wear.law=table", "wear.pressure=[1e4, 1e5]", "wear.depth=[0, 1e-5]", "wear.factor=[[1, 2], [0.5, 1]]")
 
 
 def study_with(*overrides: str) -> Study:
     return read_study("sdof_slider", (*SHORT, *overrides))
-
-
-def test_without_a_wear_table_the_law_is_archards() -> None:
-    assert study_with().wear_law == ARCHARD
-
-
-@pytest.mark.parametrize(
-    ("overrides", "law"),
-    [
-        (("wear.law=energy",), WearLaw("energy")),
-        (("wear.law=threshold", "wear.threshold=0.5"), WearLaw("threshold", 0.5)),
-        (TABLE, WearLaw("table", table=WearTable((1e4, 1e5), (0.0, 1e-5), ((1.0, 2.0), (0.5, 1.0))))),
-        (('wear.surfaces={"the support, 1" = 2, a_b-1 = 0}',), WearLaw(surfaces=(("the support, 1", 2), ("a_b-1", 0)))),
-    ],
-    ids=["energy", "threshold", "table", "surfaces"],
-)
-def test_the_effective_study_has_the_same_law(overrides: tuple[str, ...], law: WearLaw, tmp_path: Path) -> None:
-    study = study_with(*overrides)
-    assert study.wear_law == law
-    (tmp_path / "again.toml").write_text(format_study(study))
-    assert read_study(tmp_path / "again.toml").wear_law == law
 
 
 def test_a_history_is_known_by_its_law_and_a_start_state_is_not() -> None:

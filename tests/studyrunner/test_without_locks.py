@@ -11,7 +11,7 @@ import xarray as xr
 from solver.outcome import Outcome
 from studyrunner.checkpoint import store as store_module
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.database import RESULTS, TABLES
+from studyrunner.checkpoint.database import RESULTS
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
@@ -82,29 +82,8 @@ def test_what_another_run_may_be_at_is_left_alone(path: Path, monkeypatch: pytes
         assert {found: found.read_bytes() for found in before} == before
 
 
-def test_where_there_are_locks_later_nothing_is_lost(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patched:
-        no_locks(patched)
-        fill(path)
-    assert not path.exists()
-    with contextlib.closing(Store(path)) as store:
-        assert store.path == path
-        assert len(entries_of(store)) == 4 * len(TABLES)
-
-
-def test_a_run_says_once_that_there_are_no_locks(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    no_locks(monkeypatch)
-    Solver(monkeypatch)
-    assert main(SMALL) == 0
-    lines = [line for line in capsys.readouterr().err.splitlines() if "locks" in line]
-    assert len(lines) == 1
-    assert lines[0].endswith("give each run a result file of its own with -o")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("at", [1, 2, 4, 6])
+@pytest.mark.parametrize("at", [2, 6])
 def test_two_studies_with_one_result_file_do_not_mix(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second one runs from its start to its end while the first one is at work."""
     no_locks(monkeypatch)

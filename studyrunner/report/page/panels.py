@@ -17,7 +17,8 @@ _FLAT = 1e-6
 
 
 def build_panels(result: Result, point: Point | None = None) -> list[dict[str, object]]:
-    """One panel a surface, of the scene of a point or of the shown one: `title`, `kind`, and `pairs`, places of its pairs in the file.
+    """One panel a surface, of the scene of a point or of the shown one: `title`, `kind`, and
+    `pairs`, places of its pairs in the file.
 
     kind "grid": `x` and `y`, m, of the columns and rows, and `pairs` as rows; "scatter": `x` and `y`, m, of each pair
     in the plane of the surface; "bars": one bar a pair.

@@ -103,7 +103,8 @@ def _draw_bands(panel: Axes, at: NDArray[np.float64], point: xr.Dataset, axis: s
 
 def _has_error(volume: NDArray[np.float64], wrong: NDArray[np.float64]) -> bool:
     """Whether a numerical error is seen beside what samples without a value leave open."""
-    moved = np.abs(wrong - volume)[np.isfinite(wrong) & np.isfinite(volume)]
+    known = np.isfinite(wrong) & np.isfinite(volume)
+    moved = np.abs(wrong[known] - volume[known])
     return bool((moved > _NOT_NEGLIGIBLE * largest(volume)).any())
 
 

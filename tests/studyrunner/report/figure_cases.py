@@ -137,12 +137,6 @@ def with_endings(result: Result, endings: Mapping[int, tuple[int, float]], messa
     return Result(result.path, dataset)
 
 
-def with_surfaces(result: Result, number: int) -> Result:
-    """The same file with its 12 pairs on so many surfaces."""
-    labels = [f"surface {pair * number // 12}" for pair in range(12)]
-    return Result(result.path, result.dataset.assign_coords(contact_surface=("contact", labels)))
-
-
 def with_two_responses(result: Result) -> Result:
     """The same file with a second response, half as large."""
     dataset = result.dataset

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.result import Result, open_for_report
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.variables import ASKED, COORDINATES, KEPT, USUAL
 
 FAILED = 4
 SENTENCES = ("The point was computed to the end.", "one", "two", "three", "A step did not converge: <b>use</b> less.")
@@ -40,7 +40,7 @@ def build_file(
     positions: NDArray[np.float64] | None = None,
     surfaces: Sequence[str] = (),
     responses: Sequence[str] = ("tip",),
-    variables: Sequence[str] = tuple(ASKED),
+    variables: Sequence[str] = USUAL,
     loops: Sequence[int] = (),
     seed: int = 1,
     **attributes: str,
@@ -71,7 +71,7 @@ def build_file(
     coordinates |= {f"contact_{axis}": ("contact", positions[:, i]) for i, axis in enumerate("xyz")}
     coordinates["contact_surface"] = ("contact", np.array(surfaces))
     dataset = xr.Dataset(data, coords=coordinates, attrs={"title": "A study", "study": STUDY, **attributes})
-    for name in map(str, dataset.coords):
+    for name in dataset.coords.keys() & COORDINATES.keys():
         dataset[name].attrs = {"units": COORDINATES[name].units, "long_name": COORDINATES[name].long_name}
     return _with_loops(dataset, tuple(axes), loops, random) if loops else dataset
 

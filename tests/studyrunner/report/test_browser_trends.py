@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -114,27 +113,6 @@ def test_the_line_is_that_of_the_file_with_its_errors(page: Any, dataset: xr.Dat
     np.testing.assert_allclose(drawn(page, "trend-plot", "trend")["y"], worn[2, order, 0, 0, 1, 0], rtol=1e-6)
 
 
-def test_all_other_combinations_stand_behind_it(page: Any, dataset: xr.Dataset) -> None:
-    others = drawn(page, "trend-plot", "others")
-    lines = shown(others["y"]).reshape(OTHERS, 4)
-    assert np.isnan(lines[:, 3]).all()
-    points = shown(others["customdata"]).reshape(OTHERS, 4)[:, :3].astype(int)
-    own = np.arange(N_POINTS).reshape(SHAPE)[1, [1, 0, 2], 1, 0, 0, 0]
-    assert sorted([*points.ravel(), *own]) == list(range(N_POINTS))
-    np.testing.assert_allclose(lines[:, :3], worn_of(dataset).ravel()[points], rtol=1e-6)
-
-
-@pytest.mark.parametrize(("index", "axis"), [(0, 0), (2, 2), (3, 4)])
-def test_the_list_of_axes_turns_the_line(page: Any, dataset: xr.Dataset, index: int, axis: int) -> None:
-    choose(page, "trend axis", index)
-    line = drawn(page, "trend-plot", "trend")
-    place: list[Any] = [1, 2, 1, 0, 0, 0]
-    place[axis] = slice(None)
-    np.testing.assert_allclose(line["y"], worn_of(dataset)[tuple(place)], rtol=1e-6)
-    values = list(FOUR.values())[axis]
-    assert line["x"] == ([0, 1] if axis == 4 else list(values))
-
-
 def test_peaks_and_shifts_are_those_of_the_parabolas(page: Any, dataset: xr.Dataset) -> None:
     pick(page, (1, 2, 1, 0, 1, 0))
     choose(page, "trend quantity", PEAK)
@@ -146,34 +124,6 @@ def test_peaks_and_shifts_are_those_of_the_parabolas(page: Any, dataset: xr.Data
     offsets = 0.05 * np.array([1, 0, 2])
     expected = np.abs(192.3 + offsets - 192.5) + np.abs(191.1 + offsets - 191.0)
     np.testing.assert_allclose(drawn(page, "trend-plot", "trend")["bars"], expected, rtol=1e-3)
-
-
-def test_a_peak_at_the_end_of_the_frequencies_is_told_as_not_known(page: Any) -> None:
-    choose(page, "trend quantity", PEAK)
-    pick(page, (1, 0, 0, 0, 0, 0))
-    (text,) = drawn(page, "trend-plot", "failed")["text"]
-    words = text.replace("<br>", " ")
-    assert words.startswith("not known: no peak inside the frequencies computed")
-    assert "frequency 19" not in words
-
-
-def test_frequency_is_no_axis_of_what_was_searched_through_it(page: Any, dataset: xr.Dataset) -> None:
-    choose(page, "trend axis", 0)
-    choose(page, "trend quantity", PEAK)
-    script = "return [...document.querySelector(\"select[name='trend axis']\").options].map((each) => each.disabled)"
-    assert page.execute_script(script) == [True, False, False, False]
-    assert drawn(page, "trend-plot", "trend")["x"] == [1e-12, 5e-12, 5e-11]
-
-
-def test_hover_tells_what_varies_with_units(page: Any, dataset: xr.Dataset) -> None:
-    worn = worn_of(dataset)[1, 2, 1, 0, 0, 0]
-    error = worn * dataset["error_estimate"].values[1, 2, 1, 0, 0, 0]
-    told, *named = drawn(page, "trend-plot", "trend")["text"][2].replace("\u00a0", " ").split("<br>")
-    assert named == ["frequency 191 Hz", "wear coefficient 5e-11 1/Pa", "excitation amplitude 1.5 N", "scheme implicit"]
-    number, _, wrong, unit = told.split()
-    assert float(number) == pytest.approx(worn, rel=5.1e-4)
-    assert float(wrong) == pytest.approx(error, rel=5.1e-2)
-    assert unit == "mm³"
 
 
 def test_the_map_is_that_of_any_two_axes(page: Any, dataset: xr.Dataset) -> None:
@@ -242,11 +192,7 @@ def click(page: Any, plot: str, meta: str, point: int) -> None:
 
 @pytest.mark.parametrize(
     ("plot", "meta", "place"),
-    [
-        ("trend-plot", "trend", (1, 1, 1, 0, 0, 0)),
-        ("trend-plot", "others", (3, 0, 0, 0, 1, 0)),
-        ("trend-map-plot", "map", (1, 0, 0, 0, 0, 0)),
-    ],
+    [("trend-plot", "trend", (1, 1, 1, 0, 0, 0)), ("trend-map-plot", "map", (1, 0, 0, 0, 0, 0))],
 )
 def test_a_click_picks_the_point_for_the_whole_page(page: Any, plot: str, meta: str, place: tuple[int, ...]) -> None:
     from selenium.webdriver.support.wait import WebDriverWait
@@ -260,51 +206,3 @@ def test_a_click_picks_the_point_for_the_whole_page(page: Any, plot: str, meta: 
     assert page.execute_script(lists)[:4] == expected
     line = drawn(page, "trend-plot", "trend")
     assert int(np.ravel_multi_index(place, SHAPE)) in line["customdata"]
-
-
-def test_the_slider_draws_the_trends_no_second_time(page: Any) -> None:
-    from selenium.webdriver.common.keys import Keys
-
-    page.execute_script("document.getElementById('trend-plot').data[0].seen = true")
-    press(page, Keys.ARROW_LEFT)
-    assert page.execute_script("return document.getElementById('trend-plot').data[0].seen === true")
-    press(page, Keys.END)
-
-
-SINGLE = {name: values[:1] for name, values in AXES.items()}
-FREQUENCY = {"frequency": AXES["frequency"]}
-COEFFICIENT = {"wear_coefficient": AXES["wear_coefficient"]}
-
-
-@pytest.mark.parametrize(
-    ("axes", "failed", "panel", "map_too"),
-    [
-        ({**SINGLE, **FREQUENCY}, (), False, False),
-        ({**SINGLE, **COEFFICIENT}, (), True, False),
-        ({**SINGLE, **FREQUENCY, **COEFFICIENT}, (), True, True),
-        ({**SINGLE, **FREQUENCY, "harmonics": ("auto", "5")}, range(3, 8), True, True),
-        ({**SINGLE, **FREQUENCY, **COEFFICIENT}, range(8), False, False),
-    ],
-    ids=["frequency", "one other", "two", "solver key, partial", "failed"],
-)
-def test_when_there_are_trends(
-    browser: Any,  # noqa: F811
-    tmp_path: Path,
-    axes: dict[str, Sequence[object]],
-    failed: Sequence[int],
-    panel: bool,
-    map_too: bool,
-) -> None:
-    dataset = build_file(axes, failed=failed)
-    load(browser, write(dataset, tmp_path))
-    script = "return document.getElementById('{}').offsetParent !== null"
-    assert browser.execute_script(script.format("trend-part")) == panel
-    assert browser.execute_script(script.format("trend-map-part")) == map_too
-    if map_too:
-        worn = dataset["worn_volume"].values[..., -1].reshape(4, 2)
-        field = shown(drawn(browser, "trend-map-plot", "map")["z"])
-        known = np.isfinite(worn)
-        np.testing.assert_array_equal(np.isfinite(field), known)
-        np.testing.assert_allclose(field[known], worn[known] * 1e9, rtol=1e-6)
-        assert len(drawn(browser, "trend-map-plot", "failed").get("x", [])) == (~known).sum()
-    assert messages(browser) == []

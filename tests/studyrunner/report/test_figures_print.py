@@ -24,14 +24,10 @@ _THIN = 2.0
 """Pixels by which boxes of text may touch."""
 
 
-def _many() -> Result:
-    """Long labels, and many of them."""
-    return make_result(wear_coefficient=[1e-12, 5e-12, 1.1e-11], sweep=["up", "down"], failed=[3])
-
-
 CASES = {
-    "complete": lambda: with_sector(with_loops(make_result())),
-    "many": _many,
+    "many": lambda: with_sector(
+        with_loops(make_result(wear_coefficient=[1e-12, 1.1e-11], sweep=["up", "down"], failed=[3]))
+    ),
     "precision": lambda: finest_file(estimate=lambda _: 1e-4),
 }
 

@@ -25,18 +25,6 @@ def test_worn_volume_over_cycles() -> None:
     assert f"{last:.4g} mm³ ± 2 %, above rtol (explicit scheme)" in drawing.caption
 
 
-def test_a_lost_branch_is_marked_on_the_history() -> None:
-    result = make_result()
-    jumps = result.dataset["jump_cycle"].copy()
-    jumps[2, 0, 0, 0, 0, 0] = 3000.0
-    x, y = lines_of(draw_figure(with_variables(result, jump_cycle=jumps), "worn_volume").figure.axes[0])[
-        "branch lost, jump"
-    ]
-    volume = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)
-    assert x == pytest.approx(3.0)
-    assert volume[1] < y[0] < volume[2]
-
-
 @pytest.mark.parametrize(("name", "factor"), [("worn_volume", 1e9), ("wear_rate", 1e12)])
 def test_maps_over_frequency_and_cycles(name: str, factor: float) -> None:
     result = make_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
@@ -48,28 +36,6 @@ def test_maps_over_frequency_and_cycles(name: str, factor: float) -> None:
     assert drawing.figure.axes[0].patch.get_hatch()
     largest = factor * float(np.nanmax(result.dataset[name]))
     assert re.search(rf"The largest is {largest:.4g} mm³", drawing.caption)
-
-
-def test_final_worn_volume_has_gaps_and_crosses_where_points_failed() -> None:
-    result = make_result(failed=[2])
-    panel = draw_figure(result, "final_worn_volume").figure.axes[0]
-    lines = lines_of(panel)
-    for number, label in enumerate(("implicit scheme", "explicit scheme")):
-        np.testing.assert_allclose(lines[label][0], result.dataset["frequency"])
-        np.testing.assert_allclose(lines[label][1], 1e9 * values_of(result, "worn_volume", cycle=-1, scheme=number))
-    assert np.isnan(lines["implicit scheme"][1]).tolist() == [False, True, False, False]
-    assert lines["no result"][0].tolist() == [201.0]
-
-
-def test_oscillating_points_are_ringed() -> None:
-    result = make_result()
-    oscillates = result.dataset["oscillates"].copy()
-    oscillates[2, 0, 0, 0, 1, 0] = 1
-    x, y = lines_of(draw_figure(with_variables(result, oscillates=oscillates), "final_worn_volume").figure.axes[0])[
-        "oscillates"
-    ]
-    assert x.tolist() == [202.0]
-    np.testing.assert_allclose(y, 1e9 * values_of(result, "worn_volume", frequency=2, scheme=1, cycle=-1))
 
 
 def test_frequency_response_of_both_sweeps_is_open_at_the_fold() -> None:
@@ -90,15 +56,6 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold() -> None:
             assert np.flatnonzero(~known).tolist() == gaps
     assert lines["fold, sweep up"][0].tolist() == [201.4]
     assert "201.4 Hz (sweep up)" in drawing.caption
-
-
-def test_unworn_states_of_several_schemes_are_one_line() -> None:
-    result = make_result(failed=[2, 5])
-    lines = lines_of(draw_figure(result, "frequency_response").figure.axes[0])
-    complete = make_result()
-    np.testing.assert_allclose(
-        lines["0 cycles"][1], 1e3 * values_of(complete, "response_amplitude", cycle=0, scheme=0), equal_nan=False
-    )
 
 
 def test_unstable_states_are_ringed() -> None:
@@ -126,25 +83,6 @@ def test_natural_frequencies_and_mesh() -> None:
     assert "The lowest is 200 Hz" in drawing.caption
 
 
-def test_estimated_errors_are_the_worst_over_the_cycles() -> None:
-    result = make_result(failed=[2])
-    lines = lines_of(draw_figure(result, "estimated_errors").figure.axes[0])
-    for name, label in (("response_error", "response, worst cycle"), ("energy_error", "energy balance, worst cycle")):
-        expected = values_of(result, name, scheme=0).max(axis=1)
-        np.testing.assert_allclose(lines[label][1], expected)
-    np.testing.assert_allclose(lines["last worn volume"][1], values_of(result, "error_estimate", scheme=0))
-    assert lines["rtol = 0.01"][1].tolist() == [0.01, 0.01]
-
-
-def test_errors_of_points_that_hardly_wear_are_left_out() -> None:
-    result = make_result()
-    volume = result.dataset["worn_volume"].copy()
-    volume[0] *= 1e-9
-    lines = lines_of(draw_figure(with_variables(result, worn_volume=volume), "estimated_errors").figure.axes[0])
-    assert np.isnan(lines["last worn volume"][1]).tolist() == [True, False, False, False]
-    assert np.isfinite(lines["response, worst cycle"][1]).all()
-
-
 def test_outcome_map_tells_each_number_and_its_sentence() -> None:
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
@@ -155,30 +93,6 @@ def test_outcome_map_tells_each_number_and_its_sentence() -> None:
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
     assert "3: The branch was lost." in drawing.caption
-
-
-def test_table_of_outcomes() -> None:
-    table = find_table(make_result(failed=[2, 5]), "outcomes")
-    assert table is not None
-    assert [row[:5] for row in table.rows] == [
-        ("0", "converged", "6", "2", "It was computed."),
-        ("3", "branch lost", "2", "0", "The branch was lost."),
-    ]
-    assert table.rows[1][5] == "201 Hz, implicit scheme"
-    assert table.note.startswith(
-        "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the"
-    )
-    assert "8 points, 6 computed to the end, 2 without a result." in table.note
-
-
-def test_table_of_certificates_is_that_of_the_file() -> None:
-    table = find_table(make_result(), "certificates")
-    assert table is not None
-    assert table.rows == (
-        ("worst certificate of", "3 points computed to the end"),
-        ("scaled residual", "1.0e-08 at frequency 2 Hz"),
-        ("folds in the sweeps", "none"),
-    )
 
 
 def test_table_of_folds_and_jumps() -> None:
@@ -213,16 +127,3 @@ def test_table_of_stability() -> None:
         ("204 Hz, explicit scheme", "1000", "900", "yes", "", ""),
     )
     assert table.note.startswith("3 points with an explicit step longer than step_limit, 2 with a wear rate")
-
-
-def test_what_a_figure_leaves_out_is_told() -> None:
-    coefficients = np.geomspace(1e-12, 1e-10, 7).tolist()
-    drawing = draw_figure(make_result(wear_coefficient=coefficients), "final_worn_volume")
-    assert len([label for label in lines_of(drawing.figure.axes[0]) if "scheme" in label]) == 2
-    assert (
-        "Shown for wear coefficient 1e-10 1/Pa; the file also holds 6 other values of wear coefficient."
-        in drawing.caption
-    )
-    few = draw_figure(make_result(wear_coefficient=[1e-12, 1e-11, 1e-10]), "final_worn_volume")
-    assert len([label for label in lines_of(few.figure.axes[0]) if "scheme" in label]) == 6
-    assert "Shown for" not in few.caption

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.contour import ContourSet
 
 from studyrunner.report.drawing import new_panels, style
 from studyrunner.report.isolines import add_colour_bar, add_isolines, find_levels
-from tests.studyrunner.report.figure_cases import make_result
-from tests.studyrunner.report.figure_numbers import draw_figure
 
 
 def _contours(panel: Axes) -> list[ContourSet]:
@@ -35,32 +32,3 @@ def test_lines_run_where_a_plane_has_their_level_and_tell_it() -> None:
     bar = figure.axes[-1]
     assert [text.get_text() for text in bar.get_yticklabels()] == ["0", "2", "4", "6", "8"]
     assert [float(line.get_ydata()[0]) for line in bar.get_lines()] == [2.0, 4.0, 6.0, 8.0]
-
-
-def test_where_there_is_no_room_between_lines_none_is_covered() -> None:
-    """A step from 0 to 10 within a hundredth of the width: all lines in one place, and at most the outer two named."""
-    x = np.array([0.0, 4.95, 5.05, 10.0])
-    with style():
-        _, panels = new_panels(1, 1, 3.0)
-        panel = panels[0, 0]
-        panel.set(xlim=(0.0, 10.0), ylim=(0.0, 1.0))
-        add_isolines(panel, x, np.array([0.0, 1.0]), np.array([[0.0, 0.0, 10.0, 10.0]] * 2), Normalize(0.0, 10.0))
-    assert {text.get_text() for text in panel.texts} <= {"2", "8"}
-
-
-@pytest.mark.parametrize("values", [np.zeros((3, 3)), np.full((3, 3), np.nan), np.ones((1, 3))])
-def test_nothing_is_drawn_where_there_is_nothing_to_part(values: np.ndarray) -> None:
-    with style():
-        _, panels = new_panels(1, 1, 3.0)
-        add_isolines(panels[0, 0], np.arange(3.0), np.arange(float(len(values))), values, Normalize(0.0, 1.0))
-    assert not _contours(panels[0, 0])
-
-
-@pytest.mark.parametrize("name", ["worn_volume_map", "wear_rate_map", "mean_pressure", "worn_profile"])
-def test_maps_of_results_have_isolines_in_four_digits(name: str) -> None:
-    figure = draw_figure(make_result(failed=[0]), name).figure
-    found = [lines for panel in figure.axes for lines in _contours(panel)]
-    assert len(found) >= 2
-    told = [text.get_text() for panel in figure.axes for text in panel.texts]
-    assert told
-    assert all(len(text.replace(".", "").lstrip("0")) <= 4 for text in told)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 
 from studyrunner.plan.point_text import settings_of as of_study
 from studyrunner.report.drawing import Table
@@ -30,18 +27,6 @@ def mixed() -> Result:
     endings = {EARLY: (3, 6000.0), ABOVE: (6, 20_000.0), SENSITIVE: (15, 20_000.0)}
     messages = {ABOVE: "from cycle 1000 on the wear rate is known to 2.6 % only", EARLY: "it broke off"}
     return with_endings(make_result(failed=[LOST]), endings, messages)
-
-
-def test_points_are_told_apart() -> None:
-    result = mixed()
-    assert np.flatnonzero(~result.held).tolist() == [LOST]
-    assert np.flatnonzero(result.held & ~result.computed).tolist() == [EARLY]
-    assert np.flatnonzero(result.above).tolist() == [3, ABOVE, SENSITIVE, 6]
-    assert np.flatnonzero(result.ended("sensitive")).tolist() == [SENSITIVE]
-    stable = result.read("stable").values.reshape(8, 4)
-    assert np.isnan(stable[EARLY]).tolist() == [False, False, False, True]
-    assert np.isnan(stable[LOST]).all()
-    assert not np.isnan(stable[SENSITIVE]).any()
 
 
 def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
@@ -99,23 +84,6 @@ def test_an_inaccurate_state_is_no_volume_above_rtol() -> None:
     assert remarks["0"] == "the response is known to 3 % only."
 
 
-def test_of_unworn_states_no_volume_is_told() -> None:
-    result = make_result(cycles=(0.0,))
-    assert tell_volumes(result) == ""
-    table = next(item for item in draw_outcomes(result) if isinstance(item, Table))
-    assert "known to rtol" not in table.columns
-
-
-def test_an_error_just_above_rtol_is_not_shown_as_rtol() -> None:
-    result = make_result(frequency=(200.0,), scheme=("adaptive",))
-    errors = result.dataset["error_estimate"] * 0.0 + 0.010003
-    just = Result(result.path, result.dataset.assign(error_estimate=errors))
-    assert tell_volumes(just) == (
-        "The worn volume of 0 of 1 point is known to rtol = 1 %, of 1 less well; the worst is known to 1.0003 %."
-        " What may help: rtol = 0.0099."
-    )
-
-
 def test_the_report_and_the_run_advise_the_same() -> None:
     """Settings of a point by its file are those by its study."""
     changes = ("axes.frequency=[200, 201]", "axes.scheme=['implicit', 'explicit']", "solver.harmonics=5")
@@ -126,33 +94,12 @@ def test_the_report_and_the_run_advise_the_same() -> None:
         assert settings_of(result, place) == of_study(study, place)
 
 
-@pytest.mark.parametrize("figure", ["mean_pressure", "wear_depth", "worn_profile"])
-def test_a_point_at_its_target_is_drawn_where_it_ended(figure: str) -> None:
+def test_a_point_at_its_target_is_drawn_where_it_ended() -> None:
     """It is computed to the end, with no values at later counts."""
     result = with_endings(make_result(), dict.fromkeys(range(8), (0, 6000.0)), {})
     assert result.last_kept(result.shown_point()) == 2
-    caption = draw_figure(result, figure).caption.replace("\N{NO-BREAK SPACE}", " ")
+    caption = draw_figure(result, "worn_profile").caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "5000 cycles" in caption
-
-
-def bands(panel: Axes) -> list[Any]:
-    return [found for found in panel.collections if isinstance(found, PolyCollection) and found.get_gid() == "error"]
-
-
-def test_the_history_has_a_band_of_its_error() -> None:
-    result = make_result()
-    drawing = draw_figure(result, "worn_volume")
-    first, second = bands(drawing.figure.axes[0])
-    assert "Bands: estimated error" in drawing.caption
-    for number, band in enumerate((first, second)):
-        worn, error = (
-            values_of(result, name, frequency=2, scheme=number) for name in ("worn_volume", "worn_volume_error")
-        )
-        edges = band.get_paths()[0].vertices
-        at_end = edges[edges[:, 0] == 20.0][:, 1]
-        np.testing.assert_allclose(
-            [at_end.min(), at_end.max()], 1e9 * worn[-1] * (1.0 + error[-1] * np.array([-1.0, 1.0]))
-        )
 
 
 def test_a_history_that_ended_early_has_a_cross_where_it_did() -> None:
@@ -184,54 +131,3 @@ def test_final_volumes_have_bars_and_marks() -> None:
     worn = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)[-1]
     (bar,) = [segment for segment in bars.get_segments() if segment[0, 0] == 202.0]
     np.testing.assert_allclose(bar[:, 1], [0.98 * worn, 1.02 * worn])
-
-
-def test_nothing_is_marked_where_all_is_within_rtol() -> None:
-    result = make_result()
-    small = Result(result.path, result.dataset.assign(error_estimate=result.dataset["error_estimate"] * 0.1))
-    drawing = draw_figure(small, "final_worn_volume")
-    assert not {"above rtol", "sensitive", "ended early"} & set(lines_of(drawing.figure.axes[0]))
-    assert "Squares" not in drawing.caption
-
-
-@pytest.mark.parametrize("figure", ["worn_volume", "final_worn_volume", "worn_volume_map", "frequency_response"])
-def test_a_file_where_all_points_ended_early_is_drawn(figure: str) -> None:
-    result = with_endings(make_result(), dict.fromkeys(range(8), (3, 6000.0)), {})
-    assert draw_figure(result, figure).caption
-
-
-def test_an_older_file_holds_results_of_points_to_tolerance_only() -> None:
-    """It has none of the new variables, and NaN where a state was above rtol."""
-    result = make_result(failed=[LOST], failing=6, without=("last_cycle", "worn_volume_error"))
-    assert np.array_equal(result.held, result.computed)
-    assert np.flatnonzero(~result.held).tolist() == [LOST]
-    assert not bands(draw_figure(result, "worn_volume").figure.axes[0])
-    assert lines_of(draw_figure(result, "final_worn_volume").figure.axes[0])["no result"][0].tolist() == [204.0]
-    content = build_page_data(result, 1e7).content
-    assert content is not None
-    assert content["without"] == [LOST]
-
-
-def test_points_of_an_older_file_that_was_joined_to_a_newer_one_are_results() -> None:
-    result = make_result()
-    last = result.dataset["last_cycle"].copy(deep=True)
-    last.values.flat[:4] = np.nan
-    joined = Result(result.path, result.dataset.assign(last_cycle=last))
-    assert joined.held.all()
-    assert joined.last_cycle.ravel().tolist() == [20_000.0] * 8
-    assert not np.isnan(joined.read("stable").values).any()
-
-
-def test_the_page_knows_which_points_hold_what() -> None:
-    content = build_page_data(mixed(), 1e7).content
-    assert content is not None
-    assert content["without"] == [LOST]
-    assert content["ends"] == {str(EARLY): 6000.0}
-    remarks = content["remarks"]
-    assert isinstance(remarks, dict)
-    assert set(remarks) == {"3", "6", str(EARLY), str(ABOVE), str(SENSITIVE), str(LOST)}
-    assert remarks[str(LOST)] == 'Try sweep = "down" or sweep = "ramp".'
-    assert remarks[str(ABOVE)] == (
-        "from cycle 1000 on the wear rate is known to 2.6 % only. Its worn volume is known to 2 % only. What may help:"
-        " rtol = 0.005."
-    )

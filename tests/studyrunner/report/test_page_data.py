@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 
 from studyrunner.report.page import kept as page_kept
 from studyrunner.report.page.data import COURSES, PageData, build_page_data
-from studyrunner.report.page.encoding import encode_floats
-from studyrunner.report.page.kept import thin_out
 from studyrunner.report.page.maps import LOOPS, MAPS
 from studyrunner.report.page.panels import MOST_PANELS, build_panels
 from studyrunner.report.reading.result import Result
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
-from tests.studyrunner.report.page_cases import AXES, FAILED, SENTENCES, build_file, flank_positions
+from tests.studyrunner.report.page_cases import SENTENCES, build_file, flank_positions
 from tests.studyrunner.report.root_cases import dovetail_file
 
 PLENTY = 4e6
@@ -88,50 +86,6 @@ def test_the_root_is_there_with_a_quarter_of_the_room_at_most() -> None:
     assert content_of(data)["maps"] is not None
 
 
-def test_numbers_of_points() -> None:
-    dataset = build_file(failed=[3])
-    numbers = content_of(build_page_data(result_of(dataset), PLENTY))["points"]
-    for name in ("run_time", "step_limit", "newton_iterations"):
-        np.testing.assert_array_equal(decode(numbers[name], -1), dataset[name].values.ravel().astype("f4"))
-    worst = dataset["residual"].max("cycle").values.ravel().astype("f4")
-    assert np.isnan(worst[3])
-    np.testing.assert_array_equal(decode(numbers["residual"], -1), worst)
-    assert np.isnan(decode(numbers["harmonics_used"], -1)[3])
-
-
-def test_axes_keep_texts_and_order() -> None:
-    axes = {**AXES, "scheme": ("explicit", "adaptive"), "harmonics": ("auto", "5")}
-    content = content_of(build_page_data(result_of(build_file(axes)), PLENTY))
-    by_label = {axis["label"]: axis for axis in content["axes"]}
-    assert [axis["label"] for axis in content["axes"]] == [name.replace("_", " ") for name in axes]
-    assert by_label["harmonics"]["values"] == ["auto", "5"]
-    assert by_label["harmonics"]["words"]
-    assert by_label["frequency"]["values"] == list(AXES["frequency"])
-    assert not by_label["frequency"]["words"]
-    assert content["horizontal"] == 0
-    assert content["lines"] == [list(axes).index("scheme")]
-
-
-def test_without_several_frequencies_another_axis_is_the_horizontal_one() -> None:
-    content = content_of(build_page_data(result_of(build_file({**AXES, "frequency": (190.0,)})), PLENTY))
-    assert content["axes"][content["horizontal"]]["label"] == "wear coefficient"
-
-
-@pytest.mark.parametrize(("count", "keep"), [(101, 11), (101, 7), (101, 2), (101, 1), (5, 5), (5, 50), (1, 1), (2, 1)])
-def test_thinned_places_are_even_and_hold_both_ends(count: int, keep: int) -> None:
-    places = thin_out(count, keep)
-    assert places[0] == 0
-    assert places[-1] == count - 1
-    assert len(places) == min(count, max(keep, 2))
-    if len(places) > 1:
-        assert np.ptp(np.diff(places)) <= 1
-
-
-def test_floats_are_little_endian_and_keep_nan() -> None:
-    assert base64.b64decode(encode_floats([1.0, np.nan]))[:4] == b"\x00\x00\x80\x3f"
-    assert np.isnan(np.frombuffer(base64.b64decode(encode_floats([1.0, np.nan])), dtype="<f4")[1])
-
-
 def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps() -> None:
     dataset = build_file(cycles=np.linspace(0.0, 1e4, 101), failed=[2])
     n_points, n_good, n_pairs = dataset["outcome"].size, dataset["outcome"].size - 1, dataset.sizes["contact"]
@@ -163,25 +117,6 @@ def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps() -> 
     assert any(f"the {len(points)} most worn of {n_good} points" in note for note in few.notes)
 
 
-def test_cycles_of_points_are_thinned_out_last() -> None:
-    dataset = build_file(cycles=np.linspace(0.0, 1e4, 101), failed=[2])
-    data = build_page_data(result_of(dataset), 4e4)
-    content = content_of(data)
-    kept = np.searchsorted(dataset["cycle"].values, content["cycles"])
-    assert 2 < len(kept) < 101
-    assert (kept[0], kept[-1]) == (0, 100)
-    assert any(f"{len(kept)} of the 101 cycle counts of the file" in note for note in data.notes)
-    expected = dataset["worn_volume"].values.reshape(-1, 101)[:, kept].astype("f4")
-    np.testing.assert_array_equal(decode(content["courses"]["worn_volume"], *expected.shape), expected)
-
-
-@pytest.mark.parametrize("limit", [3e4, 1e5, 3e5, 1e6])
-def test_the_limit_is_kept(limit: float) -> None:
-    dataset = build_file(cycles=np.linspace(0.0, 1e4, 101), loops=[1, 3])
-    data = build_page_data(result_of(dataset), limit)
-    assert len(json.dumps(data.content)) < limit + 8e3
-
-
 def test_a_page_without_room_says_so() -> None:
     data = build_page_data(result_of(build_file()), 1e3)
     assert data.content is None
@@ -198,36 +133,6 @@ def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.Monkey
             assert build_page_data(result_of(dataset), 2e5) == whole
 
 
-def test_all_points_failed() -> None:
-    dataset = build_file(failed=range(16), loops=[1])
-    content = content_of(build_page_data(result_of(dataset), PLENTY))
-    assert content["maps"] is None
-    assert content["loops"] is None
-    assert content["outcome"] == [FAILED] * 16
-    assert np.isnan(decode(content["courses"]["worn_volume"], -1)).all()
-
-
-def test_missing_variables_are_left_out() -> None:
-    content = content_of(build_page_data(result_of(build_file(variables=("wear_rate",))), PLENTY))
-    assert list(content["courses"]) == ["wear_rate"]
-    assert content["maps"] is None
-    assert "residual" not in content["points"]
-
-
-def test_the_shown_point_is_picked_at_first() -> None:
-    result = result_of(build_file())
-    found = np.unravel_index(content_of(build_page_data(result, PLENTY))["shown"], result.computed.shape)
-    assert dict(zip(result.axes, map(int, found), strict=True)) == result.shown_point()
-
-
-def test_values_are_shown_in_units_that_fit() -> None:
-    content = content_of(build_page_data(result_of(build_file()), PLENTY))
-    assert (content["courses"]["response_amplitude"]["unit"], content["courses"]["response_amplitude"]["factor"]) == (
-        "µm",
-        1e6,
-    )
-
-
 def test_flanks_are_grids() -> None:
     panels = build_panels(result_of(build_file()))
     assert [(panel["title"], panel["kind"]) for panel in panels] == [("intrados", "grid"), ("extrados", "grid")]
@@ -240,23 +145,6 @@ def test_flanks_are_grids() -> None:
         np.testing.assert_allclose(positions[pairs][0, :, 2] - positions[pairs][0, 0, 2], panel["x"])
         seen += pairs.ravel().tolist()
     assert sorted(seen) == list(range(24))
-
-
-def test_scattered_positions_keep_their_distances() -> None:
-    positions = np.random.default_rng(3).normal(size=(9, 3)) * [1.0, 1.0, 0.0]
-    (panel,) = build_panels(result_of(build_file(positions=positions, surfaces=["one"] * 9)))
-    assert (panel["kind"], panel["pairs"]) == ("scatter", list(range(9)))
-    drawn = np.stack([panel["x"], panel["y"]], axis=1)
-    distances = [np.linalg.norm(each[:, None] - each[None], axis=-1) for each in (positions, drawn)]
-    np.testing.assert_allclose(*distances, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "positions", [np.full((4, 3), np.nan), np.zeros((1, 3)), np.eye(3)[[0] * 4] * [[1], [2], [3], [4]]]
-)
-def test_bars_where_there_is_no_map(positions: NDArray[np.float64]) -> None:
-    (panel,) = build_panels(result_of(build_file(positions=positions, surfaces=["one"] * len(positions))))
-    assert panel == {"title": "one", "kind": "bars", "pairs": list(range(len(positions)))}
 
 
 def test_many_surfaces_share_a_panel() -> None:

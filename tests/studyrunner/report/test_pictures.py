@@ -22,13 +22,12 @@ from studyrunner import read_study, run_study
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
 from studyrunner.study.study_file import format_study
-from tests.benchmarks.pictures import FOLDER, NAMES, NUMBERS, as_text, make_pictures, read_figure
-from tests.studyrunner.report.figure_cases import make_result, with_sector
-from tests.studyrunner.report.figure_numbers import draw_figure, values_of
+from tests.benchmarks.pictures import FOLDER, NAMES, NUMBERS
+from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.report.page_cases import as_result
 from tests.studyrunner.report.root_cases import dovetail_file
 
-RECOMPUTED = (212.0, 212.5)  # Hz; they take half a minute
+RECOMPUTED = (211.0,)  # Hz; beside the resonance, which takes longer
 
 
 @pytest.fixture(scope="module")
@@ -42,22 +41,6 @@ def line_of(stored: dict[str, Any], figure: str, label: str) -> dict[float, floa
     return dict(zip(x, y, strict=True))
 
 
-def test_final_volumes_are_written_down_with_their_errors() -> None:
-    result = make_result()
-    panel = read_figure(draw_figure(result, "final_worn_volume"))["panels"][0]
-    assert panel["x"] == "excitation frequency (Hz)"
-    assert panel["y"].endswith("(mm³)")
-    expected = []
-    for number, label in enumerate(("implicit scheme", "explicit scheme")):
-        worn = 1e9 * values_of(result, "worn_volume", cycle=-1, scheme=number)
-        wrong = values_of(result, "error_estimate", scheme=number) * worn
-        at = result.dataset["frequency"].values
-        np.testing.assert_allclose(panel["lines"][label], [at, worn], rtol=1e-5)
-        expected += np.stack([at, worn - wrong, worn + wrong], axis=1).tolist()
-    np.testing.assert_allclose(sorted(panel["bars"]), sorted(expected), rtol=1e-5)
-
-
-@pytest.mark.slow
 def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> None:
     """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
 
@@ -89,30 +72,6 @@ def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> 
             assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
 
 
-def test_maps_and_long_lines_are_written_down_by_their_ranges() -> None:
-    result = make_result()
-    maps = [panel["maps"] for panel in read_figure(draw_figure(result, "worn_volume_map"))["panels"]]
-    worn = [1e9 * values_of(result, "worn_volume", scheme=number) for number in (0, 1)]
-    np.testing.assert_allclose(maps, [[[each.min(), each.max()]] for each in worn], rtol=1e-5)
-    many = make_result(frequency=np.linspace(200.0, 204.0, 41).tolist())
-    x, y = read_figure(draw_figure(many, "final_worn_volume"))["panels"][0]["lines"]["implicit scheme"]
-    assert x == [200.0, 204.0]
-    last = 1e9 * values_of(many, "worn_volume", cycle=-1, scheme=0)
-    assert y == pytest.approx([last.min(), last.max()], rel=1e-5)
-
-
-def test_gaps_are_null_in_the_text() -> None:
-    figure = read_figure(draw_figure(make_result(failed=[2]), "final_worn_volume"))
-    again = json.loads(as_text(figure))
-    assert again == figure
-    assert again["panels"][0]["lines"]["implicit scheme"][1][1] is None
-
-
-def test_a_file_without_what_a_picture_needs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(KeyError, match="fretting_loops"):
-        make_pictures(with_sector(make_result()), tmp_path)
-
-
 def test_figures_of_the_bundled_study_are_all_written_down(stored: dict[str, Any]) -> None:
     assert set(stored["figures"]) == set(NAMES)
     final = stored["figures"]["final_worn_volume"]["panels"][0]
@@ -142,7 +101,8 @@ def test_points_computed_anew_agree_within_the_errors(stored: dict[str, Any], tm
         "outputs.loops": [],
     }
     with run_study("dovetail", tmp_path / "again.nc", overrides=changes, progress=False) as result:
-        again = result.squeeze(drop=True).load()
+        varied = {"frequency", "cycle", "response", "contact"}
+        again = result.squeeze([name for name in result.outcome.dims if name not in varied], drop=True).load()
     worn = line_of(stored, "final_worn_volume", "adaptive scheme")
     bars = stored["figures"]["final_worn_volume"]["panels"][0]["bars"]
     unworn = line_of(stored, "frequency_response", "0 cycles")

@@ -14,13 +14,7 @@ from studyrunner.report.drawing import Table
 from studyrunner.report.precision.comparison import Precision, study_precision
 from studyrunner.report.precision.errors import pareto_front
 from studyrunner.report.precision.figures import draw_precision
-from studyrunner.report.precision.findings import (
-    TARGETS,
-    find_orders,
-    find_stable_step,
-    log_slope,
-    recommend,
-)
+from studyrunner.report.precision.findings import TARGETS, find_orders, find_stable_step, recommend
 from studyrunner.report.precision.settings import Setting
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.synthetic import WORN, Point, synthetic
@@ -78,17 +72,6 @@ def test_errors_against_the_exact_answer_are_those_of_the_formula() -> None:
         assert times == sorted(times)
 
 
-def test_largest_error_over_the_cycles_is_that_of_any_count() -> None:
-    result = exact_file()
-    worn = result.dataset["worn_volume"].values.copy()
-    worn[..., 1] += 0.25 * WORN
-    result.dataset["worn_volume"] = (result.dataset["worn_volume"].dims, worn)
-    for item in precision_of(result).points[0].measured.itertuples():
-        middle = 0.5 * 0.4 * error_of({"frequency": 100.0, **vars(item.Index)})
-        assert item.course == pytest.approx(0.25 + middle, rel=1e-9)
-        assert item.volume < 0.1
-
-
 def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines() -> None:
     precision = precision_of(finest_file(estimate=lambda point: 2e-4 if point["scheme"] == "adaptive" else 9e-4))
     reference_error = 0.03 / 81
@@ -106,32 +89,6 @@ def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines() -> No
             known = abs(own - size * reference_error) / (1.0 + size * reference_error)
             assert item.volume == pytest.approx(known, rel=1e-9, abs=1e-14)
             assert item.volume_resolved == (known >= 3.0 * 2e-4)
-
-
-@pytest.mark.parametrize(("implicit", "expected"), [(1e-5, "implicit"), (9e-4, "adaptive")])
-def test_of_the_finest_in_time_the_one_of_smaller_estimate_is_the_reference(implicit: float, expected: str) -> None:
-    result = finest_file(estimate=lambda point: 2e-4 if point["scheme"] == "adaptive" else implicit)
-    reference = precision_of(result).points[0].reference
-    assert reference is not None
-    assert reference.setting == Setting(expected, None if expected == "adaptive" else STEPS[0], 9)
-
-
-def test_smallest_rtol_of_the_adaptive_scheme_is_the_reference() -> None:
-    axes = {
-        "scheme": ["adaptive", "implicit"],
-        "step": STEPS,
-        "harmonics": [1, 3],
-        "samples": [32, 64],
-        "rtol": [0.1, 0.01],
-    }
-    result = synthetic(axes, error_of, time_of)
-    (point,) = precision_of(result).points
-    assert point.reference is not None
-    assert point.reference.setting == Setting("adaptive", None, 3, 64, None, 0.01)
-    # rtol changes nothing for the implicit scheme with given harmonics and samples, nor the step for the adaptive one
-    by_scheme = [setting.scheme for setting in point.measured.index]
-    assert by_scheme.count("adaptive") == 2 * 2 * 2 - 1
-    assert by_scheme.count("implicit") == len(STEPS) * 2 * 2
 
 
 def test_automatic_harmonics_use_rtol_and_rank_by_what_they_took() -> None:
@@ -172,19 +129,6 @@ def test_nothing_is_compared_where_all_failed() -> None:
     assert {row[0] for row in table.rows} == {"100 Hz"}
 
 
-def test_files_without_settings_to_compare() -> None:
-    assert study_precision(synthetic({"frequency": [1.0, 2.0]}, error_of, time_of)) is None
-    assert study_precision(synthetic({"scheme": ["implicit", "explicit"]}, error_of, time_of)) is None
-    assert study_precision(synthetic({"scheme": ["implicit", "explicit"]}, error_of, time_of, exact=True)) is not None
-    assert study_precision(synthetic({"scheme": ["adaptive", "implicit", "explicit"]}, error_of, time_of)) is None
-
-
-@pytest.mark.parametrize(("wears", "shortcuts", "shared"), [(1, "true", False), (2, "true", True), (2, "false", False)])
-def test_times_of_shared_marches_are_told(wears: int, shortcuts: str, shared: bool) -> None:
-    axes = {"step": STEPS, "wear_coefficient": [1e-11, 1e-10][:wears]}
-    assert precision_of(synthetic(axes, error_of, time_of, shortcuts=shortcuts)).shared == shared
-
-
 def test_front_is_that_of_all_pairs_compared() -> None:
     rng = np.random.default_rng(1)
     numbers = rng.integers(1, 12, (60, 2)).astype(float)
@@ -199,20 +143,6 @@ def test_front_is_that_of_all_pairs_compared() -> None:
     }
     assert best == undominated
     assert len(front) == len(undominated)
-
-
-def test_errors_that_are_not_resolved_end_the_front() -> None:
-    precision = precision_of(finest_file(estimate=lambda _: 2e-3))
-    for point in precision.points:
-        front = point.front("volume")
-        assert sum(~front["volume_resolved"]) == 1
-        assert not front["volume_resolved"].iloc[-1]
-
-
-@pytest.mark.parametrize("power", [1.0, 2.0])
-def test_slope_of_a_power_is_its_exponent(power: float) -> None:
-    steps = np.array([1.0, 3.0, 7.0, 50.0])
-    assert log_slope(steps.tolist(), (0.2 * steps**power).tolist()) == pytest.approx(power, abs=1e-12)
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0])
@@ -231,51 +161,6 @@ def test_order_in_the_step_is_that_of_the_formula(power: float, against: str) ->
         assert order.order == pytest.approx(power, abs=1e-9)
         assert order.used == STEPS
         assert list(order.errors.values()) == pytest.approx([1e-4 * step**power for step in STEPS], rel=1e-9)
-
-
-def test_order_of_the_step_without_a_finer_reference_uses_clear_errors_only() -> None:
-    steps = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0]
-    result = synthetic({"step": steps}, lambda point: -1e-3 * float(point["step"]), time_of)
-    (point,) = precision_of(result).points
-    order = next(order for order in find_orders(point) if order.quantity == "volume")
-    # against a step of 1 the errors are those of step - 1: less than 5 at step 4
-    assert tuple(order.errors) == tuple(steps[1:])
-    assert order.used == (8.0, 16.0, 32.0)
-    assert order.order == pytest.approx(np.polyfit(np.log([8, 16, 32]), np.log([7, 15, 31]), 1)[0], rel=1e-9)
-
-
-def test_order_that_cannot_be_measured_says_why() -> None:
-    result = synthetic({"step": STEPS, "scheme": ["implicit", "adaptive"]}, error_of, time_of, rtol=0.5)
-    (point,) = precision_of(result).points
-    for order in find_orders(point):
-        assert math.isnan(order.order)
-        assert "no value with a clear error, of 50 % at least" in order.reason
-
-
-def test_explicit_steps_beyond_the_limit_are_left_out_of_the_order() -> None:
-    def error(point: Point) -> float:
-        wild = 5.0 if point["scheme"] == "explicit" and float(point["step"]) > 60.0 else 1.0
-        return SIGN[str(point["scheme"])] * 1e-4 * float(point["step"]) * wild
-
-    result = synthetic({"step": STEPS, "scheme": list(SIGN)}, error, time_of, limit=60.0, rtol=1e-4)
-    (point,) = precision_of(result).points
-    for order in find_orders(point):
-        assert order.used == (STEPS[:3] if order.setting.scheme == "explicit" else STEPS)
-        assert order.order == pytest.approx(1.0, abs=1e-9)
-
-
-def test_convergence_in_the_harmonics() -> None:
-    axes = {"harmonics": [1, 3, 5, 9], "step": STEPS}
-    result = synthetic(axes, lambda point: 0.1 / float(point["harmonics"]) ** 2, time_of, exact=True)
-    (point,) = precision_of(result).points
-    orders = [order for order in find_orders(point) if order.key == "harmonics"]
-    assert [order.quantity for order in orders] == ["volume", "response"]
-    for order in orders:
-        assert order.order == pytest.approx(2.0, abs=1e-9)
-        assert tuple(order.errors) == (1.0, 3.0, 5.0, 9.0)
-        assert order.setting == Setting("implicit", STEPS[0])
-        # against the exact answer, what the finest setting leaves may have other causes: 5 times that counts
-        assert order.used == (1.0, 3.0)
 
 
 @pytest.mark.parametrize("how", ["oscillates", "outcome"])
@@ -313,22 +198,6 @@ def test_recommended_is_the_cheapest_of_all_that_are_exact_enough() -> None:
             assert found.run_time == pytest.approx(best[0])
             assert found.certain
             assert found.volume <= target
-
-
-def test_recommendation_within_the_uncertainty_of_the_reference_is_not_certain() -> None:
-    precision = precision_of(finest_file(estimate=lambda _: 5e-3))
-    coarse, fine, finest = (recommend(precision.points, target) for target in TARGETS)
-    assert coarse.certain
-    assert fine.reference >= 5e-3
-    assert finest.setting is None or not finest.certain
-    assert max(fine.volume, fine.response) <= 0.01
-
-
-def test_worse_response_decides_too() -> None:
-    result = exact_file(response_error=lambda point: 0.2 if point["scheme"] == "explicit" else 0.0)
-    found = recommend(precision_of(result).points, 0.05)
-    assert found.setting is not None
-    assert found.setting.scheme == "implicit"
 
 
 def test_wear_where_there_is_none_is_infinitely_wrong() -> None:

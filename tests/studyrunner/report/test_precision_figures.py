@@ -11,9 +11,9 @@ import pytest
 
 from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.precision.comparison import Precision, study_precision
-from studyrunner.report.precision.figures import _show_tick, _ticks, draw_precision
+from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.precision.findings import show_percent
-from tests.studyrunner.report.synthetic import Point, synthetic
+from tests.studyrunner.report.synthetic import synthetic
 from tests.studyrunner.report.test_precision import HARMONICS, STEPS, exact_file, finest_file, precision_of
 
 
@@ -28,7 +28,6 @@ def items_of(precision: Precision) -> dict[str, Drawing | Missing | Table]:
     return dict(zip(names, items, strict=True))
 
 
-@pytest.mark.slow
 def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
     precision = precision_of(finest_file(estimate=lambda _: 1e-4))
     items = items_of(precision)
@@ -83,19 +82,6 @@ def test_failed_points_are_told_and_listed() -> None:
     assert sum("march failed" in row[-1] for row in table.rows) == len(STEPS) * len(HARMONICS)
 
 
-@pytest.mark.slow
-def test_exact_answer_and_shared_times_are_told() -> None:
-    axes = {"step": STEPS, "scheme": ["implicit", "explicit"], "wear_coefficient": [1e-11, 1e-10]}
-    result = synthetic(axes, lambda point: 1e-4 * float(point["step"]), lambda _: 1.0, exact=True)
-    drawing = items_of(precision_of(result))["precision"]
-    assert isinstance(drawing, Drawing)
-    assert "against the exact answer" in drawing.caption
-    assert "shortcuts = false" in drawing.caption
-    other = items_of(precision_of(exact_file()))["precision"]
-    assert isinstance(other, Drawing)
-    assert "shortcuts" not in other.caption
-
-
 def test_recommendations_are_listed_for_each_point_and_all() -> None:
     table = items_of(precision_of(exact_file()))["precision_recommended"]
     assert isinstance(table, Table)
@@ -111,65 +97,12 @@ def test_settings_that_all_agree_are_one_sentence() -> None:
     assert isinstance(item, Missing)
 
 
-def test_no_figure_where_no_error_is_resolved() -> None:
-    """The largest error of the formula is 8 %: from 8 % / 3 of uncertainty on, nothing is clearly larger."""
-    for uncertainty, kind in ((0.02, Drawing), (0.03, Missing)):
-        items = items_of(precision_of(finest_file(estimate=lambda _, known=uncertainty: known)))
-        assert type(items["precision"]) is kind
-        assert isinstance(items["precision_settings_1"], Table)
-
-
-def test_no_figure_where_all_errors_are_the_same() -> None:
-    result = synthetic({"step": STEPS}, lambda point: 0.0 if point["step"] == STEPS[0] else 0.05, lambda _: 1.0)
-    assert isinstance(items_of(precision_of(result))["precision"], Missing)
-
-
-def test_titles_tell_what_differs_and_the_caption_the_rest() -> None:
-    axes = {"wear_coefficient": [1e-11, 2e-11], "frequency": [100.0, 200.0], "step": STEPS}
-    result = synthetic(axes, lambda point: 1e-4 * float(point["step"]), lambda _: 1.0)
-    chosen = type(result)(result.path, result.dataset.isel(wear_coefficient=[1]))
-    whole = type(result)(result.path, result.dataset.isel(frequency=[1]))
-    for file, titles in (
-        (chosen, ["100 Hz", "200 Hz"]),
-        (whole, ["wear coefficient 1e-11 1/Pa", "wear coefficient 2e-11 1/Pa"]),
-    ):
-        drawing = items_of(precision_of(file))["precision"]
-        assert isinstance(drawing, Drawing)
-        assert [panel.get_title(loc="left") for panel in drawing.figure.axes[::2]] == titles
-    drawing = items_of(precision_of(result))["precision"]
-    assert isinstance(drawing, Drawing)
-    assert drawing.figure.axes[0].get_title(loc="left") == "100 Hz, wear coefficient 1e-11 1/Pa"
-
-
-@pytest.mark.parametrize(("low", "high"), [(0.24, 0.4), (0.47, 0.66), (0.2, 33.0), (1e-7, 3.0), (1.1e-3, 1.9e-3)])
-def test_ticks_are_few_and_short(low: float, high: float) -> None:
-    ticks = _ticks(low, high)
-    assert 3 <= len(ticks) <= 6
-    assert all(low <= tick <= high for tick in ticks)
-    assert all(len(_show_tick(tick, percent=False)) <= 7 for tick in ticks)
-
-
 def test_one_response_less_is_one_panel_less() -> None:
     result = finest_file()
     lesser = type(result)(result.path, result.dataset.drop_vars("response_amplitude"))
     drawing = items_of(precision_of(lesser))["precision"]
     assert isinstance(drawing, Drawing)
     assert len(drawing.figure.axes) == 2
-
-
-def test_at_most_three_points_are_drawn_those_that_wear_most() -> None:
-    def error(point: Point) -> float:
-        return -1e-4 * float(point["step"])
-
-    result = synthetic(
-        {"frequency": [1.0, 2.0, 3.0, 4.0, 5.0], "step": STEPS}, error, lambda point: 1.0 / point["step"]
-    )
-    factor = np.array([1.0, 5.0, 2.0, 4.0, 3.0])
-    result.dataset["worn_volume"] = result.dataset["worn_volume"] * factor[:, None, None, None, None]
-    drawing = items_of(precision_of(result))["precision"]
-    assert isinstance(drawing, Drawing)
-    assert [panel.get_title(loc="left") for panel in drawing.figure.axes[::2]] == ["2 Hz", "4 Hz", "5 Hz"]
-    assert "2 other points not drawn" in drawing.caption
 
 
 @pytest.mark.parametrize(

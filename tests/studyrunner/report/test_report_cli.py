@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from studyrunner.report import page_contents
-from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main, parse_options
+from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.drawing import Missing, Table
 from tests.studyrunner.report.page_cases import build_file
 
@@ -32,7 +32,6 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
 def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["results/worn.x.nc"]) == WRITTEN
     said = capsys.readouterr()
@@ -43,21 +42,6 @@ def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: p
     assert said.err == ""
 
 
-@pytest.mark.slow
-def test_a_folder_can_be_named(short: Path) -> None:
-    assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
-    assert [path.name for path in (short / "a" / "b").iterdir()] == ["index.html"]
-    # Again: it is replaced.
-    assert main(["results/worn.x.nc", "-o", "a/b"]) == WRITTEN
-
-
-@pytest.mark.slow
-def test_failed_points_are_no_failure_of_the_report(short: Path) -> None:
-    build_file(failed=range(16)).to_netcdf(short / "failed.nc")
-    assert main(["failed.nc"]) == WRITTEN
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
@@ -94,18 +78,6 @@ def test_an_unexpected_failure_has_a_traceback(
     assert "ZeroDivisionError: broken" in said
 
 
-@pytest.mark.slow
-def test_an_interrupt_is_one_line(
-    short: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(_result: object) -> Iterator[Missing]:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(page_contents, "draw_report", interrupt)
-    assert main(["results/worn.x.nc"]) == INTERRUPTED
-    assert capsys.readouterr().err == "study-report: interrupted\n"
-
-
 APART = """
 import ctypes, os, signal, sys, time
 # in the background of a shell it is ignored
@@ -130,26 +102,22 @@ def start_apart(drawing: str, folder: Path) -> subprocess.Popen[str]:
     ("drawing", "status", "said"),
     [
         ("ctypes.string_at(0)", BAD_INPUT, "results/worn.x.nc: the file = damaged: give a result file that is whole\n"),
-        ("os.abort()", BAD_INPUT, "results/worn.x.nc: the file = damaged: give a result file that is whole\n"),
         ("os.kill(os.getpid(), signal.SIGKILL)", UNEXPECTED, "ended by signal 9 (Killed)\n"),
-        ("[]", WRITTEN, ""),
     ],
 )
 def test_a_crash_of_a_library_while_it_draws_is_one_line(drawing: str, status: int, said: str, short: Path) -> None:
     """A file may be damaged where nobody has looked before: most of a large variable is read for the drawings only."""
     with start_apart(drawing, short) as started:
         out, error = started.communicate()
-    assert (started.returncode, error) == (status, f"study-report: {said}" if said else "")
-    assert bool(out) == (status == WRITTEN)
+    assert (started.returncode, out, error) == (status, "", f"study-report: {said}")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_what_ends_the_command_ends_the_process_that_draws(number: signal.Signals, short: Path) -> None:
+def test_what_ends_the_command_ends_the_process_that_draws(short: Path) -> None:
     with start_apart("print(os.getpid(), flush=True) or time.sleep(600)", short) as started:
         assert started.stdout is not None
         drawing = int(started.stdout.readline())
-        started.send_signal(number)
+        started.send_signal(signal.SIGINT)
         _, error = started.communicate()
     assert (started.returncode, error) == (INTERRUPTED, "study-report: interrupted\n")
     with pytest.raises(ProcessLookupError):
@@ -166,8 +134,3 @@ def test_help_has_examples_and_does_not_load_the_libraries(capsys: pytest.Captur
         "sys.exit(bool({'matplotlib', 'plotly', 'xarray', 'numpy'} & set(sys.modules)))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
-
-
-def test_options() -> None:
-    assert parse_options(["some/where/out.nc"]).folder == Path("out-report")
-    assert parse_options(["out.nc", "-o", "f"]).folder == Path("f")

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report.reading.result import Result, as_sentences, open_for_report
-from studyrunner.report.reading.units import Scale, scale_for, show_cycles, show_number, show_power
+from studyrunner.report.reading.result import open_for_report
+from studyrunner.report.reading.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
-from tests.studyrunner.report.figure_cases import make_result, with_variables
+from tests.studyrunner.report.figure_cases import make_result
 
 
-@pytest.mark.slow
 def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     path = tmp_path / "made.nc"
     made = make_result()
@@ -28,7 +27,6 @@ def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
     result.close()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [
@@ -66,32 +64,6 @@ def test_the_shown_point_wears_most_of_those_to_be_trusted() -> None:
     assert result.shown_point() == dict.fromkeys(result.axes, 0) | {"frequency": 2, "scheme": 0}
 
 
-def test_the_shown_point_does_not_oscillate_where_another_does_not() -> None:
-    result = make_result()
-    oscillates = result.dataset["oscillates"].copy()
-    oscillates[2] = 1
-    assert with_variables(result, oscillates=oscillates).shown_point()["frequency"] in (1, 3)
-    oscillates[:] = 1
-    assert with_variables(result, oscillates=oscillates).shown_point()["frequency"] == 2
-
-
-@pytest.mark.parametrize(
-    ("result", "expected"),
-    [
-        (make_result(scheme=["explicit"]), (2, 0)),
-        (make_result(failed=[4]), (1, 0)),
-        (make_result(failed=[0, 2, 4, 6]), (2, 1)),
-        (make_result(wears=False), (2, 0)),
-        (make_result(without=["worn_volume"]), (2, 0)),
-        (make_result(without=["worn_volume", "response_amplitude"], failed=[0]), (1, 0)),
-        (make_result(failed=range(8)), (0, 0)),
-    ],
-)
-def test_the_shown_point_where_something_is_lacking(result: Result, expected: tuple[int, int]) -> None:
-    shown = result.shown_point()
-    assert (shown["frequency"], shown["scheme"]) == expected
-
-
 def test_combinations_within_the_limit_are_all_chosen() -> None:
     choice = make_result(sweep=["up", "down"]).choose(["frequency"], 4)
     assert choice.labels == (
@@ -104,18 +76,6 @@ def test_combinations_within_the_limit_are_all_chosen() -> None:
     assert all("frequency" not in point for point in choice.points)
 
 
-def test_beyond_the_limit_the_shown_point_stands_for_the_rest() -> None:
-    result = make_result(wear_coefficient=[1e-12, 1e-11, 1e-10], sweep=["up", "down"])
-    choice = result.choose(["frequency"], 4)
-    assert {point["wear_coefficient"] for point in choice.points} == {2}
-    assert choice.sentence == (
-        "Shown for wear coefficient 1e-10 1/Pa; the file also holds 2 other values of wear coefficient."
-    )
-    single = result.choose(["frequency"], 1)
-    shown = result.shown_point()
-    assert single.points == ({name: index for name, index in shown.items() if name != "frequency"},)
-
-
 def test_points_in_words() -> None:
     result = make_result(frequency=[212.25, 213.0])
     assert result.describe({"frequency": 0, "scheme": 1}) == "212.25 Hz, explicit scheme"
@@ -126,43 +86,15 @@ def test_points_in_words() -> None:
     )
 
 
-def test_outcomes_are_told_by_the_file() -> None:
-    result = make_result(failed=[1], failing=-1)
-    assert result.endings[-1].word == "not_computed"
-    assert result.endings[-1].sentence == "It was not reached."
-    # what files of earlier versions claim of every point that was computed to the end
-    older = make_result()
-    sentences = older.dataset["outcome"].attrs["sentences"].replace("It was computed.", "It was computed to tolerance.")
-    older.dataset["outcome"].attrs["sentences"] = sentences
-    assert older.endings[0].sentence == "It was computed to the end."
-    del result.dataset["outcome"].attrs["sentences"]
-    bare = Result(result.path, result.dataset)
-    assert bare.endings[3].sentence == "branch lost"
-    unknown = make_result(failed=[1], failing=77)
-    assert unknown.endings[77].sentence == "outcome 77"
-
-
-def test_a_study_that_cannot_be_read_is_empty() -> None:
-    result = make_result()
-    result.dataset.attrs["study"] = "= nonsense"
-    assert result.study == {}
-
-
 @pytest.mark.parametrize(
     ("units", "largest", "shown"),
     [
         ("m", 4.2e-3, "4.2 mm"),
-        ("m", 14.7e-6, "14.7 µm"),
-        ("m", 2e-9, "2 nm"),
         ("m", 139.0, "139 m"),
         ("m3", 2.25e-9, "2.25 mm³"),
-        ("m3", 3e-15, "3000 µm³"),
         ("m3 per cycle", 1.2e-13, "0.12 mm³ per kcycle"),
         ("Pa", 23.4e6, "23.4 MPa"),
-        ("Pa", 1280.0, "1.28 kPa"),
         ("cycles", 1e5, "100 kcycles"),
-        ("cycles", 400.0, "400 cycles"),
-        ("N", 560.0, "560 N"),
         ("rad", np.pi, "180 °"),
         ("1", 0.25, "0.25"),
         ("furlong", 2.0, "2 furlong"),
@@ -171,22 +103,6 @@ def test_a_study_that_cannot_be_read_is_empty() -> None:
 )
 def test_prefixes_fit_the_values(units: str, largest: float, shown: str) -> None:
     assert scale_for(units, [np.nan, 0.1 * largest, -largest]).show(largest) == shown
-
-
-def test_round_off_of_the_largest_is_shown_as_zero() -> None:
-    """A mean of 2.76e-23 m beside depths of micrometres is none; a millionth of the largest is a value."""
-    scale = scale_for("m", [8e-6, 2.76e-23])
-    assert scale.show(2.76e-23) == "0 µm"
-    assert scale.show(-2.76e-23) == "0 µm"
-    assert scale.show(8e-12) == "8e-06 µm"
-    assert scale_for("m", [2.76e-9]).show(2.76e-9) == "2.76 nm"
-
-
-def test_scales_apply_to_arrays_and_labels() -> None:
-    scale = Scale(1e3, "mm")
-    np.testing.assert_allclose(scale([1e-3, np.nan]), [1.0, np.nan])
-    assert scale.label("amplitude") == "amplitude (mm)"
-    assert Scale(1.0, "").label("error") == "error"
 
 
 def test_numbers_in_words() -> None:
@@ -206,7 +122,3 @@ def test_numbers_in_words() -> None:
         "0.002",
         "",
     ]
-
-
-def test_sentences_end_once() -> None:
-    assert as_sentences("One", "", "Two.", "Three") == "One. Two. Three."

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from studyrunner.report.drawing import Drawing
 from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result
 from studyrunner.report.trends.figures import draw_trends
-from studyrunner.report.trends.quantities import find_error, find_peak, find_quantities
+from studyrunner.report.trends.quantities import find_peak, find_quantities
 from tests.studyrunner.report.figure_cases import make_result, with_variables
 
 FREQUENCIES = (199.0, 200.0, 201.0, 202.0, 203.0, 204.0, 205.0, 206.0)
@@ -81,29 +79,6 @@ def test_lines_and_maps_are_those_of_the_file() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("result", "names"),
-    [
-        (make_result(), []),
-        (make_result(frequency=(200.0,), wear_coefficient=(1e-12, 1e-11), scheme=("implicit",)), ["trends"]),
-        (make_result(wear_coefficient=(1e-12, 1e-11), scheme=("implicit",)), ["trends", "trend_maps"]),
-        (make_result(wear_coefficient=(1e-12, 1e-11), failed=range(3, 16)), ["trends", "trend_maps"]),
-        (make_result(wear_coefficient=(1e-12, 1e-11), failed=range(16)), []),
-    ],
-)
-def test_which_there_are(result: Result, names: list[str]) -> None:
-    found = list(draw_trends(result))
-    assert [drawing.name for drawing in found] == names
-    for drawing in found:
-        drawing.figure.draw_without_rendering()
-
-
-@pytest.mark.slow
-def test_they_come_first_among_the_results() -> None:
-    names = [item.name for item in draw_report(many()) if isinstance(item, Drawing)]
-    assert names[:2] == ["trends", "trend_maps"]
-
-
 def test_the_page_gets_the_numbers_of_the_file_in_si() -> None:
     result = many()
     dataset = result.dataset
@@ -124,12 +99,3 @@ def test_the_page_gets_the_numbers_of_the_file_in_si() -> None:
     np.testing.assert_array_equal(told, estimated > 0.0)
     np.testing.assert_allclose(error["data"][told] * error["factor"], 100.0 * estimated[told], rtol=1e-6)
     assert peak["sizes"] == [1, *worn.shape[1:]]
-
-
-def test_the_page_gets_none_where_other_plots_show_all() -> None:
-    assert build_trend_numbers(make_result()) is None
-    assert build_trend_numbers(make_result(wear_coefficient=(1e-12, 1e-11), failed=range(16))) is None
-
-
-def test_no_error_without_worn_volumes() -> None:
-    assert find_error(make_result(wear_coefficient=(1e-12, 1e-11), without=("worn_volume",))) is None

@@ -69,34 +69,6 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Datas
         assert (np.bincount(surface + 1)[1:] == 2 * 3).all()
 
 
-def test_equal_results_give_equal_files(folder: Path, dataset: xr.Dataset, tmp_path: Path) -> None:
-    vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path)
-    for path in (Path("root.pvd"), *(Path("vtu") / f"root_{number:04d}.vtu" for number in range(5))):
-        assert (tmp_path / path).read_bytes() == (folder / path).read_bytes()
-
-
-def test_triangles_are_cells_of_their_own(tmp_path: Path) -> None:
-    dataset = dovetail_file()
-    quads = dataset["mesh_quad"].values.copy()
-    corner = np.flatnonzero(quads[:, 0] == quads[-1, 0])[0]
-    quads[corner, 3] = quads[corner, 2]
-    dataset["mesh_quad"] = (dataset["mesh_quad"].dims, quads)
-    vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path)
-    mesh = meshio.read(tmp_path / "vtu" / "root_0000.vtu")
-    assert mesh.cells_dict["triangle"].tolist() == [quads[corner, :3].tolist()]
-    assert len(mesh.cells_dict["quad"]) == len(quads) - 1
-    assert [len(each) for each in mesh.cell_data["body"]] == [1, len(quads) - 1]
-
-
-def test_a_point_that_ended_early_has_files_up_to_there(tmp_path: Path) -> None:
-    dataset = dovetail_file(axes={"frequency": (190.0,), "scheme": ("implicit",), "sweep": ("up",)})
-    dataset["outcome"].values[:], dataset["last_cycle"].values[:] = 4, 250.0
-    for values in dataset.data_vars.values():
-        if "cycle" in values.dims and values.dtype.kind == "f":
-            values.values[..., 3:, :] = np.nan if "contact" in values.dims else values.values[..., 3:, :]
-    assert vtu.find_writer(as_result(dataset, tmp_path / "some.nc"))(tmp_path).n_files == 3
-
-
 def test_the_command_writes_the_series_beside_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], dataset: xr.Dataset
 ) -> None:
