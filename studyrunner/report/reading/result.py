@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.endings import Ending, read_endings
 from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
@@ -33,22 +34,6 @@ NO_VOLUME = 1e-24
 
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Combinations of the axes that a figure shows, with labels.
-
-    sentence: on combinations that are left out; empty where there are none.
-    """
-
-    points: tuple[dict[str, int], ...]
-    labels: tuple[str, ...]
-    sentence: str
-
-    def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
-        """Combinations with their labels."""
-        return iter(zip(self.points, self.labels, strict=True))
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,15 @@ def tells_depth(result: Result) -> bool:
     return result.has("wear_depth") or result.has("wear_depth_last")
 
 
+def depths(result: Result, point: Point) -> NDArray[np.float64]:
+    """Wear depth (n_cycles, n_contact), m, of one point; NaN at the counts of which the file holds none."""
+    if result.has("wear_depth"):
+        return np.asarray(result.at("wear_depth", point).values, dtype=float)
+    found = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
+    found[result.last_kept(point)] = last_depth(result, point)
+    return found
+
+
 def last_depth(result: Result, point: Point) -> NDArray[np.float64]:
     """Wear depth (n_contact,), m, of one point at the last count that it has reached."""
     if result.has("wear_depth"):

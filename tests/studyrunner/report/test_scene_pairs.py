@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,9 +16,10 @@ from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.maps import LAST_DEPTH
 from studyrunner.report.reading.flanks import find_flanks
 from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import of_scene, of_shown_scene
+from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.report.reading.schema_check import check_dataset
 from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.vtu import find_writer
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
 from tests.studyrunner.report.test_page_data import decode
@@ -106,6 +108,18 @@ def test_little_room_takes_the_shown_combination(samples: Result) -> None:
     scatter: Any = data.content["scatter"]
     assert scatter["held"] == [samples.shown_point()["frequency"]]
     assert "The scatter is on this page for one of 2 combinations of the other axes." in data.notes
+
+
+@pytest.mark.parametrize(("kind", "n_files"), [("meshes", 3), ("samples", 1)])
+def test_the_root_of_one_scene_is_written(
+    kind: str, n_files: int, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    result = request.getfixturevalue(kind)
+    series = find_writer(result)(tmp_path)
+    assert series.n_files == n_files
+    mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
+    expected = last_depth(result, result.shown_point())
+    assert np.nanmax(mesh.point_data["wear_depth"]) == np.nanmax(expected)
 
 
 def test_drawn_values_are_taken() -> None:
