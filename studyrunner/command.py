@@ -184,14 +184,16 @@ def _show_plan(study: Study) -> int:
     from studyrunner.plan.planning import build_tasks
     from studyrunner.scene.drawn_contacts import contact_changes
     from studyrunner.scene.planned_scenes import plan_scenes
+    from studyrunner.summary.plausibility import doubts_of_study
 
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
     contacts = contact_changes(study, planned.scenes, [planned.facts[number] for number in planned.nearest])
-    plan = build_tasks(study, planned.n_displacements, contacts)
+    plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
-    print(format_plan(study, planned.largest, plan, built_with, seconds, planned.describe()), flush=True)
+    lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
+    print(*lines, *(f"note       {doubt}" for doubt in doubts_of_study(study)), sep="\n", flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
@@ -229,7 +231,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.sample_lines import describe_samples
     from studyrunner.scene.scene_set import merge_facts
     from studyrunner.scene_building import build_scenes
-    from studyrunner.system.progress import ProgressDisplay, format_seconds
+    from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
@@ -253,7 +255,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
         what = f"{path} holds {done}" if ended.summary.written else kept
         raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
     failed = summary.n_points - summary.n_complete
-    counts = f"{summary.n_points} points, {summary.n_complete} computed, {failed} failed"
+    counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
     head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
     untouched = [] if summary.written else [f"{path} is the finished result that it was"]
     samples = [] if study.scatter is None or not summary.written else describe_samples(target.path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
 
@@ -78,7 +79,7 @@ class _SceneHelp(argparse.Action):
 
 
 def parse_options(arguments: Sequence[str]) -> Options:
-    """Options from the command line. Raises UserError; SystemExit after --help and --scene-help."""
+    """Options from the command line. Raises UserError; SystemExit after --help, --version and --scene-help."""
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,
@@ -95,6 +96,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
     )
     parser.add_argument(
         "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
+    )
+    parser.add_argument(
+        "--version", action="version", version=f"fretwear {metadata.version('fretwear')}", help="print the version"
     )
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(

@@ -238,7 +238,7 @@ def _prepare(
     """The index of finished points, and the writer of the result."""
     store, facts = scenes.store, merge_facts(scenes.facts)
     contacts = contact_changes(study, scenes.scenes, scenes.facts)
-    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts)
+    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
@@ -251,7 +251,7 @@ def _prepare(
     completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)
     store.note_study(label.name, label.model, layout_of(kind), completion.describe_tasks())
-    pairs = pair_arrays(study, scenes.facts)
+    pairs = pair_arrays(study, scenes.facts, scenes.scenes)
     writer = _ResultWriter(study, plan, facts, scenes, pairs, target, software, options.date, said)
     return completion, writer
 

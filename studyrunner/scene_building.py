@@ -33,6 +33,7 @@ from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
 from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
+from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 
@@ -142,21 +143,20 @@ def build_scenes(
     """
     scenes = find_scenes(study)
     if len(scenes.studies) == 1:
-        model = build_study_scene(study, say, store)
+        with keys_as_given(study.scene_axes):
+            model = build_study_scene(study, say, store)
         if "natural_frequency" in study.outputs.variables:
             say("finding the natural frequencies of the scene")
         variables = (*build_scene_variables(study, model, store), *exact_answers(study))
         facts = replace(describe_scene(model), static_response=static_response(model))
         broadcast = Broadcast(ranks, machines, model)
         return Scenes(scenes, (facts,), variables, scene_to_keep(study, model), (), broadcast, store)
-    if study.outputs.scene:
-        remedy = f"leave it out: the study has {len(scenes.studies)} scenes, and a result keeps one"
-        raise UserError(study.source, "outputs.scene", True, remedy)
     Broadcast(ranks, machines, SeveralScenes()).send()
     built = _build_all(ranks, scenes, store, say)
-    for each in built:
-        if each.error is not None:
-            raise each.error
+    with keys_as_given(study.scene_axes):
+        for each in built:
+            if each.error is not None:
+                raise each.error
     facts_of_all = tuple(each.facts for each in built if each.facts is not None)
     variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
     return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, store)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Mapping
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
@@ -73,16 +74,24 @@ class WrongValueError(ValueError):
 
 def show_value(value: object) -> str:
     """`value` as it would stand in a TOML file, on one line and cut where it is long."""
+    if isinstance(value, Verbatim):
+        return _cut(show_text(" ".join(value.split())), _LONGEST_VERBATIM)
     try:
-        text = str(value).lower() if isinstance(value, bool) else repr(value)
+        text = _as_toml(value)
     except (ValueError, RecursionError):
         # whole numbers of more digits than Python writes
         text = "too long to be shown"
-    if isinstance(value, Verbatim):
-        return _cut(show_text(" ".join(value.split())), _LONGEST_VERBATIM)
-    if isinstance(value, str):
-        text = '"' + value + '"'
     return _cut(show_text(" ".join(text.split())), _LONGEST_VALUE)
+
+
+def _as_toml(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_as_toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_as_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def show_text(text: str) -> str:

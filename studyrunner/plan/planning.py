@@ -28,8 +28,8 @@ from studyrunner.plan.sharing import (
 )
 from studyrunner.plan.tasks import BranchTask, Joint, MarchTask, TaskPlan
 from studyrunner.scene.drawn_contacts import ContactChange
-from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import Realisation, realise
+from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
@@ -60,7 +60,10 @@ class _Case:
 
 
 def build_tasks(
-    study: Study, n_displacements: int | Sequence[int], contacts: Sequence[ContactChange] | None = None
+    study: Study,
+    n_displacements: int | Sequence[int],
+    contacts: Sequence[ContactChange] | None = None,
+    scenes: SceneSet | None = None,
 ) -> TaskPlan:
     """Tasks of a study.
 
@@ -69,8 +72,9 @@ def build_tasks(
 
     n_displacements: number of relative displacements of each scene of the study (`find_scenes`), or of all scenes.
     contacts: what is drawn for the pairs of each part of the study (`contact_changes`); None where nothing is.
+    scenes: of the study, where they are known already.
     """
-    return _Planner(study, n_displacements, contacts).plan()
+    return _Planner(study, n_displacements, contacts, find_scenes(study) if scenes is None else scenes).plan()
 
 
 def march_variables(study: Study) -> tuple[str, ...]:
@@ -83,12 +87,19 @@ class _Planner:
     """Builds the tasks of a study one after the other."""
 
     def __init__(
-        self, study: Study, n_displacements: int | Sequence[int], contacts: Sequence[ContactChange] | None
+        self,
+        study: Study,
+        n_displacements: int | Sequence[int],
+        contacts: Sequence[ContactChange] | None,
+        scenes: SceneSet,
     ) -> None:
         self._study = study
-        self._parts = realise(study)
+        self._parts = scenes.parts
         self._contacts: Sequence[ContactChange] = ((),) * len(self._parts) if contacts is None else contacts
-        self._scenes = find_scenes(study)
+        self._scenes = scenes
+        # what all parts have in common
+        self._lines = [(lines, _settings(study, lines[0])) for lines in _lines(study)]
+        self._variables = march_variables(study)
         n_scenes = len(self._scenes.studies)
         self._n_displacements = (
             (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
@@ -109,14 +120,15 @@ class _Planner:
             for frequencies in [[one] for one in ascending] if case.sweep == "ramp" else [ascending]:
                 self._add_branch(case, {frequency: at[frequency] for frequency in frequencies})
         n_points = math.prod(len(values) for values in self._study.dimensions.values())
-        harmonics = self._study.harmonics
         return TaskPlan(
             branches=tuple(self._branches),
             marches=tuple(self._marches),
             left_out=describe_left_out(self._causes),
             n_points=n_points,
             n_scenes=len(self._n_displacements),
-            n_unknowns=max(_unknowns(number, each) for number in self._n_displacements for each in harmonics),
+            n_unknowns=max(
+                _unknowns(number, each) for number in set(self._n_displacements) for each in self._study.harmonics
+            ),
         )
 
     def _cases(self) -> dict[_Case, list[_Start]]:
@@ -127,9 +139,9 @@ class _Planner:
             contact = self._contacts[number]
             of_pairs = any(name == "friction_coefficient" for name, _ in contact)
             joint = Joint(scene, None if of_pairs else study.friction_coefficient, contact)
-            for lines in _lines(study):
+            for lines, settings in self._lines:
                 amplitude, sweep = study.axes.excitation_amplitude[lines[0][0]], study.axes.sweep[lines[0][1]]
-                case = _Case(joint, amplitude, sweep, _settings(study, lines[0]))
+                case = _Case(joint, amplitude, sweep, settings)
                 frequencies = range(len(study.axes.frequency))
                 cases.setdefault(case, []).extend(_Start(number, lines, place) for place in frequencies)
         return cases
@@ -180,14 +192,14 @@ class _Planner:
         self._causes += sharing.causes
         self._causes[IDLE_RTOL] += n_others * (sum(lines) - len(lines))
         self._causes[EQUAL_POINTS] += n_others * (len(lines) - len(of_value))
-        axes = study.axes
+        axes, own_axes = study.axes, study.own_axes
         for alike in sharing.marches:
             histories = tuple(
                 ScaledHistory(
                     axes.wear_coefficient[choices[0][0]],
                     axes.step[choices[0][1]],
                     tuple(
-                        _point(self._study, self._parts[start.part], start.frequency, line, (wear, *choice[1:]))
+                        _point(own_axes, self._parts[start.part], start.frequency, line, (wear, *choice[1:]))
                         for choice in choices
                         for start, wear in of_value[choice[0]]
                         for line in start.lines
@@ -210,7 +222,7 @@ class _Planner:
                 histories=histories,
                 held=alike.held,
                 cycles=study.cycles_kept,
-                variables=march_variables(self._study),
+                variables=self._variables,
                 loops=study.outputs.loops,
                 cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, histories[0].step),
                 n_unknowns=n_unknowns,
@@ -263,9 +275,9 @@ def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
     return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
 
 
-def _point(study: Study, part: Realisation, frequency: int, line: Index, choice: Choice) -> Index:
-    """Index of a point along the dimensions of the study. line: see `_lines`."""
+def _point(own_axes: Sequence[str], part: Realisation, frequency: int, line: Index, choice: Choice) -> Index:
+    """Index of a point along the dimensions of the study. own_axes: of the study. line: see `_lines`."""
     places = dict(zip(("excitation_amplitude", "sweep", *SOLVER_AXES), line, strict=True))
     places.update(zip(("wear_coefficient", "step", "scheme"), choice, strict=True))
     places["frequency"] = frequency
-    return (*(places[name] for name in study.own_axes), *part.place)
+    return (*(places[name] for name in own_axes), *part.place)

@@ -15,7 +15,7 @@ from studyrunner.scatter.section import Distribution, Kind, Of, Scattered, Scatt
 from studyrunner.user_error import WrongValueError
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
-_NOT_BELOW_ZERO = ("friction_coefficient", "wear_coefficient")
+_NOT_BELOW_ZERO = ("friction_coefficient", "threshold", "wear_coefficient")
 
 _NUGGET = 1e-8
 """Share of the variance of a field that is independent from pair to pair.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
 from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 
 _MOST_BUILT = 8
@@ -69,6 +70,7 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
     facts = {}
     for number in kinds.values():
         say(f"building scene {number + 1} of {len(scenes.studies)}")
-        facts[number] = describe_scene(build_study_scene(scenes.studies[number], say))
+        with keys_as_given(study.scene_axes):
+            facts[number] = describe_scene(build_study_scene(scenes.studies[number], say))
     each_takes = (time.monotonic() - began) / len(facts)
     return PlannedScenes(scenes, facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))

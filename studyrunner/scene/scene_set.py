@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from studyrunner.scene.computed import scene_parameters_of
 from studyrunner.scene.scene import SceneFacts, harmonics_to_build
-from studyrunner.study.realisation import realise
+from studyrunner.study.realisation import Realisation, realise
 from studyrunner.study.study import Study
+from studyrunner.user_error import UserError
 
 
 @dataclass(frozen=True)
@@ -21,25 +22,33 @@ class SceneSet:
     """The different scenes of a study.
 
     studies: for each scene a study without axes of the scene, from which the scene is built.
-    numbers: number of the scene of each part of the study (`realise`).
+    parts: of the study (`realise`). numbers: number of the scene of each part.
     """
 
     studies: tuple[Study, ...]
+    parts: tuple[Realisation, ...]
     numbers: tuple[int, ...]
 
 
 def find_scenes(study: Study) -> SceneSet:
-    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it."""
+    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it.
+
+    Raises UserError where a result file is to keep the scene, and there are several.
+    """
     numbers: dict[str, int] = {}
     studies: list[Study] = []
     of_parts = []
-    for part in realise(study):
+    parts = realise(study)
+    for part in parts:
         key = _key(part.study)
         if key not in numbers:
             numbers[key] = len(numbers)
             studies.append(part.study)
         of_parts.append(numbers[key])
-    return SceneSet(tuple(studies), tuple(of_parts))
+    if study.outputs.scene and len(studies) > 1:
+        remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
+        raise UserError(study.source, "outputs.scene", True, remedy)
+    return SceneSet(tuple(studies), parts, tuple(of_parts))
 
 
 def _key(study: Study) -> str:
@@ -82,7 +91,7 @@ class PairArrays:
     exists: NDArray[np.bool_] | None
 
 
-def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
+def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
     """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
     one = facts[0]
     if all(_same_pairs(one, each) for each in facts[1:]):
@@ -94,29 +103,29 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts]) -> PairArrays:
     for number, each in enumerate(facts):
         own = slice(len(each.area))
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
-    places, numbers = axes_of_difference(study, find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b]))
-    kept = [study.scene_axes[place].name for place in places]
+    names, numbers = axes_of_difference(
+        study, scenes or find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b])
+    )
     exists = np.isfinite(area[numbers])
-    return PairArrays((*kept, "contact"), position[numbers], area[numbers], surface[numbers], exists)
+    return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
 
 def axes_of_difference(
     study: Study, scenes: SceneSet, are_equal: Callable[[int, int], bool]
-) -> tuple[tuple[int, ...], NDArray[np.intp]]:
-    """Axes of the scene along which something differs, as indices in `study.scene_axes`, and numbers of scenes along
-    these axes.
+) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of the axes along which something differs between the scenes, and numbers of scenes along these axes.
 
     are_equal: whether two scenes, given by number, are equal in it.
     """
-    numbers = np.array(scenes.numbers).reshape([len(axis.values) for axis in study.scene_axes])
-    places = []
-    for place in reversed(range(numbers.ndim)):
+    numbers = np.array(scenes.numbers).reshape([len(values) for values in study.axes_of_parts.values()])
+    names = []
+    for place, name in reversed(list(enumerate(study.axes_of_parts))):
         first = np.broadcast_to(numbers.take([0], axis=place), numbers.shape)
         if all(a == b or are_equal(a, b) for a, b in zip(first.flat, numbers.flat, strict=True)):
             numbers = numbers.take(0, axis=place)
         else:
-            places.append(place)
-    return tuple(reversed(places)), numbers
+            names.append(name)
+    return tuple(reversed(names)), numbers
 
 
 def _same_pairs(one: SceneFacts, other: SceneFacts) -> bool:

@@ -29,15 +29,14 @@ def join_scene_variables(
         if len({each.values.shape for each in variables}) > 1:
             left_out.append(first.name)
             continue
-        places, numbers = axes_of_difference(
+        names, numbers = axes_of_difference(
             study,
             scenes,
             lambda a, b, v=variables: _equal(v[a], v[b]),  # type: ignore[misc]
         )
-        if not places:
+        if not names:
             joined.append(first)
             continue
-        names = tuple(study.scene_axes[place].name for place in places)
         values = np.stack([each.values for each in variables])[numbers]
         entry = replace(first.entry, dimensions=(*names, *(first.entry.dimensions or (first.name,))))
         joined.append(replace(first, entry=entry, values=values, coordinate=False))
@@ -57,7 +56,7 @@ def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
     if "exact" not in study.outputs.variables:
         return ()
     parts = [_answers(part.study) for part in realise(study)]
-    shape = [len(axis.values) for axis in study.scene_axes]
+    shape = [len(values) for values in study.axes_of_parts.values()]
     own = len(study.own_axes)
     variables = []
     for name, entry in SCENE["exact"].items():

@@ -97,6 +97,10 @@ def check_scatter(study: Study) -> None:
     section = study.scatter
     if section is None:
         return
+    of_pairs = [name for name, each in section.inputs.items() if is_of_pairs(name, each)]
+    if of_pairs and "exact" in study.outputs.variables:
+        remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
+        raise UserError(study.source, "outputs.variables", "exact", remedy)
     numbers = [*_OF_AXES, *OF_PAIRS, *_numbers_of(study)]
     for name, scattered in section.inputs.items():
         if name not in numbers:
@@ -119,7 +123,7 @@ def _numbers_of(study: Study) -> list[str]:
     """Keys of [scene] and [wear] that are numbers with fractions."""
     parameters = study.scene.parameters
     floats = [name for name, field in type(parameters).model_fields.items() if "float" in str(field.annotation)]
-    return [*floats, "threshold"]
+    return [*floats, "threshold"] if study.wear.law == "threshold" else floats
 
 
 def _own_value(study: Study, name: str) -> ArrayLike:

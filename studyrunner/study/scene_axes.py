@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +21,7 @@ Table = dict[str, Any]
 AxisValue = float | int | bool | str
 
 _IN_WEAR = ("threshold", "surfaces")
+_MOST_COMBINATIONS = 10_000  # each of them is checked, which takes 0.2 ms
 _UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
 _UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N s/m", "kg", "kg/m3", "J/m2"), "")
 
@@ -80,6 +83,10 @@ def take_scene_axes(
             key = (name,) if inner is None else (name, str(inner))
             dotted = ".".join(key)
             _check_once(sections.get(table, {}), table, key, source)
+            given = only_table(sections.get(table, {}).get(name, {}))
+            if inner is not None and not isinstance(given, Mapping):
+                remedy = f"leave it out, or give a table of the other keys: axes.{dotted} gives one of them"
+                raise UserError(source, f"{table}.{name}", given, remedy)
             if not "_".join(key).isidentifier():
                 remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
                 raise UserError(source, f"axes.{dotted}", values, remedy)
@@ -89,7 +96,23 @@ def take_scene_axes(
                 raise UserError(source, f"axes.{dotted}", error.value, error.remedy) from None
             units, meaning = describe_key(dict(kinds)[table], *key)
             found.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
+    n_combinations = math.prod(len(axis.values) for axis in found)
+    if n_combinations > _MOST_COMBINATIONS:
+        longest = max(found, key=lambda axis: len(axis.values))
+        remedy = f"give fewer values: there are {n_combinations} combinations of keys of [scene] and [wear], at most "
+        remedy += f"{_MOST_COMBINATIONS} are possible; [scatter] takes more samples"
+        raise UserError(source, f"axes.{longest.dotted}", len(longest.values), remedy)
     return tuple(found)
+
+
+@contextlib.contextmanager
+def keys_as_given(scene_axes: Sequence[SceneAxis]) -> Iterator[None]:
+    """A UserError on a key of [scene] or [wear] whose values stand under [axes] names the key there."""
+    given = {f"{axis.table}.{name}": f"axes.{name}" for axis in scene_axes for name in (axis.key[0], axis.dotted)}
+    try:
+        yield
+    except UserError as error:
+        raise UserError(error.place, given.get(error.key, error.key), error.value, error.remedy) from None
 
 
 def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
@@ -139,15 +162,18 @@ def only_table(value: Any) -> Any:
 
 def is_table(value: object) -> bool:
     """Whether a value under [axes] holds values by name of a surface or of a key, and no range."""
-    return isinstance(value, dict) and not {"start", "stop", "num"} & value.keys()
+    return isinstance(value, dict) and bool(value) and not {"start", "stop", "num"} & value.keys()
 
 
 def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source: str) -> None:
     """Raises UserError where the table has the key of an axis."""
     given: Any = table
-    for part in key:
+    for depth, part in enumerate(key):
         given = only_table(given)
-        if not isinstance(given, Mapping) or part not in given:
+        if not isinstance(given, Mapping):
+            key = key[:depth]
+            break
+        if part not in given:
             return
         given = given[part]
     dotted = ".".join(key)

@@ -87,7 +87,7 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _check_points(self) -> Study:
-        check_n_points(self)
+        check_axes(self)
         return self
 
     @model_validator(mode="after")
@@ -211,9 +211,13 @@ class Study(Section):
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
-        own = {name: getattr(self.axes, name) for name in self.own_axes}
+        return {**{name: getattr(self.axes, name) for name in self.own_axes}, **self.axes_of_parts}
+
+    @property
+    def axes_of_parts(self) -> Mapping[str, tuple[float | str, ...]]:
+        """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
         samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}
-        return {**own, **{axis.name: axis.values for axis in self.scene_axes}, **samples}
+        return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}
 
     def units(self, name: str) -> str:
         """Unit of an axis; "1" where it has none."""
@@ -226,10 +230,14 @@ class Study(Section):
         return (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
 
 
-def check_n_points(study: Study) -> None:
-    """Raises WrongValueError where a study has too many points."""
+def check_axes(study: Study) -> None:
+    """Raises WrongValueError where a study has too many points, or two dimensions of the result have one name."""
+    if "nodal_diameter" in study.dimensions and "natural_frequency" in study.outputs.variables:
+        remedy = "leave it out: it has a dimension nodal_diameter of its own; a study without this axis gives it"
+        raise WrongValueError("natural_frequency", remedy, "outputs.variables")
     n_points = math.prod(len(values) for values in study.dimensions.values())
     if n_points > _MOST_POINTS:
         longest = max(study.dimensions, key=lambda name: len(study.dimensions[name]))
         remedy = f"give fewer values: there are {n_points:.3g} points, and a study has at most {_MOST_POINTS}"
-        raise WrongValueError(len(study.dimensions[longest]), remedy, f"axes.{longest}")
+        key = "scatter.samples" if longest == "sample" else f"axes.{longest}"
+        raise WrongValueError(len(study.dimensions[longest]), remedy, key)

@@ -16,12 +16,20 @@ from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
-from studyrunner.study.scene_axes import SceneAxis, as_checked, combinations, is_table, only_table, take_scene_axes
+from studyrunner.study.scene_axes import (
+    SceneAxis,
+    as_checked,
+    combinations,
+    is_table,
+    keys_as_given,
+    only_table,
+    take_scene_axes,
+)
 from studyrunner.study.scene_errors import scene_errors
 from studyrunner.study.scene_table import check_scene, parameters_of
 from studyrunner.study.sections import SOLVER_AXES, AxesSection
 from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.study import Study, check_n_points
+from studyrunner.study.study import Study, check_axes
 from studyrunner.study.study_of_result import Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.study.wear_section import WearSection
@@ -141,16 +149,11 @@ def _with_variants(
     sections: Table, scene_axes: Sequence[SceneAxis], source: str, path: Path, archived: Archived | None
 ) -> Study:
     """A study with axes that are keys of [scene] or [wear]."""
-    variants = []
-    moved: dict[str | None, str] = {f"{axis.table}.{axis.dotted}": f"axes.{axis.dotted}" for axis in scene_axes}
-    try:
-        for tables in combinations(sections, scene_axes):
-            variants.append(check_study(tables, source, path, archived))
-    except UserError as error:
-        raise UserError(error.place, moved.get(error.key, error.key), error.value, error.remedy) from None
+    with keys_as_given(scene_axes):
+        variants = [check_study(tables, source, path, archived) for tables in combinations(sections, scene_axes)]
     study = variants[0].model_copy(update={"scene_axes": as_checked(scene_axes, variants), "variants": tuple(variants)})
     try:
-        check_n_points(study)
+        check_axes(study)
     except WrongValueError as error:
         raise UserError(source, error.key or "axes", error.value, error.remedy) from None
     check_scatter(study)
@@ -231,7 +234,9 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
         place = inner
     place[names[-1]] = value
     # the last place where a key is given counts, here or under [axes]
-    others = {"axes": ("solver", "scene", "wear"), **dict.fromkeys(("solver", "scene", "wear"), ("axes",))}
+    of_solver = names[-1] in AxesSection.model_fields
+    tables = ("solver",) if of_solver else ("scene", "wear")
+    others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
     if len(names) == 2 and not is_table(place[names[1]]):
         for other in others.get(names[0], ()):
             if not is_table(_section(table, other).get(names[1])):

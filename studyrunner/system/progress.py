@@ -148,13 +148,16 @@ class SilentProgress(ProgressDisplay):
         """Nothing."""
 
 
+_YEAR = 8766.0 * 3600.0  # s
+
+
 def format_seconds(seconds: float) -> str:
     """A time as a person says it."""
     if seconds < 60.0:
         return f"{seconds:.0f} s"
     if seconds < 3600.0:
         return f"{seconds / 60.0:.1f} min"
-    return f"{seconds / 3600.0:.1f} h"
+    return f"{seconds / 3600.0:.1f} h" if seconds < _YEAR else f"{seconds / _YEAR:.3g} years"
 
 
 def count(number: int, one: str, many: str | None = None) -> str:

@@ -72,7 +72,24 @@ class Shape:
         return build_tasks(study, N_DISPLACEMENTS)
 
 
-SHAPES = {
+@dataclass(frozen=True)
+class Samples:
+    """Sizes of a study with samples: each has a sweep of its own, and one march from the state that it leads to."""
+
+    n_samples: int
+
+    @property
+    def label(self) -> str:
+        """One line for the table."""
+        return f"{self.n_samples} samples of friction, excitation, frequency and gaps"
+
+    def build_plan(self) -> TaskPlan:
+        """The tasks of the bundled study of samples, as they are where pairs have no draws of their own."""
+        study = read_study("scatter", [f"scatter.samples={self.n_samples}", "scatter.gap={normal={std=1e-7}}"])
+        return build_tasks(study, N_DISPLACEMENTS)
+
+
+SHAPES: dict[str, Shape | Samples] = {
     "usual": Shape(100, 5, 2, 10, 500),
     "short": Shape(100, 5, 2, 10, 100),
     "focus": Shape(100, 5, 2, 10, 500, 210.9, 212.5),
@@ -81,6 +98,7 @@ SHAPES = {
     "many_lines": Shape(25, 20, 2, 10, 500, 210.9, 212.5),
     "few_lines": Shape(200, 1, 2, 25, 500, 210.9, 212.5),
     "one_line": Shape(1000, 1, 1, 10, 500, 210.9, 212.5),
+    "samples": Samples(4096),
 }
 """usual: the range of the bundled study, most of which rests. focus: where the joint slips. band: a resonance only,
 little wear, no march ten times as long as others. steps: as band, uneven by the step axis, which the plan knows."""
@@ -141,10 +159,31 @@ class RecordedCosts:
         return int(np.clip(round(share * (len(recorded) - 1)), 0, len(recorded) - 1))
 
 
-def replay_shape(shape: Shape, n_ranks: int, overheads: Overheads) -> Replay:
+class CostsOfSamples:
+    """Costs of samples: each is drawn from the run times of the 64 samples of the bundled study."""
+
+    _DECILES = (0.9, 3.4, 3.6, 3.7, 3.9, 4.1, 4.1, 4.3, 5.2, 6.1, 14.8)
+    """s, of start state and history together, with adaptive steps on mesh 1."""
+    _START = 0.4
+    """Share of the start state."""
+
+    def __init__(self, plan: TaskPlan) -> None:
+        shares = np.random.default_rng(0).random(len(plan.branches))
+        self._seconds = np.interp(shares, np.linspace(0.0, 1.0, len(self._DECILES)), self._DECILES)
+
+    def start(self, branch: BranchTask, position: int) -> tuple[StartResult, float]:
+        """A start state and its cost, s."""
+        return StartResult(position, None, True, N_DISPLACEMENTS), self._START * float(self._seconds[branch.number])
+
+    def march(self, task: MarchTask) -> float:
+        """Cost of a march, s."""
+        return (1.0 - self._START) * float(self._seconds[task.branch])
+
+
+def replay_shape(shape: Shape | Samples, n_ranks: int, overheads: Overheads) -> Replay:
     """A study of this shape on so many ranks."""
     plan = shape.build_plan()
-    costs = RecordedCosts(plan, shape.n_steps)
+    costs = CostsOfSamples(plan) if isinstance(shape, Samples) else RecordedCosts(plan, shape.n_steps)
     return replay(plan, costs.start, costs.march, n_ranks, overheads)
 
 

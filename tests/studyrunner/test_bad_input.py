@@ -66,7 +66,7 @@ WRONG_KEYS = {
     "target of what is not": ("slow_time.until={hours = 1}", "slow_time.until", "hours", "{wear_depth = ...}"),
     "two targets": ("slow_time.until={wear_depth = 1, worn_volume = 1}", "slow_time.until", "wear_depth", "one of"),
     "unknown variable": ("outputs.variables=['wear']", "outputs.variables", '"wear"', "wear_depth"),
-    "a table among the variables": ("outputs.variables=[{a = 1}]", "outputs.variables", "{'a'", "default"),
+    "a table among the variables": ("outputs.variables=[{a = 1}]", "outputs.variables", "{a = 1}", "default"),
     "harmonics of no computer": ("solver.harmonics=1e9", "solver.harmonics", "1000000000.0", "at most 1000"),
     "loops": ("outputs.loops=0", "outputs.loops", "0", "list of contact indices"),
     "loops of a pair that is not there": ("outputs.loops=[0, 1]", "outputs.loops", "1", "from 0 to 0"),

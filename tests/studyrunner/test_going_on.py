@@ -233,9 +233,9 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     own, begun = evaluate._solve, []
     own_clock, n_looks = newton.computing_time, 0
 
-    def solve(model: object, friction: float, task: MarchTask, *rest: object) -> object:
+    def solve(model: object, task: MarchTask, *rest: object) -> object:
         begun.append(task.resume)
-        return own(model, friction, task, *rest)  # type: ignore[arg-type]
+        return own(model, task, *rest)  # type: ignore[arg-type]
 
     def clock() -> float:
         # the time is over in the midst of the march, however fast the machine is

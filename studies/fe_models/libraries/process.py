@@ -22,10 +22,10 @@ Arrays = dict[str, np.ndarray]
 
 _READERS: Mapping[str, tuple[str, str]] = {
     "gmsh": ("meshio", "meshio"),
-    "cdb": ("ansys.mapdl.reader", "ansys"),
-    "full": ("ansys.mapdl.reader", "ansys"),
+    "cdb": ("ansys.mapdl.reader", "ansys-mapdl-reader"),
+    "full": ("ansys.mapdl.reader", "ansys-mapdl-reader"),
 }
-"""Library and the project's extra that brings it, of every kind of file."""
+"""Library of every kind of file, and the package that brings the library."""
 
 _LARGEST_FILE = 2**31
 _LEAST_SECONDS = 60
@@ -51,10 +51,10 @@ def read_by_library(kind: str, path: Path, key: str) -> Arrays:
         Where the library is not installed, refuses the file, crashes, or takes too long or too much memory.
     """
     size = check_file(path, _LARGEST_FILE, key)
-    library, extra = _READERS[kind]
+    library, package = _READERS[kind]
     if not _is_installed(library):
         found = f"{path.name} needs the library {library}, which is not installed"
-        raise SceneError(key, found, f"install the project with its extra: pip install 'fretwear[{extra}]'")
+        raise SceneError(key, found, f"install the library: pip install {package}")
     with tempfile.TemporaryDirectory(prefix="fretwear-") as folder:
         answer = Path(folder) / "arrays.npz"
         status, said = run_limited(_CHILD, [kind, str(path.absolute()), str(answer)], 4.0 * seconds_for(size))

@@ -39,7 +39,7 @@ def find_writer(result: Result) -> Callable[[Path], Series]:
         Where the library is missing, or the result has nothing to draw.
     """
     if find_spec("meshio") is None:
-        remedy = "install the project with its extra: pip install 'fretwear[meshio]'"
+        remedy = "install the library: pip install meshio"
         raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
     result = of_shown_scene(result)
     surface = read_root(result)

@@ -92,5 +92,5 @@ def test_what_stands_in_the_way_is_said_before_anything_is_written(
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "--vtu" in said
-    assert ("pip install 'fretwear[meshio]'" if wrong == "no library" else "no positions") in said
+    assert ("pip install meshio" if wrong == "no library" else "no positions") in said
     assert [path.name for path in tmp_path.iterdir()] == ["some.nc"]

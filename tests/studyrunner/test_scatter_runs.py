@@ -1,0 +1,166 @@
+"""Studies with [scatter] from the file to the result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.plan.planning import build_tasks
+from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.realisation import draw_inputs
+from studyrunner.study.study_file import format_study, read_study
+from tests.studyrunner.test_scene_axes import CHEAP, compute, refused, same_values
+
+FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
+WEAR = "scatter.wear_coefficient={lognormal={factor=1.5}}"
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(folder: Path) -> None:
+    """Results go to a folder of their own."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "widths",
+    [
+        ("friction_coefficient={normal={std=0}}", "frequency={uniform={half_width=0}}"),
+        ("stiffness={lognormal={factor=1}}", "excitation_amplitude={normal={relative_std=0}}"),
+        ("gap={normal={std=0}, of='each pair'}", "area={lognormal={factor=1}, of='each surface'}"),
+        ("friction_coefficient={normal={std=0}, of='each pair'}", "wear_coefficient={lognormal={factor=1}}"),
+    ],
+)
+def test_a_scatter_without_width_is_the_point(widths: tuple[str, str]) -> None:
+    asked = "outputs.variables=['default']"
+    samples = compute("sdof_slider", "w.nc", *CHEAP, asked, "scatter.samples=2", *(f"scatter.{one}" for one in widths))
+    names = ", ".join(f"'{name}'" for name in samples.data_vars)
+    point = compute("sdof_slider", "p.nc", *CHEAP, f"outputs.variables=[{names}]")
+    for sample in (0, 1):
+        same_values(samples.isel(sample=sample), point)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", ["frequency={normal={std=0.05}}", "stiffness={normal={std=100}}"])
+def test_more_samples_go_on_from_those_there_are(more: str, capsys: pytest.CaptureFixture[str]) -> None:
+    scatter = (FRICTION, f"scatter.{more}")
+    few = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=4", *scatter)
+    capsys.readouterr()
+    many = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=8", *scatter)
+    assert "4 of 8 points are there from an earlier run" in capsys.readouterr().err
+    same_values(many.isel(sample=slice(4)), few)
+    xr.testing.assert_identical(compute("sdof_slider", "n.nc", *CHEAP, "scatter.samples=8", *scatter), many)
+    assert len(np.unique(many.worn_volume[..., -1])) == 8
+
+
+@pytest.mark.slow
+def test_scatter_of_the_wear_coefficient_alone_is_one_history() -> None:
+    given = (*CHEAP, "axes.scheme=adaptive", "scatter.samples=64", WEAR)
+    study = read_study("sdof_slider", given)
+    plan = build_tasks(study, 2)
+    assert (len(plan.branches), [len(line) for line in plan.marches]) == (1, [1])
+    (cause,) = plan.left_out
+    assert cause.n_points == 63
+    assert "adaptive" in cause.reason
+    samples = compute("sdof_slider", "w.nc", *given)
+    assert samples.newton_iterations.min() == samples.newton_iterations.max()
+    for sample in (3, 40):
+        value = float(samples.sample_wear_coefficient[sample])
+        alone = compute("sdof_slider", "a.nc", *CHEAP, "axes.scheme=adaptive", f"axes.wear_coefficient={value!r}")
+        one, other = (each.worn_volume.values.squeeze() for each in (samples.isel(sample=sample), alone))
+        # both within rtol of the true volume; the steps are those of the largest coefficient
+        np.testing.assert_allclose(one, other, rtol=1e-2)
+
+
+@pytest.mark.slow
+def test_a_sample_is_the_study_of_its_drawn_values() -> None:
+    scatter = (
+        "scatter.samples=3",
+        FRICTION,
+        "scatter.frequency={normal={std=0.5}}",
+        "scatter.mass={normal={std=1e-3}}",
+    )
+    samples = compute("sdof_slider", "w.nc", *CHEAP, *scatter, "outputs.variables=['worn_volume', 'exact']")
+    for number in range(3):
+        sample = samples.isel(sample=number)
+        own = [
+            f"axes.frequency={float(sample.sample_frequency)!r}",
+            f"scene.friction_coefficient={float(sample.sample_friction_coefficient)!r}",
+            f"scene.mass={float(sample.sample_mass)!r}",
+        ]
+        alone = compute("sdof_slider", "a.nc", *CHEAP, *own, "outputs.variables=['worn_volume', 'exact']")
+        same_values(sample, alone)
+    assert samples.sample_mass.attrs["units"] == "kg"
+    assert samples.sample_frequency.attrs["units"] == "Hz"
+
+
+@pytest.mark.slow
+def test_pairs_that_differ_between_samples_have_the_dimension() -> None:
+    """A scattered radius moves the strips."""
+    given = ("scene.strips=10", "slow_time.cycles=0", "slow_time.outputs=1", "solver.harmonics=1")
+    samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}")
+    assert samples.contact_x.dims == ("sample", "contact")
+    assert samples.contact_exists.all()
+    assert (samples.contact_area[0] != samples.contact_area[1]).all()
+
+
+@pytest.mark.slow
+def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again() -> None:
+    given = (*CHEAP, "scatter.samples=2", FRICTION, WEAR, "axes.friction_coefficient=[0.4, 0.6]")
+    study = read_study("sdof_slider", given)
+    Path("again.toml").write_text(format_study(study), encoding="utf-8")
+    assert format_study(read_study("again.toml")) == format_study(study)
+    first = compute("sdof_slider", "first.nc", *given)
+    assert first.worn_volume.dims[-3:] == ("friction_coefficient", "sample", "cycle")
+    assert first.sample_friction_coefficient.dims == ("friction_coefficient", "sample")
+    drawn = [draw_inputs(variant)["friction_coefficient"] for variant in study.variants]
+    np.testing.assert_array_equal(first.sample_friction_coefficient, drawn)
+    again = compute("first.nc", "second.nc")
+    xr.testing.assert_identical(again.drop_attrs(), first.drop_attrs())
+
+
+def test_friction_of_samples_builds_no_scene() -> None:
+    study = read_study("dovetail", ["scatter.samples=64", FRICTION, "scatter.gap={normal={std=1e-7}, of='each pair'}"])
+    assert len(find_scenes(study).studies) == 1
+    study = read_study("dovetail", ["scatter.samples=4", "scatter.rotation_speed={normal={std=10}}"])
+    assert len(find_scenes(study).studies) == 4
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (["scatter=3"], "scatter = 3: give a table"),
+        (["scatter.fricton_coefficient={normal={std=0.1}}"], "unknown input, give friction_coefficient"),
+        (["scatter.friction_coefficient=0.3"], "give a table with one distribution"),
+        (["scatter.step={normal={std=0.1}}"], "scatter.step: unknown input"),
+        (["scatter.threshold={normal={mean=1, std=0.1}}"], "scatter.threshold: unknown input"),
+        (
+            ["wear.law=threshold", "wear.threshold=1", "scatter.threshold={normal={std=1}}"],
+            "which threshold cannot be",
+        ),
+        (["scatter.mass={normal={std=1}}"], "scatter.mass = -1.76"),
+        (["scatter.wear_coefficient={normal={relative_std=3}}"], "which wear_coefficient cannot be"),
+        (
+            ["axes.frequency=[100, 101]", "scatter.frequency={normal={mean=100, std=0.1}}"],
+            "give one value of axes.frequency",
+        ),
+        (["scatter.gap={normal={std=1e-6}, of='each pair', correlation_length=1}"], "scatter.gap.correlation_length"),
+        (
+            ["scatter.area={normal={std=1e-6}}", "outputs.variables=['exact']"],
+            "the closed form knows nothing of the area",
+        ),
+        (["scatter.stiffness={normal={std=1}}", "outputs.scene=true"], "the study has 8 scenes"),
+        (
+            ["scatter.samples=1000000", FRICTION, "axes.frequency=[100, 101]"],
+            "scatter.samples = 1000000: give fewer values",
+        ),
+        (["scatter.samples=1e7", FRICTION], "scatter.samples = 10000000.0: give a whole number"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(
+    overrides: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = ["scatter.samples=8"] if "scatter=3" not in overrides else []
+    assert expected in refused("sdof_slider", ["axes.frequency=160", *first, *overrides], capsys)

@@ -1,0 +1,260 @@
+"""Axes that are keys of [scene] or [wear]: each point is the one of a study of its own, to the last bit."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.accessor import join_results
+from studyrunner.cli import main
+from studyrunner.plan.planning import build_tasks
+from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.study_file import format_study, read_study
+from studyrunner.user_error import UserError
+from tests.studies.fe_models.decks import SECTOR
+from tests.studyrunner.test_model_studies import STUDY as SECTOR_STUDY
+
+CHEAP = (
+    *("axes.frequency=160", "axes.scheme=implicit", "axes.step=1000", "solver.harmonics=3", "solver.samples=32"),
+    *("slow_time.cycles=2000", "slow_time.outputs=3"),
+)
+UNWORN = ("slow_time.cycles=0", "slow_time.outputs=1")
+FRICTIONS = (0.3, 0.4, 0.5, 0.6, 0.7)
+
+
+def arguments(study: str, output: str, *overrides: str) -> list[str]:
+    return [study, "-o", output, *(part for text in overrides for part in ("--set", text))]
+
+
+def compute(study: str, output: str, *overrides: str) -> xr.Dataset:
+    """A result without what depends on the machine."""
+    assert main(arguments(study, output, *overrides)) == 0
+    with xr.open_dataset(output) as opened:
+        return opened.load().drop_vars("run_time")
+
+
+def same_values(one: xr.Dataset, other: xr.Dataset) -> None:
+    """All variables, to the last bit."""
+    assert set(one.data_vars) == set(other.data_vars)
+    for name in one.data_vars:
+        np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name), strict=True)
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(folder: Path) -> None:
+    """Results go to a folder of their own."""
+
+
+@pytest.mark.slow
+def test_an_axis_of_five_frictions_is_five_studies() -> None:
+    exact = "outputs.variables=['default', 'wear_depth', 'exact']"
+    whole = compute("sdof_slider", "whole.nc", *CHEAP, exact, f"axes.friction_coefficient={list(FRICTIONS)}")
+    assert whole.worn_volume.dims[5:] == ("sweep", "friction_coefficient", "cycle")
+    assert whole.friction_coefficient.attrs["units"] == "1"
+    assert whole.friction_coefficient.attrs["long_name"] == "Coulomb friction coefficient"
+    volumes = set()
+    for friction in FRICTIONS:
+        alone = compute("sdof_slider", f"{friction}.nc", *CHEAP, exact, f"scene.friction_coefficient={friction}")
+        same_values(whole.sel(friction_coefficient=friction), alone)
+        volumes.add(float(alone.worn_volume[..., -1].sum()))
+        exact_volume = alone.exact_worn_volume.values
+        assert alone.worn_volume.values == pytest.approx(exact_volume, rel=0.05, nan_ok=True)
+    assert len(volumes) == 5
+
+
+@pytest.mark.slow
+def test_a_key_that_changes_the_scene_is_studies_with_these_scenes() -> None:
+    axes = ("axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.3, 0.4]")
+    study = read_study("sdof_slider", [*CHEAP, *axes])
+    # friction alone builds no scene
+    assert find_scenes(study).numbers == (0, 0, 1, 1)
+    whole = compute("sdof_slider", "whole.nc", *CHEAP, *axes)
+    assert whole.stiffness.attrs["units"] == "N/m"
+    for stiffness in (1.6e5, 1.7e5):
+        own = (f"scene.stiffness={stiffness}", "scene.friction_coefficient=0.4")
+        same_values(
+            whole.sel(stiffness=stiffness, friction_coefficient=0.4), compute("sdof_slider", "o.nc", *CHEAP, *own)
+        )
+
+
+@pytest.mark.slow
+def test_thresholds_share_start_states() -> None:
+    law = ("wear.law=threshold", "axes.threshold=[0, 5, 1e9]")
+    plan = build_tasks(read_study("sdof_slider", [*CHEAP, *law]), 2)
+    assert len(plan.branches) == 1
+    assert len(plan.marches[0]) == 3
+    whole = compute("sdof_slider", "whole.nc", *CHEAP, *law)
+    assert whole.threshold.attrs["units"] == "J/m2"
+    volume = whole.worn_volume.isel(cycle=-1).squeeze().values
+    assert volume[0] > volume[1] > volume[2] == 0.0
+    alone = compute("sdof_slider", "alone.nc", *CHEAP, "wear.law=threshold", "wear.threshold=5")
+    same_values(whole.sel(threshold=5.0), alone)
+
+
+@pytest.mark.slow
+def test_pairs_of_scenes_of_different_size_are_padded() -> None:
+    whole = compute("cylinder_on_flat", "whole.nc", *UNWORN, "axes.strips=[20, 10]", "scene.half_width=1e-3")
+    counts = [int(number) for number in whole.contact_exists.sum("contact")]
+    assert whole.contact_exists.dims == ("strips", "contact")
+    assert counts[0] > counts[1]
+    alone = compute("cylinder_on_flat", "alone.nc", *UNWORN, "scene.strips=10", "scene.half_width=1e-3")
+    assert alone.sizes["contact"] == counts[1]
+    own = whole.sel(strips=10).isel(contact=slice(counts[1]))
+    same_values(own, alone)
+    for name in ("contact_x", "contact_area", "contact_surface"):
+        np.testing.assert_array_equal(own[name], alone[name])
+    rest = whole.sel(strips=10).isel(contact=slice(counts[1], None))
+    assert rest.mean_pressure.isnull().all()
+    assert rest.contact_area.isnull().all()
+
+
+def test_factors_of_a_surface_are_an_axis() -> None:
+    factors = ("axes.surfaces={flat=[0.5, 1.0]}", "wear.surfaces={cylinder=0.5}")
+    with pytest.raises(UserError, match=r"wear.surfaces.flat = 0.5: give it once, here or as axes.surfaces.flat"):
+        read_study("cylinder_on_flat", ["axes.surfaces={flat=[0.5, 1.0]}"])
+    varied = read_study("cylinder_on_flat", factors)
+    assert [dict(variant.wear.surfaces or {}) for variant in varied.variants] == [
+        {"cylinder": 0.5, "flat": 0.5},
+        {"cylinder": 0.5, "flat": 1.0},
+    ]
+    assert varied.variants[0].wear == read_study("cylinder_on_flat").wear
+    assert dict(varied.dimensions)["surfaces_flat"] == (0.5, 1.0)
+
+
+@pytest.mark.slow
+def test_natural_frequencies_stand_along_the_axes_of_their_scenes() -> None:
+    asked = ("outputs.variables=['natural_frequency']", "axes.frequency=0.05", "solver.harmonics=1")
+    axes = ("axes.friction_coefficient=[0.1, 0.2]", "axes.stiffness_2=[0.5, 1.0]")
+    whole = compute("two_masses", "whole.nc", *asked, *axes)
+    assert whole.natural_frequency.dims == ("stiffness_2", "nodal_diameter", "mode")
+    for stiffness in (0.5, 1.0):
+        alone = compute("two_masses", "alone.nc", *asked, f"scene.stiffness_2={stiffness}")
+        np.testing.assert_array_equal(whole.natural_frequency.sel(stiffness_2=stiffness), alone.natural_frequency)
+
+
+def test_flags_are_an_axis() -> None:
+    study = read_study("dovetail", ["axes.stress_stiffening=[true, false]", "axes.mesh={start=1, stop=3, num=3}"])
+    assert dict(study.dimensions)["stress_stiffening"] == (True, False)
+    assert dict(study.dimensions)["mesh"] == (1, 2, 3)
+    assert len(find_scenes(study).studies) == 6
+
+
+@pytest.mark.slow
+def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(SECTOR, "sector.inp")
+    Path("wear.toml").write_text(SECTOR_STUDY.replace("friction_coefficient = 0.1\n", ""), encoding="utf-8")
+    said = refused("wear.toml", ["axes.friction_coefficient={A=[0.1, 0.2]}"], capsys)
+    assert "friction_coefficient.A = no contact has this name" in said
+    own = compute("wear.toml", "own.nc", "scene.friction_coefficient={BLADES=0.2}", "slow_time.cycles=0")
+    both = compute("wear.toml", "both.nc", "axes.friction_coefficient={BLADES=[0.1, 0.2]}", "slow_time.cycles=0")
+    same_values(both.sel(friction_coefficient_BLADES=0.2), own)
+
+
+# --- files ---
+
+
+@pytest.mark.slow
+def test_effective_study_and_result_are_the_study_again() -> None:
+    axes = ("axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.3, 0.4]", "wear.law=threshold")
+    given = (*CHEAP, *axes, "axes.threshold=[0, 5]")
+    study = read_study("sdof_slider", given)
+    Path("again.toml").write_text(format_study(study), encoding="utf-8")
+    again = read_study("again.toml")
+    assert again.scene_axes == study.scene_axes
+    assert format_study(again) == format_study(study)
+    assert [variant.scene for variant in again.variants] == [variant.scene for variant in study.variants]
+    first = compute("sdof_slider", "first.nc", *given)
+    xr.testing.assert_identical(compute("first.nc", "second.nc").drop_attrs(), first.drop_attrs())
+
+
+@pytest.mark.slow
+def test_results_with_an_axis_of_the_scene_are_joined() -> None:
+    low = compute("sdof_slider", "low.nc", *CHEAP, "axes.friction_coefficient=[0.3]")
+    high = compute("sdof_slider", "high.nc", *CHEAP, "axes.friction_coefficient=[0.4, 0.5]")
+    whole = compute("sdof_slider", "whole.nc", *CHEAP, "axes.friction_coefficient=[0.3, 0.4, 0.5]")
+    joined = join_results([low, high])
+    for name in ("worn_volume", "outcome", "response_amplitude"):
+        np.testing.assert_array_equal(joined[name], whole[name])
+
+
+def test_one_scene_of_several_is_neither_written_nor_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    axis = ("--set", "axes.stiffness=[1.6e5, 1.7e5]")
+    assert main(["sdof_slider", *axis, "--write-scene", "s.h5"]) == 2
+    assert "axes.stiffness: give one value: a scene file holds one scene" in capsys.readouterr().err
+    for command in (["--plan"], ["-o", "o.nc"]):
+        assert main(["sdof_slider", *axis, "--set", "outputs.scene=true", *command]) == 2
+        assert "the study has 2 scenes, and a result keeps one" in capsys.readouterr().err
+    assert not Path("o.nc").exists()
+
+
+# --- what is wrong ---
+
+
+def refused(study: str, overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -> str:
+    command = [study, "--plan", *(part for text in overrides for part in ("--set", text))]
+    assert main(command) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    return said[0].removeprefix(f"run-study: {study}: ")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (["scene.friction_coefficient=[0.3, 0.4]"], "or the list as axes.friction_coefficient"),
+        (["axes.friction_coefficient={}"], "axes.friction_coefficient = {}: give a number, a list"),
+        (["axes.friction_coefficient={support=[0.3]}"], "scene.friction_coefficient = 0.5: give it once"),
+        (["axes.friction_coefficient=[0.3, nan]"], "axes.friction_coefficient = nan: give a number"),
+        (["axes.friction_coefficient=[0.3, -0.1]"], "axes.friction_coefficient = -0.1: give greater"),
+        (["axes.friction_coefficient=[0.3, 0.3]"], "axes.friction_coefficient = 0.3: give every value once"),
+        (["axes.friction_coefficient=[0.3, true]"], "give values of one kind"),
+        (["axes.frictioncoefficient=[0.3]"], "unknown key, give friction_coefficient"),
+        (["axes.half_width=[0.3]"], "axes.half_width = [0.3]: unknown key"),
+        (["axes.law=['archard', 'energy']"], "axes.law"),
+        (["axes.threshold=[1, 2]"], 'axes.threshold = 1.0: leave it out: only the law "threshold" takes it'),
+        (["wear.law=threshold", "axes.threshold=[-1, 2]"], "axes.threshold = -1"),
+        (["axes.surfaces=[1, 2]"], "axes.surfaces = 1"),
+        (["axes.surfaces={nosuch=[1, 2]}"], "axes.surfaces = {nosuch = 1.0}"),
+        (["axes.surfaces={'a b'=[1, 2]}"], "a dimension has the name"),
+        (["axes.surfaces={'<b>'=[1, 2]}"], "a dimension has the name"),
+        (["axes.surfaces={support=[-1, 2]}"], "axes.surfaces = -1"),
+        (["axes.stiffness={start=1e5, stop=2e5, num=10000000}"], "axes.stiffness = 10000000: give a whole number"),
+        (
+            ["axes.stiffness={start=1e5, stop=2e5, num=2000}", "axes.mass={start=1, stop=2, num=2001}"],
+            "axes.mass = 2001: give fewer values: there are 4002000 combinations",
+        ),
+        (
+            ["axes.stiffness={start=1e5, stop=2e5, num=200}", "axes.frequency={start=100, stop=200, num=6000}"],
+            "axes.frequency = 6000: give fewer values: there are 1.2e+06 points",
+        ),
+        (["axes.sample=[1, 2]"], "unknown key, give samples"),
+    ],
+)
+def test_what_is_wrong_with_an_axis_is_said_in_a_sentence(
+    overrides: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert expected in refused("sdof_slider", ["axes.scheme=adaptive", *overrides], capsys)
+
+
+def test_two_dimensions_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["axes.nodal_diameter=[0, 3]", "outputs.variables=['natural_frequency']"]
+    assert "outputs.variables" in (said := refused("dovetail", asked, capsys))
+    assert "it has a dimension nodal_diameter of its own" in said
+
+
+def test_friction_of_a_scene_file_with_its_own_is_refused_by_its_key(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sdof_slider", "--write-scene", "s.h5"]) == 0
+    capsys.readouterr()
+    with h5py.File("s.h5", "r+") as file:
+        file["contact/friction_coefficient"] = np.array([0.3])
+    text = (
+        '[study]\nname = "s"\n[scene]\nmodel = "s.h5"\n[axes]\nfrequency = 160.0\nfriction_coefficient = [0.3, 0.4]\n'
+    )
+    Path("s.toml").write_text(text, encoding="utf-8")
+    assert refused("s.toml", [], capsys).startswith("axes.friction_coefficient = 0.3: remove it")
