@@ -67,6 +67,7 @@ def _draw_bars(panel: Axes, point: xr.Dataset) -> None:
         sides = np.maximum(np.stack([middle - interval[:, LOWEST], interval[:, HIGHEST] - middle]), 0.0)
         panel.errorbar(at, middle, yerr=sides, fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
     panel.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names])
+    panel.set_xlim(-0.6, len(names) - 0.4)
     panel.set_ylim(0.0, 1.02)
     panel.grid(visible=False, axis="x")
 
