@@ -31,15 +31,34 @@ def contact_changes(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts])
     changes: list[ContactChange] = []
     for place, variant in enumerate(variants):
         own = scenes.numbers[place * n_samples : (place + 1) * n_samples]
-        values = {number: pair_values(variant, facts[number]) for number in set(own)}
+        drawn: tuple[SceneFacts, dict[str, NDArray[np.float64]]] | None = None
         for sample, number in enumerate(own):
-            of_sample = {name: each[sample] for name, each in values[number].items()}
+            # scenes of samples mostly have the same pairs, and then the same draws
+            if drawn is None or not _draws_alike(drawn[0], facts[number]):
+                drawn = facts[number], pair_values(variant, facts[number])
+            of_sample = {name: each[sample] for name, each in drawn[1].items()}
             if variant.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
                 gap = of_sample.get("gap", facts[number].gap)
                 of_sample["gap"] = gap + worn_depth(variant, facts[number])
             changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
     return tuple(changes)
+
+
+def _draws_alike(one: SceneFacts, other: SceneFacts) -> bool:
+    """Whether the pairs of two scenes draw the same values."""
+    if one is other:
+        return True
+    frictions = [
+        None if each.friction_coefficient is None else each.friction_coefficient.tolist() for each in (one, other)
+    ]
+    return (
+        one.surface == other.surface
+        and np.array_equal(one.position, other.position, equal_nan=True)
+        and np.array_equal(one.area, other.area)
+        and np.array_equal(one.gap, other.gap)
+        and frictions[0] == frictions[1]
+    )
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:

@@ -164,7 +164,9 @@ def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
     sections = study.model_dump(mode="json")
     scene = sections["scene"]
-    sections["scene"] = {"model": scene["model"], **scene["parameters"], "worn": _worn_states(study)}
+    chosen = _chosen_by_scenes(study)
+    kept = {key: value for key, value in scene["parameters"].items() if key not in chosen}
+    sections["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
@@ -183,6 +185,14 @@ def format_study(study: Study) -> str:
         lines.append(f"[{name}]")
         lines.extend(f"{key} = {_toml_value(value)}" for key, value in section.items() if value is not None)
     return "\n".join(lines) + "\n"
+
+
+def _chosen_by_scenes(study: Study) -> set[str]:
+    """Parameters that are no axis and differ along the axes: each scene has room for its own wear."""
+    axes = {axis.key[0] for axis in study.scene_axes}
+    own = dict(study.scene.parameters)
+    others = [dict(variant.scene.parameters) for variant in study.variants]
+    return {key for key in own if key not in axes and any(other[key] != own[key] for other in others)}
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,14 @@ import pytest
 import xarray as xr
 
 from studyrunner.plan.planning import build_tasks
+from studyrunner.scene import drawn_contacts
+from studyrunner.scene.drawn_contacts import pair_values
+from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import draw_inputs
+from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
+from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.test_scene_axes import CHEAP, compute, refused, same_values
 
 FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
@@ -126,6 +132,28 @@ def test_friction_of_samples_builds_no_scene() -> None:
     assert len(find_scenes(study).studies) == 1
     study = read_study("dovetail", ["scatter.samples=4", "scatter.rotation_speed={normal={std=10}}"])
     assert len(find_scenes(study).studies) == 4
+
+
+def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not once for each scene, which would be quadratic in the number of samples."""
+    gaps = ["scatter.samples=16", "scatter.gap={normal={std=1e-7}, of='each pair'}"]
+    calls: list[object] = []
+
+    def count(study: Study, facts: SceneFacts) -> dict[str, np.ndarray]:
+        calls.append(study)
+        return pair_values(study, facts)
+
+    monkeypatch.setattr(drawn_contacts, "pair_values", count)
+    changes = []
+    for more in ([], ["scatter.stiffness={normal={std=10}}"]):
+        study = read_study("sdof_slider", [*gaps, *more])
+        scenes = find_scenes(study)
+        facts = [replace(FACTS, gap=np.zeros(2)) for _ in scenes.studies]
+        changes.append(drawn_contacts.contact_changes(study, scenes, facts))
+    assert len(facts) == 16
+    assert len(calls) == 2
+    assert changes[0] != changes[1]  # columns of the design are in the order of the names, those of pairs last
+    assert len({one for change in changes for one in change}) == 32
 
 
 @pytest.mark.parametrize(

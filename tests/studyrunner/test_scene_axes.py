@@ -173,6 +173,19 @@ def test_effective_study_and_result_are_the_study_again() -> None:
     xr.testing.assert_identical(compute("first.nc", "second.nc").drop_attrs(), first.drop_attrs())
 
 
+def test_width_that_each_scene_chooses_is_chosen_again() -> None:
+    text = '[study]\nname = "s"\n[scene]\nmodel = "cylinder_on_flat"\nstroke = 1e-5\n[axes]\nfrequency = 20.0\n'
+    Path("s.toml").write_text(f"{text}wear_coefficient = 1e-12\nP = [1e5, 2e5]\n", encoding="utf-8")
+    study = read_study("s.toml")
+    Path("again.toml").write_text(format_study(study), encoding="utf-8")
+    widths = [
+        [dict(variant.scene.parameters)["half_width"] for variant in each.variants]
+        for each in (study, read_study("again.toml"))
+    ]
+    assert widths[0] == widths[1]
+    assert widths[0][0] < widths[0][1]
+
+
 @pytest.mark.slow
 def test_results_with_an_axis_of_the_scene_are_joined() -> None:
     low = compute("sdof_slider", "low.nc", *CHEAP, "axes.friction_coefficient=[0.3]")

@@ -1,0 +1,63 @@
+"""Studies of several scenes on several ranks: built side by side, killed and gone on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from tests.mpi.launching import Running, count_rows, results, run_to_end
+
+STUDY = (
+    *("-m", "studyrunner.cli", "sdof_slider"),
+    *("--set", "axes.frequency=160"),
+    *("--set", "axes.scheme=implicit"),
+    *("--set", "axes.stiffness=[1.6e5, 1.65e5, 1.7e5]"),
+    *("--set", "scatter={samples = 2, friction_coefficient = {normal = {std = 0.03}}, mass = {normal = {std = 1e-3}}}"),
+    *("--set", "solver.harmonics=3"),
+    *("--set", "solver.samples=32"),
+    *("--set", "slow_time.cycles=2000"),
+    *("--set", "slow_time.outputs=3"),
+)
+"""Six scenes, of which each rank holds two at most."""
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """The result of one process without a launcher."""
+    folder = tmp_path_factory.mktemp("alone")
+    assert run_to_end(0, [*STUDY, "-o", "out.nc"], folder).status == 0
+    found = results(folder / "out.nc")
+    assert found.worn_volume.sizes["stiffness"] * found.worn_volume.sizes["sample"] == 6
+    assert (found.outcome == 0).all()
+    return found
+
+
+@pytest.mark.parametrize("n_ranks", [1, 2, 3])
+def test_the_result_is_the_same_on_any_number_of_ranks(n_ranks: int, alone: xr.Dataset, tmp_path: Path) -> None:
+    ended = run_to_end(n_ranks, [*STUDY, "-o", "out.nc"], tmp_path)
+    assert ended.status == 0, ended.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)
+
+
+@pytest.mark.parametrize(("table", "victim"), [("computed", 1), ("results", 0)])
+def test_a_run_that_is_killed_goes_on_to_the_same_result(
+    table: str, victim: int, alone: xr.Dataset, tmp_path: Path
+) -> None:
+    """Once some of the scenes are built, or some of the histories are there."""
+
+    def kill(running: Running) -> None:
+        assert running.reaches(lambda: count_rows(table, tmp_path / "out.nc") > 0), running.said
+        with contextlib.suppress(ProcessLookupError, KeyError):
+            os.kill(running.ranks()[victim], signal.SIGKILL)
+
+    assert run_to_end(2, [*STUDY, "-o", "out.nc"], tmp_path, disturb=kill).status != 0
+    left = count_rows(table, tmp_path / "out.nc")
+    assert left > 0
+    ended = run_to_end(2, [*STUDY, "-o", "out.nc"], tmp_path)
+    assert ended.status == 0, ended.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)
