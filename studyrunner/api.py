@@ -16,7 +16,7 @@ from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
-from studyrunner.report.reading.result import open_vetted
+from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
 from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
 from studyrunner.scene_building import build_scenes

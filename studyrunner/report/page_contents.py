@@ -9,12 +9,14 @@ from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
 from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
 from studyrunner.report.figures.response import draw_responses
-from studyrunner.report.figures.sector import draw_sector
+from studyrunner.report.figures.sector import OF_SECTOR, draw_sector
 from studyrunner.report.figures.volume import draw_volumes
 from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.scene_pairs import of_shown_scene
 from studyrunner.report.root.figures import draw_root
+from studyrunner.report.scatter.figures import draw_scatter
 from studyrunner.report.trends.figures import draw_trends
 
 Item = Drawing | Missing | Table
@@ -26,12 +28,18 @@ def draw_report(result: Result) -> Iterator[Item]:
 
     Where no point holds a state, the results are left out with a single sentence.
     """
-    of_results: tuple[_Part, ...] = (draw_trends, draw_responses, draw_volumes, draw_root, draw_flanks, draw_loops)
+    of_results: tuple[_Part, ...] = (
+        draw_scatter,
+        draw_trends,
+        draw_responses,
+        draw_volumes,
+        *map(_of_pairs, (draw_root, draw_flanks, draw_loops)),
+    )
     if not result.held.any():
         of_results = (_tell_nothing,)
     parts = (
         draw_outcomes,
-        draw_sector,
+        lambda result: draw_sector(of_shown_scene(result, OF_SECTOR)),
         *of_results,
         list_branches,
         list_stability,
@@ -43,6 +51,11 @@ def draw_report(result: Result) -> Iterator[Item]:
         with style():
             items = list(part(result))
         yield from items
+
+
+def _of_pairs(part: _Part) -> _Part:
+    """Where scenes differ in their pairs, figures of pairs show the scene of the shown point."""
+    return lambda result: part(of_shown_scene(result))
 
 
 def _draw_precision(result: Result) -> Iterator[Item]:

@@ -24,6 +24,7 @@ from studyrunner.report.drawing import (
 from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
 
@@ -43,11 +44,11 @@ _NO_DEPTH = 1e-15
 def draw_flanks(result: Result) -> Iterator[Drawing | Missing]:
     """Figures of the pairs at the shown point; sentences where the file does not hold what they need."""
     worn = False
-    if not result.has("wear_depth"):
+    if not tells_depth(result):
         yield Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
     elif len(result.cycles) > 1:
         shown = result.shown_point()
-        worn = float(result.at("wear_depth", shown, result.last_kept(shown)).max()) > _NO_DEPTH
+        worn = float(last_depth(result, shown).max()) > _NO_DEPTH
     if worn and result.dataset.sizes["contact"] > 1:
         yield draw_depths(result)
     placed = all(flank.seen is not None for flank in find_flanks(result))
@@ -69,7 +70,7 @@ def draw_depths(result: Result) -> Drawing:
     course = result.course_axis
     choice = result.choose([course] if course else [], _MOST_SERIES)
     pairs, last = result.dataset["contact"].values, result.last_kept(shown)
-    series = [(result.at("wear_depth", {**shown, **point}, last).values, label) for point, label in choice]
+    series = [(last_depth(result, {**shown, **point}), label) for point, label in choice]
     series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]
     scale = scale_for("m", *(depth for depth, _ in series))
     highest = max(float(np.nanmax(depth)) for depth, _ in series)
@@ -177,7 +178,7 @@ def draw_profile(result: Result) -> Drawing:
     """Wear depth on each flank at the last cycle count: map, and lines along the flank (Fig. 12)."""
     shown = result.shown_point()
     last = result.last_kept(shown)
-    depth = result.at("wear_depth", shown, last).values
+    depth = last_depth(result, shown)
     scale = scale_for("m", depth)
     flanks, left_out = _choose_flanks(result, [depth])
     label = result.cycle_label(last)

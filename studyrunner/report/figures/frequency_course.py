@@ -68,7 +68,7 @@ def find_course(result: Result, axis: str | None = None) -> Course | None:
     if axis is None or axis not in result.varying:
         return None
     values = np.asarray(result.dataset[axis].values, dtype=float)
-    scale = scale_for(units_of(axis), values)
+    scale = scale_for(units_of(result.dataset[axis]), values)
     index = np.argsort(values, kind="stable")
     shown = scale(values[index])
     name = axis.replace("_", " ")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
 from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for
 
 _MOST_PAIRS = 3
@@ -115,9 +116,9 @@ def component_labels(result: Result, both: bool) -> dict[str, str]:
 def _deepest(result: Result) -> int:
     """The pair that is worn most at the shown point; the first where the file does not say."""
     pairs = result.dataset["contact"].values
-    if not result.has("wear_depth"):
+    if not tells_depth(result):
         return int(pairs[0])
-    return int(pairs[np.argmax(np.nan_to_num(result.at("wear_depth", result.shown_point(), -1).values))])
+    return int(pairs[np.argmax(np.nan_to_num(last_depth(result, result.shown_point())))])
 
 
 def kept_loops(result: Result, point: dict[str, int]) -> list[int]:

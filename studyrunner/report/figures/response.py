@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
 from studyrunner.report.figures.frequency_course import Course, find_course
-from studyrunner.report.reading.result import Choice, Point, Result, as_sentences
+from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.result import Point, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
 

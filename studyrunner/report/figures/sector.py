@@ -14,6 +14,9 @@ from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint
 from studyrunner.report.root.surface import MESH
 from studyrunner.report.root.views import from_aslant
 
+OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
+"""Variables that the figure shows."""
+
 _TITLE = "Sector and its natural frequencies"
 
 
@@ -35,6 +38,7 @@ def draw_sector(result: Result) -> Iterator[Drawing | Missing]:
         sentences.append(_draw_mesh(result, panels[0]))
     if frequencies:
         sentences.append(_draw_frequencies(result, panels[-1]))
+    sentences.append(f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else "")
     name = "natural_frequencies" if frequencies else "mesh"
     yield Drawing(name, _TITLE, as_sentences(*sentences, "Fig. 2 of the paper"), figure)
 

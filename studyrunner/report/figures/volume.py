@@ -24,8 +24,9 @@ from studyrunner.report.drawing import (
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
 from studyrunner.report.isolines import add_colour_bar, add_isolines
+from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.flanks import cell_edges
-from studyrunner.report.reading.result import NO_VOLUME, Choice, Result, as_sentences
+from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
 

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.figures.frequency_course import Course
+from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.known_volumes import show_error
-from studyrunner.report.reading.result import Choice, Result
+from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.units import Scale, show_cycles
 from studyrunner.system.progress import count
 

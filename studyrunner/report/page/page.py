@@ -31,7 +31,14 @@ DATA_LIMIT = 5.2e6
 PAGE_LIMIT = 11.4e6
 """Bytes that a page is to stay below; its drawings and numbers make room."""
 
-_SCRIPTS = ("numbers.js", "plots.js", "root.js", "trends.js", "page.js")  # each uses what stands in those before it
+_SCRIPTS = (
+    "numbers.js",
+    "plots.js",
+    "root.js",
+    "trends.js",
+    "scatter.js",
+    "page.js",
+)  # each uses what stands in those before it
 _DRAWINGS_LIMIT = 3e6
 _FEWEST_DATA = 0.5e6
 _SVG = "http://www.w3.org/2000/svg"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from studyrunner.report.reading.flanks import Flank, find_flanks
-from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.result import Point, Result
+from studyrunner.report.reading.scene_pairs import of_scene, pairs_of_scene
 
 MOST_PANELS = 6
 """More surfaces than this share one panel of bars."""
@@ -13,16 +16,19 @@ MOST_PANELS = 6
 _FLAT = 1e-6
 
 
-def build_panels(result: Result) -> list[dict[str, object]]:
-    """One panel a surface: `title`, `kind` and `pairs`, places of its contact pairs in the file.
+def build_panels(result: Result, point: Point | None = None) -> list[dict[str, object]]:
+    """One panel a surface, of the scene of a point or of the shown one: `title`, `kind`, and
+    `pairs`, places of its pairs in the file.
 
     kind "grid": `x` and `y`, m, of the columns and rows, and `pairs` as rows; "scatter": `x` and `y`, m, of each pair
     in the plane of the surface; "bars": one bar a pair.
     """
-    flanks = find_flanks(result)
+    # places in the file, where other scenes may have more pairs
+    point = result.shown_point() if point is None else point
+    places = pairs_of_scene(result, point)
+    flanks = [replace(flank, pairs=places[flank.pairs]) for flank in find_flanks(of_scene(result, point))]
     if len(flanks) > MOST_PANELS:
-        n_pairs = result.dataset.sizes["contact"]
-        return [{"title": "all contact pairs", "kind": "bars", "pairs": list(range(n_pairs))}]
+        return [{"title": "all contact pairs", "kind": "bars", "pairs": places.tolist()}]
     return [{"title": flank.surface, **_place(flank)} for flank in flanks]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.scene_pairs import of_shown_scene, pairs_of_scene
 from studyrunner.report.root.painting import body_colours
 from studyrunner.report.root.simplified import simplify
 from studyrunner.report.root.surface import RootSurface, read_root
@@ -34,7 +35,8 @@ def build_root_numbers(result: Result, limit: float, notes: list[str]) -> dict[s
     if n_pairs > _MOST_PAIRS:
         notes.append(f"The contact is not on this page in three dimensions: it has {n_pairs} pairs.")
         return None
-    surface = read_root(result)
+    shown = of_shown_scene(result)
+    surface = read_root(shown)
     if surface is None:
         return None
     n_faces, surface = (
@@ -43,7 +45,7 @@ def build_root_numbers(result: Result, limit: float, notes: list[str]) -> dict[s
     )
     if len(surface.faces) < n_faces:
         notes.append(f"The mesh is drawn with {len(surface.faces)} of its {n_faces} faces; those in contact are whole.")
-    views = find_views(result, surface)
+    views = find_views(shown, surface)
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
     contact = surface.contact
     return {
@@ -58,7 +60,7 @@ def build_root_numbers(result: Result, limit: float, notes: list[str]) -> dict[s
         "contact": {
             "nodes": encode_floats(contact.nodes),
             "columns": int(contact.pairs.shape[1]),
-            "pairs": encode_floats(contact.pairs),
+            "pairs": encode_floats(pairs_of_scene(result, result.shown_point())[contact.pairs]),
             "weights": encode_floats(contact.weights),
             "normals": encode_floats(contact.normals),
         },

@@ -7,12 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studyrunner.report.reading.endings import Ending
 from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
-from studyrunner.report.reading.result import CONVERGED, Ending, Result
-from studyrunner.report.reading.units import show_cycles, show_number, units_of
+from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
+from studyrunner.report.reading.units import scale_for, show_cycles, show_number, units_of
+from studyrunner.report.scatter.points import last_of, statistics_at
+from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.system.progress import count
+from studyrunner.variables import COORDINATES
 
 _MOST_VALUES = 12
+_MOST_SENTENCES = 3
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,7 @@ def describe_study(result: Result) -> StudyFacts:
     """What was studied and how it ended."""
     attributes = result.dataset.attrs
     facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
+    facts += _drawn(result)
     cycles = result.cycles
     ends = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}"
     kept = f"{ends}, {np.count_nonzero(~np.isnan(cycles))} kept"
@@ -55,7 +62,7 @@ def describe_study(result: Result) -> StudyFacts:
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     ]
-    summary = " ".join(filter(None, (tell_volumes(result), tell_ends(result))))
+    summary = " ".join(filter(None, (_tell_samples(result), tell_volumes(result), tell_ends(result))))
     return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
 
 
@@ -67,11 +74,37 @@ def _axis_values(result: Result, name: str) -> str:
     axis = result.dataset[name]
     words = axis.dtype.kind not in "fiu"
     values = [str(value) if words else show_number(float(value)) for value in axis.values]
-    units = units_of(name)
+    units = units_of(axis)
     after = f" {units}" if units else ""
+    # of keys of [scene] and [wear] the file says what they are
+    meaning = "" if name in COORDINATES else str(axis.attrs.get("long_name", ""))
+    told = f": {meaning}" if meaning else ""
     if len(values) > _MOST_VALUES:
-        return f"{values[0]} to {values[-1]}{after}, {len(values)} values"
-    return ", ".join(values) + after
+        return f"{values[0]} to {values[-1]}{after}, {len(values)} values{told}"
+    return ", ".join(values) + after + told
+
+
+def _tell_samples(result: Result) -> str:
+    """What the samples say at each combination of the other axes, or at the shown one alone of many."""
+    if result.statistics is None:
+        return ""
+    told = sentences(result.statistics)
+    if len(told) > _MOST_SENTENCES:
+        shown = {name: index for name, index in result.shown_point().items() if name != SAMPLE}
+        told = [f"{result.describe(shown)}: {sentence(last_of(statistics_at(result.statistics, shown)))}"]
+    return " ".join(f"{line}." for line in told)
+
+
+def _drawn(result: Result) -> list[tuple[str, str]]:
+    """Inputs that scatter: the smallest and the largest value that is drawn."""
+    found = []
+    for name, drawn in result.dataset.coords.items():
+        if str(name).startswith(DRAWN):
+            scale = scale_for(str(drawn.attrs.get("units", "")), drawn.values)
+            low, high = (scale.show(float(end), 4) for end in (drawn.min(), drawn.max()))
+            words = str(name).removeprefix(DRAWN).replace("_", " ")
+            found.append((f"drawn: {words}", f"{low} to {high}"))
+    return found
 
 
 def _scene(result: Result) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -14,6 +14,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.endings import Ending, read_endings
+from studyrunner.report.reading.opening import open_vetted
+from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
 from studyrunner.system.progress import count
@@ -33,39 +37,16 @@ Point = Mapping[str, int]
 
 
 @dataclass(frozen=True)
-class Ending:
-    """One outcome: number and word of the file, sentence for the reader."""
-
-    number: int
-    word: str
-    sentence: str
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Combinations of the axes that a figure shows, with labels.
-
-    sentence: on combinations that are left out; empty where there are none.
-    """
-
-    points: tuple[dict[str, int], ...]
-    labels: tuple[str, ...]
-    sentence: str
-
-    def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
-        """Combinations with their labels."""
-        return iter(zip(self.points, self.labels, strict=True))
-
-
-@dataclass(frozen=True)
 class Result:
     """A result file. A point is one combination of the axes.
 
-    dataset: read lazily. A variable that was read as a whole stays in memory.
+    dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
+    of several, and how many the file has.
     """
 
     path: Path
     dataset: xr.Dataset
+    fixed: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -190,21 +171,7 @@ class Result:
     @cached_property
     def endings(self) -> dict[int, Ending]:
         """All ways for a point to end that the file names, by number."""
-        attributes = self.dataset["outcome"].attrs
-        numbers = np.atleast_1d(attributes.get("flag_values", ())).tolist()
-        words = str(attributes.get("flag_meanings", "")).split()
-        # versions before 0.5 said so of every point that was computed to the end
-        claimed = str(attributes.get("sentences", "")).replace("computed to tolerance", "computed to the end")
-        sentences = claimed.splitlines()
-        sentences += [""] * (len(words) - len(sentences))
-        named = {
-            int(number): Ending(int(number), word, sentence or word.replace("_", " "))
-            for number, word, sentence in zip(numbers, words, sentences, strict=False)
-        }
-        # A number without a name is told as it is rather than left out.
-        for number in np.unique(self.dataset["outcome"].values).tolist():
-            named.setdefault(int(number), Ending(int(number), f"outcome_{number}", f"outcome {number}"))
-        return named
+        return read_endings(self.dataset["outcome"])
 
     @cached_property
     def responses(self) -> tuple[str, ...]:
@@ -244,6 +211,11 @@ class Result:
         if "cycle" in values.dims:
             where["cycle"] = cycle
         return values.isel(where)
+
+    @cached_property
+    def statistics(self) -> xr.Dataset | None:
+        """What the samples of the file say, see `statistics_of`; None where it has none."""
+        return statistics_of(self.dataset, self.study, self.endings)
 
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
@@ -292,9 +264,9 @@ class Result:
     @cached_property
     def course_axis(self) -> str | None:
         """The axis that figures over frequency are drawn over: the frequency, or the first other axis of several
-        numbers where the file has one frequency only; None where nothing but words varies.
+        numbers where the file has one frequency only; None where nothing but words and samples varies.
         """
-        numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf"]
+        numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
         if "frequency" in numbers:
             return "frequency"
         return numbers[0] if numbers else None
@@ -319,22 +291,24 @@ class Result:
         ranges = [range(self.dataset.sizes[name]) for name in split]
         points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in itertools.product(*ranges))
         labels = tuple(self.describe(point, split) for point in points)
-        fixed = [name for name in order if name not in split]
+        sizes = {name: self.dataset.sizes[name] for name in order if name not in split}
+        sizes |= {name: size for name, size in self.fixed.items() if name not in free}
+        fixed = [name for name in self.axes if name in sizes]
         if not fixed:
             return Choice(points, labels, "")
         others = " and ".join(
-            f"{count(self.dataset.sizes[name] - 1, 'other value')} of {name.replace('_', ' ')}" for name in fixed
+            count(sizes[name] - 1, "other sample" if name == SAMPLE else "other value")
+            + ("" if name == SAMPLE else f" of {name.replace('_', ' ')}")
+            for name in fixed
         )
         sentence = f"Shown for {self.describe(shown, fixed)}; the file also holds {others}."
         return Choice(points, labels, sentence)
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
-        kept = axes if axes is not None else (self.varying or self.axes)
+        kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         return ", ".join(
-            show_value(name, self.dataset[name].values[point[name]])
-            for name in self.axes
-            if name in kept and name in point
+            show_value(self.dataset[name], point[name]) for name in self.axes if name in kept and name in point
         )
 
     def cycle_label(self, index: int) -> str:
@@ -366,17 +340,3 @@ def open_for_report(path: Path | str) -> Result:
     opened = open_vetted(path)
     with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
         return Result(Path(path), check_dataset(opened, str(path)))
-
-
-def open_vetted(path: Path | str) -> xr.Dataset:
-    """Open a file as it is, once a process of its own has read it without harm. Raises UserError."""
-    # the report itself knows nothing of studies and scenes
-    from studyrunner.study.study_of_result import check_result_file
-
-    path, source = Path(path), str(path)
-    if not path.is_file():
-        raise UserError(source, "OUT.nc", None, "there is no such file; give a result file of run-study")
-    check_result_file(path, source)
-    with reading_errors(source, every=True), warnings.catch_warnings(action="ignore"):
-        # the same file as before, whatever its name looks like
-        return xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)

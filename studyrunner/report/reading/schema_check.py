@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import numpy as np
 import xarray as xr
 
+from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, COUNTS, KEPT, LOOPS, SCENE, Variable
@@ -24,6 +25,7 @@ _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a 
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
 _INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "cycle_count", *CERTIFICATE)
+_MOST_INPUTS, _MOST_DRAWN = 100, 2**24  # inputs that scatter, values of one of them
 _MOST_NAMES = 2**20  # values along any dimension
 _LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
 _DEEPEST = 3  # of what is nested in a study
@@ -70,13 +72,14 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
                 # where scenes differ, along the axes along which they do
                 along = tuple(axis for axis in axes if axis in dataset.variables[name].dims)
                 kept[name] = _check_variable(dataset, name, entry, (*along, *entry.dimensions))
+        drawn = {name: _check_drawn(dataset, name, axes) for name in _drawn_names(dataset)}
         _check_values(kept)
     except _WrongError as wrong:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
     names = set(_OF_CONTACTS) | set(_coordinates(dataset, axes))
     checked = xr.Dataset(
         {name: variable for name, variable in kept.items() if name not in names},
-        {name: variable for name, variable in kept.items() if name in names},
+        {**{name: variable for name, variable in kept.items() if name in names}, **drawn},
         {str(name): _clean(value, _limit(str(name))) for name, value in dataset.attrs.items()},
     )
     checked.set_close(dataset.close)
@@ -189,6 +192,27 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
     if not np.isfinite(variable.values).all():
         raise _WrongError(name, "a value that is no finite number")
     return xr.Variable((name,), variable.values, _attributes(variable))
+
+
+def _drawn_names(dataset: xr.Dataset) -> list[str]:
+    """Coordinates with what samples draw."""
+    found = [str(name) for name in dataset.variables if str(name).startswith(DRAWN)]
+    if len(found) > _MOST_INPUTS or not all(name.isidentifier() and len(name) <= _LONGEST_NAME for name in found):
+        raise _WrongError(found[0], f"{len(found)} inputs that scatter, or unusual names")
+    return found
+
+
+def _check_drawn(dataset: xr.Dataset, name: str, axes: Sequence[str]) -> xr.Variable:
+    """What the samples draw of an input: finite numbers, along the samples, and along one axis or the pairs."""
+    variable = dataset.variables[name]
+    shapes = [(SAMPLE,), (SAMPLE, "contact"), *((axis, SAMPLE) for axis in axes if axis != SAMPLE)]
+    if SAMPLE not in axes or variable.dims not in shapes:
+        raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
+    if variable.dtype.kind != "f" or variable.size > _MOST_DRAWN:
+        raise _WrongError(name, f"type {variable.dtype} of shape {variable.shape}")
+    if not (np.abs(variable.values) < _LARGEST_NUMBER).all():
+        raise _WrongError(name, "a value that is no finite number")
+    return xr.Variable(variable.dims, variable.values, _attributes(variable))
 
 
 def _is_choice(text: str) -> bool:

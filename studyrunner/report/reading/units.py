@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.variables import COORDINATES
 
 
 @dataclass(frozen=True)
@@ -98,23 +99,25 @@ def show_cycles(value: float) -> str:
     return f"{show_number(value, 4)} cycle" + ("" if value == 1 else "s")
 
 
-def units_of(name: str) -> str:
-    """Unit of a variable or a coordinate of a result file; `cycles` where it counts them, empty where there is none."""
-    if name in ("step", "step_limit", "cycle", "jump_cycle", "cycles_to_target"):
+def units_of(axis: xr.DataArray) -> str:
+    """Unit of an axis: `cycles` where it counts them, empty where there is none.
+
+    Of the axes that every study has it is known, of those that are keys of [scene] or [wear] the file tells it.
+    """
+    name = str(axis.name)
+    if name == "step":
         return "cycles"
-    for table in (ASKED, KEPT, COORDINATES):
-        if name in table:
-            units = table[name].units
-            return "" if units == "1" else units
-    return ""
+    units = COORDINATES[name].units if name in COORDINATES else str(axis.attrs.get("units", ""))
+    return "" if units == "1" else units
 
 
-def show_value(name: str, value: object) -> str:
+def show_value(axis: xr.DataArray, index: int) -> str:
     """A value of an axis in words."""
+    name, value = str(axis.name), axis.values[index]
     if isinstance(value, str):
         return f"{value} scheme" if name == "scheme" else f"{name.replace('_', ' ')} {value}"
-    units = units_of(name)
-    number = show_number(float(str(value)))
+    units = units_of(axis)
+    number = show_number(float(value))
     return (
         f"{number} Hz" if name == "frequency" else f"{name.replace('_', ' ')} {number}" + (f" {units}" if units else "")
     )

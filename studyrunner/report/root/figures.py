@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scene_pairs import depths, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for, show_number
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.disk import build_disk
@@ -65,8 +66,9 @@ class State:
 
 def _find_state(result: Result) -> State | None:
     """The state of the shown point that is drawn; None where the file holds no values of its pairs."""
-    shown, names = result.shown_point(), [name for name in ("wear_depth", "mean_pressure") if result.has(name)]
-    values = {name: result.at(name, shown).values for name in names}
+    shown = result.shown_point()
+    values = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
+    values |= {name: result.at(name, shown).values for name in ("mean_pressure",) if result.has(name)}
     held = np.ones(len(result.cycles), dtype=np.bool_)
     for each in values.values():
         held &= np.isfinite(each).all(axis=1)

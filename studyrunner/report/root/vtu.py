@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.scene_pairs import depths, of_shown_scene, tells_depth
 from studyrunner.report.root.surface import RootSurface, read_root
 from studyrunner.user_error import UserError, Verbatim
 
@@ -40,6 +41,7 @@ def find_writer(result: Result) -> Callable[[Path], Series]:
     if find_spec("meshio") is None:
         remedy = "install the library: pip install meshio"
         raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
+    result = of_shown_scene(result)
     surface = read_root(result)
     if surface is None:
         remedy = "leave out --vtu: the result holds no positions of its contact pairs"
@@ -61,7 +63,8 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
     import meshio
 
     shown = result.shown_point()
-    fields = {name: result.at(name, shown).values for name in FIELDS if result.has(name)}
+    fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
+    fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
     held = np.ones(len(result.cycles), dtype=np.bool_)
     for values in fields.values():
         held &= np.isfinite(values).all(axis=1)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, hatch_empty, new_figure, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.sample_statistics import SAMPLE
 from studyrunner.report.reading.units import scale_for, show_number, show_power, units_of
 from studyrunner.report.trends.quantities import Quantity, find_error, find_quantities, has_trends
 
@@ -41,8 +42,8 @@ def draw_trends(result: Result) -> Iterator[Drawing]:
 
 
 def _choose_axes(result: Result) -> list[str]:
-    """Axes of several values, at most `_MOST_AXES`: those of the solver, which stand last, are the first to go."""
-    return list(result.varying[:_MOST_AXES])
+    """Axes of several values, at most `_MOST_AXES`: the last are the first to go. Samples are no axis of a trend."""
+    return [name for name in result.varying if name != SAMPLE][:_MOST_AXES]
 
 
 def _draw_multiples(result: Result, quantities: list[Quantity], axes: list[str]) -> Drawing:
@@ -115,7 +116,7 @@ def _is_last(rows: list[Quantity], row: int, axis: int) -> bool:
 
 
 def _tell_left(result: Result, axes: list[str]) -> str:
-    left = [name.replace("_", " ") for name in result.varying if name not in axes]
+    left = [name.replace("_", " ") for name in result.varying if name not in (*axes, SAMPLE)]
     return f"Left out: {', '.join(left)}" if left else ""
 
 
@@ -131,7 +132,7 @@ def _positions(result: Result, name: str) -> tuple[NDArray[np.float64], NDArray[
 def _set_axis(panel: Axes, result: Result, name: str) -> None:
     """Label, scale and ticks of a horizontal axis: few values are ticks themselves."""
     values = result.dataset[name].values
-    panel.set_xlabel(_label(name))
+    panel.set_xlabel(_label(result, name))
     panel.tick_params(labelsize=_SMALL)
     if values.dtype.kind not in "fiu":
         panel.set_xticks(range(len(values)), [str(value) for value in values])
@@ -150,9 +151,9 @@ def _set_axis(panel: Axes, result: Result, name: str) -> None:
         _turn(panel.get_xticklabels())
 
 
-def _label(name: str) -> str:
+def _label(result: Result, name: str) -> str:
     """Name of an axis, a word a line, and its unit below: panels are narrow."""
-    units = units_of(name)
+    units = units_of(result.dataset[name])
     return name.replace("_", "\n") + (f"\n({units})" if units else "")
 
 
@@ -231,7 +232,7 @@ def _tick(panel: Axes, result: Result, name: str, order: NDArray[np.intp], named
         panel.xaxis.tick_top()
         panel.xaxis.set_label_position("top")
     if named:
-        panel.set_xlabel(_label(name))
+        panel.set_xlabel(_label(result, name))
         texts = panel.get_xticklabels()
         _turn(texts)
         if top:
@@ -243,7 +244,7 @@ def _tick_up(panel: Axes, result: Result, name: str, order: NDArray[np.intp], na
     """As `_tick`, beside the cells."""
     panel.set_yticks(*_cells(result, name, order, named), fontsize=_SMALL)
     if named:
-        panel.set_ylabel(_label(name))
+        panel.set_ylabel(_label(result, name))
 
 
 def _cells(result: Result, name: str, order: NDArray[np.intp], named: bool) -> tuple[list[int], list[str]]:

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.sample_statistics import SAMPLE
 
 FloatArray = NDArray[np.float64]
 
-_PLAIN = ("frequency", "scheme")
+_PLAIN = ("frequency", "scheme", SAMPLE)
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Quantity:
 
 
 def has_trends(result: Result) -> bool:
-    """Whether more than frequency and scheme varies, which other figures show, and there is something to tell."""
+    """Whether there is something to tell, and more varies than what other figures show: frequency, scheme, samples."""
     return bool(result.computed.any()) and not all(name in _PLAIN for name in result.varying)
 
 

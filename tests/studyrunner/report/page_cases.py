@@ -71,7 +71,7 @@ def build_file(
     coordinates |= {f"contact_{axis}": ("contact", positions[:, i]) for i, axis in enumerate("xyz")}
     coordinates["contact_surface"] = ("contact", np.array(surfaces))
     dataset = xr.Dataset(data, coords=coordinates, attrs={"title": "A study", "study": STUDY, **attributes})
-    for name in map(str, dataset.coords):
+    for name in dataset.coords.keys() & COORDINATES.keys():
         dataset[name].attrs = {"units": COORDINATES[name].units, "long_name": COORDINATES[name].long_name}
     return _with_loops(dataset, tuple(axes), loops, random) if loops else dataset
 

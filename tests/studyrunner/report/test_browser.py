@@ -147,14 +147,14 @@ def wait_for_frame(page: Any) -> None:
     page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]()))")
 
 
-def click_at(page: Any, point: int) -> None:
-    """A press of the mouse on the pixel at which the plot of the response shows a point; it is picked afterwards."""
+def click_at(page: Any, point: int, name: str = "response-plot") -> None:
+    """A press of the mouse on the pixel at which a plot shows a point; the point is picked afterwards."""
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.wait import WebDriverWait
 
     script = """
-    const plot = document.getElementById("response-plot");
+    const plot = document.getElementById(arguments[1]);
     plot.scrollIntoView({block: "center", behavior: "instant"});
     const box = plot.getBoundingClientRect();
     for (const trace of plot.data) {
@@ -164,7 +164,7 @@ def click_at(page: Any, point: int) -> None:
       const x = xaxis._offset + xaxis.d2p(trace.x[at]), y = yaxis._offset + yaxis.d2p(trace.y[at]);
       return [x - box.width / 2, y - box.height / 2];
     }"""
-    plot = page.find_element(By.ID, "response-plot")
+    plot = page.find_element(By.ID, name)
     # behind the listener of the page
     page.execute_script(
         """
@@ -177,7 +177,7 @@ def click_at(page: Any, point: int) -> None:
 
     def hover(_: Any) -> bool:
         # a click is one on what the plot has found under the mouse before, which it does in its own time
-        x, y = page.execute_script(script, point)
+        x, y = page.execute_script(script, point, name)
         actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
         actions.move_by_offset(3, -2).perform()
         wait_for_frame(page)

@@ -142,7 +142,7 @@ def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
     assert found.text.count(EVIL) >= 11
     content = json.loads(found.scripts[0])
     assert content["responses"][0] == EVIL
-    assert content["maps"]["panels"][0]["title"] == EVIL
+    assert content["maps"]["panels"][0][0]["title"] == EVIL
     assert "<" not in found.scripts[0]
 
 

@@ -13,8 +13,9 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.page import data as page_data
-from studyrunner.report.page.data import COURSES, LOOPS, MAPS, PageData, build_page_data
+from studyrunner.report.page import kept as page_kept
+from studyrunner.report.page.data import COURSES, PageData, build_page_data
+from studyrunner.report.page.maps import LOOPS, MAPS
 from studyrunner.report.page.panels import MOST_PANELS, build_panels
 from studyrunner.report.reading.result import Result
 from studyrunner.report.root.surface import read_root
@@ -127,7 +128,7 @@ def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.Monkey
     with xr.open_dataset(tmp_path / "some.nc") as dataset:
         whole = build_page_data(result_of(dataset), 2e5)
     for size in (1.0, 4e3, 2e4):
-        monkeypatch.setattr(page_data, "_BYTES_A_BLOCK", size)
+        monkeypatch.setattr(page_kept, "_BYTES_A_BLOCK", size)
         with xr.open_dataset(tmp_path / "some.nc") as dataset:
             assert build_page_data(result_of(dataset), 2e5) == whole
 

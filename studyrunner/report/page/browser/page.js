@@ -11,6 +11,9 @@ function readout() {
   // The other axes have one value, which the table of the study tells.
   varying.forEach((axis) => rows.push([`axis ${axes[axis].label}`, axes[axis].label, axisText(axis, found[axis])]));
   rows.push(["cycle", "cycle", countText(point, cycle)]);
+  for (const entry of scatter ? scatter.inputs : []) {
+    if (entry.values.length === sizes[scatter.axis] || rowOf(found) >= 0) rows.push([`drawn ${entry.label}`, `${entry.label}, drawn`, show(entry, drawnValue(entry, found))]);
+  }
   const of = data.responses.length > 1 ? `, ${data.responses[response]}` : "";
   for (const [name, entry] of Object.entries(courses)) {
     const label = name.includes("response") ? entry.label + of : entry.label;
@@ -63,6 +66,7 @@ function pick(point) {
   drawMaps();
   drawLoop();
   drawTrends();
+  drawScatter();
   drawRoot();
   readout();
 }
@@ -107,6 +111,7 @@ function prepare() {
     byId("map-plot").parentElement.hidden = true;
   }
   prepareTrends();
+  prepareScatter();
   prepareRoot();
   if (loops) {
     state.component = Math.max(loops.components.indexOf("tangent_1"), 0);
@@ -131,7 +136,7 @@ function prepare() {
   });
   byId("explore").hidden = false;
   turnTo(state.cycle);
-  for (const id of ["response-plot", "trend-plot", "trend-map-plot"]) {
+  for (const id of ["response-plot", "trend-plot", "trend-map-plot", "scatter-plot"]) {
     // a plot that was never drawn hears nothing
     byId(id).on?.("plotly_click", (event) => {
       const point = event.points[0].customdata;

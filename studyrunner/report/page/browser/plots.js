@@ -188,40 +188,55 @@ function sayInstead(id, text) {
   }), CONFIG);
 }
 
+// Which values of the pairs the page holds: most at many cycles, the depth of the last count at that alone.
+const pairsOf = (name) => (maps.variables[name].points ? maps.variables[name] : maps);
+const heldPairs = (name) => held(pairsOf(name), state.point, state.cycle);
+const isLast = (name) => name === "wear_depth_last";
+const knownPairs = (name) => (isLast(name) ? !without.has(state.point) : known(state.point, state.cycle));
+const pairsText = (name, found) => (isLast(name) ? "the last count" : cycleText(found ? found.cycle : state.cycle));
+const sceneOf = (point) => maps.scenes.reduce((number, axis) => number * sizes[axis] + places(point)[axis], 0);
+
+// Values of the pairs of a point at a cycle, and the largest of all its cycles; in the units of the file.
+function pairValues(name, found) {
+  const { values } = maps.variables[name];
+  const { points, cycles: kept } = pairsOf(name);
+  const nPairs = values.length / (points.length * kept.length);
+  const start = found.row * kept.length * nPairs;
+  let largest = 0;
+  for (let i = start; i < start + kept.length * nPairs; i++) if (values[i] > largest) largest = values[i];
+  return { largest, at: values.subarray(start + found.column * nPairs, start + (found.column + 1) * nPairs) };
+}
+
 function drawMaps() {
   if (!maps) return;
   const entry = maps.variables[state.map];
-  const found = held(maps, state.point, state.cycle);
-  byId("map-title").textContent = `Contact pairs at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found || !known(state.point, state.cycle)) {
-    sayInstead("map-plot", known(state.point, state.cycle) ? "The maps of this point are not on this page." : lacking(state.point, state.cycle));
+  const found = heldPairs(state.map);
+  const panels = maps.panels[sceneOf(state.point)];
+  byId("map-title").textContent = `Contact pairs at ${pairsText(state.map, found)}`;
+  if (!found || !panels.length || !knownPairs(state.map)) {
+    sayInstead("map-plot", knownPairs(state.map) ? "The maps of this point are not on this page." : lacking(state.point, state.cycle));
     return;
   }
-  const nPairs = entry.values.length / (maps.points.length * maps.cycles.length);
-  const start = found.row * maps.cycles.length * nPairs;
-  let largest = 0;
-  for (let i = start; i < start + maps.cycles.length * nPairs; i++) {
-    if (entry.values[i] > largest) largest = entry.values[i];
-  }
+  const { largest: most, at } = pairValues(state.map, found);
   // One scale for all cycles of the point, so that the slider shows what changes.
-  largest = state.map === "open_fraction" ? 1 : largest * entry.factor || 1;
-  const value = (pair) => (pair === null ? NaN : entry.values[start + found.column * nPairs + pair] * entry.factor);
+  const largest = state.map === "open_fraction" ? 1 : most * entry.factor || 1;
+  const value = (pair) => (pair === null ? NaN : at[pair] * entry.factor);
   const hover = `pair %{customdata}<br>%{PLACE:.5~g} ${plain(entry.unit)}<extra></extra>`;
-  const gap = 0.17 / Math.max(maps.panels.length - 1, 1);
-  const height = (1 - gap * (maps.panels.length - 1)) / maps.panels.length;
-  const bars = maps.panels.every((panel) => panel.kind === "bars");
-  const shape = layout({ height: 60 + 160 * Math.max(maps.panels.length, 2), annotations: [], showlegend: false, uirevision: "map" });
+  const gap = 0.17 / Math.max(panels.length - 1, 1);
+  const height = (1 - gap * (panels.length - 1)) / panels.length;
+  const bars = panels.every((panel) => panel.kind === "bars");
+  const shape = layout({ height: 60 + 160 * Math.max(panels.length, 2), annotations: [], showlegend: false, uirevision: "map" });
   if (!bars) {
     shape.coloraxis = { colorscale: "Cividis", cmin: 0, cmax: largest,
       colorbar: { title: { text: plain(entry.unit), side: "top" }, thickness: 14, outlinewidth: 0 } };
   }
   shape.margin.t = 28;
-  const traces = maps.panels.map((panel, i) => {
+  const traces = panels.map((panel, i) => {
     const suffix = i ? String(i + 1) : "";
     const top = 1 - i * (height + gap);
     const domain = [Math.max(top - height, 0), top];
     const place = { xaxis: `x${suffix}`, yaxis: `y${suffix}`, name: plain(panel.title), meta: "map" };
-    const last = i === maps.panels.length - 1;
+    const last = i === panels.length - 1;
     const milli = (values) => values.map((metres) => metres * 1e3);
     shape.annotations.push({ text: plain(panel.title), showarrow: false, xref: "paper", yref: "paper", x: 0, y: top,
       xanchor: "left", yanchor: "bottom", font: { ...FONT, size: 13 } });

@@ -5,6 +5,7 @@ const GREY_EDGE = "#555";
 const DISTANCE = 1.45; // of the eye, over the longest side of what is seen
 const MARGIN = 0.04;
 const WHAT = root && root.mesh ? "The root" : "The contact pairs";
+const DEPTH = maps && ["wear_depth", "wear_depth_last"].find((name) => maps.variables[name]);
 const LIT = { ambient: 0.65, diffuse: 0.5, specular: 0.05, roughness: 0.9, fresnel: 0.05, facenormalsepsilon: 0 };
 
 if (root) {
@@ -87,16 +88,6 @@ function factorOf(deepest) {
   return [5, 2, 1].find((factor) => factor * power <= wanted * (1 + 1e-9)) * power;
 }
 
-// Values of the pairs of a point at a cycle, and the largest of all its cycles; in the units of the file.
-function pairValues(name, found) {
-  const { values } = maps.variables[name];
-  const nPairs = values.length / (maps.points.length * maps.cycles.length);
-  const start = found.row * maps.cycles.length * nPairs;
-  let largest = 0;
-  for (let i = start; i < start + maps.cycles.length * nPairs; i++) if (values[i] > largest) largest = values[i];
-  return { largest, at: values.subarray(start + found.column * nPairs, start + (found.column + 1) * nPairs) };
-}
-
 function atNodes(ofPairs) {
   const { pairs, weights, columns, nodes } = root.contact;
   return Array.from(nodes, (_, i) => {
@@ -109,16 +100,18 @@ function atNodes(ofPairs) {
 function drawRoot() {
   if (!root || byId("root-plot").hidden) return;
   const entry = maps.variables[state.colour];
-  const found = held(maps, state.point, state.cycle);
-  const title = `${WHAT} at ${cycleText(found ? found.cycle : state.cycle)}`;
-  if (!found || !known(state.point, state.cycle)) {
+  const found = heldPairs(state.colour);
+  const title = `${WHAT} at ${pairsText(state.colour, found)}`;
+  const here = sceneOf(state.point) === sceneOf(data.shown);
+  if (!found || !here || !knownPairs(state.colour)) {
     byId("root-title").textContent = title;
     byId("root-plot").dataset.factor = "";
-    sayInstead("root-plot", known(state.point, state.cycle) ? "The pairs of this point are not on this page." : lacking(state.point, state.cycle));
+    sayInstead("root-plot", !here ? `On this page in three dimensions is the scene of ${maps.scenes.map((axis) => `${axes[axis].label} ${axisText(axis, places(data.shown)[axis])}`).join(", ")} alone.` : knownPairs(state.colour) ? "The pairs of this point are not on this page." : lacking(state.point, state.cycle));
     return;
   }
   const coloured = pairValues(state.colour, found);
-  const depth = maps.variables.wear_depth ? pairValues("wear_depth", found) : null;
+  const deep = DEPTH && heldPairs(DEPTH);
+  const depth = deep ? pairValues(DEPTH, deep) : null;
   const factor = depth ? factorOf(depth.largest) : 1;
   byId("root-title").textContent = title + (depth && depth.largest > 0 ? `, worn shape exaggerated ${digits(factor)} times` : "");
   byId("root-plot").dataset.factor = String(factor);
@@ -182,7 +175,7 @@ function prepareRoot() {
   byId("root-part").hidden = !root;
   if (!root) return;
   const names = Object.keys(maps.variables);
-  state.colour = names.includes("wear_depth") ? "wear_depth" : names[0];
+  state.colour = DEPTH || names[0];
   if (!hasWebGl()) {
     byId("root-plot").hidden = true;
     byId("root-title").textContent = WHAT;
@@ -194,7 +187,7 @@ function prepareRoot() {
   if (root.views.length > 1) {
     addChoice("root-choice", "root view", "view", root.views.map((view) => view.title), 0, (i) => { state.view = i; drawRoot(); });
   }
-  if (maps.variables.wear_depth) {
+  if (DEPTH) {
     addChoice("root-choice", "root shape", "worn shape", ["exaggerated", "as it is"], 0, (i) => { state.exaggerated = i === 0; drawRoot(); });
   }
 }

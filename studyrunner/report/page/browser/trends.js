@@ -14,10 +14,12 @@ for (const entry of trends) {
   entry.wrong = entry.errors && decode(entry.errors);
 }
 
+// Samples are no axis of a trend.
+const trended = varying.filter((axis) => axes[axis].label !== "sample");
 // Axes that a quantity is known over: not the frequency of a peak. First those that the response does not show already.
 function axesOf(entry) {
   const shown = (axis) => axis === data.horizontal || data.lines.includes(axis);
-  const found = varying.filter((axis) => entry.sizes[axis] > 1);
+  const found = trended.filter((axis) => entry.sizes[axis] > 1);
   return [...found.filter((axis) => !shown(axis)), ...found.filter(shown)];
 }
 
@@ -168,10 +170,10 @@ function drawTrends() {
 
 // List of axes; what the chosen quantity is not known over cannot be chosen.
 function addAxisChoice(parent, name, label, choose) {
-  const select = addChoice(parent, name, label, varying.map((axis) => axes[axis].label), 0, (i) => { choose(varying[i]); drawTrends(); });
+  const select = addChoice(parent, name, label, trended.map((axis) => axes[axis].label), 0, (i) => { choose(trended[i]); drawTrends(); });
   return (entry, axis) => {
-    varying.forEach((each, i) => { select.options[i].disabled = entry.sizes[each] === 1; });
-    select.value = String(varying.indexOf(axis));
+    trended.forEach((each, i) => { select.options[i].disabled = entry.sizes[each] === 1; });
+    select.value = String(trended.indexOf(axis));
   };
 }
 

@@ -1,0 +1,1 @@
+"""Figures of studies with samples: what their scatter says of the worn volume."""

@@ -1,0 +1,164 @@
+"""Figures and maps of pairs show those of one scene; the depth of the last count; coordinates that lie are refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.report.drawing import style
+from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.page.data import build_page_data
+from studyrunner.report.page.maps import LAST_DEPTH
+from studyrunner.report.reading.flanks import find_flanks
+from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
+from studyrunner.report.reading.schema_check import check_dataset
+from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.vtu import find_writer
+from studyrunner.user_error import UserError
+from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
+from tests.studyrunner.report.test_page_data import decode
+
+FEW, MANY = 12, 24
+
+
+@pytest.fixture(scope="module")
+def meshes() -> Result:
+    return Result(Path("meshes.nc"), check_dataset(mesh_file(), "meshes.nc"))
+
+
+@pytest.fixture(scope="module")
+def samples() -> Result:
+    return Result(Path("samples.nc"), check_dataset(sample_file(), "samples.nc"))
+
+
+@pytest.fixture(scope="module")
+def page(samples: Result) -> Any:
+    return build_page_data(samples, 4e6).content
+
+
+def test_a_scene_has_its_own_pairs(meshes: Result) -> None:
+    shown = of_shown_scene(meshes)
+    assert shown.shown_point() == meshes.shown_point() | {"mesh": 0}
+    assert [shown.dataset.sizes["contact"], sum(len(flank.pairs) for flank in find_flanks(shown))] == [FEW, FEW]
+    other = of_scene(meshes, {**meshes.shown_point(), "mesh": 1})
+    assert other.dataset.sizes["contact"] == MANY
+    assert read_root(shown) is not None
+    np.testing.assert_array_equal(
+        shown.at("wear_depth", shown.shown_point()), meshes.at("wear_depth", meshes.shown_point())[:, :FEW]
+    )
+
+
+def test_axes_of_the_scene_are_named_with_their_unit(meshes: Result) -> None:
+    shown = of_shown_scene(meshes)
+    assert "rpm, mesh 1" in shown.describe(shown.shown_point())
+    choice = shown.choose([], 4)
+    assert choice.sentence == "Shown for mesh 1; the file also holds 1 other value of mesh."
+
+
+def test_figures_show_the_pairs_of_the_shown_scene(meshes: Result) -> None:
+    with style():
+        items = {item.name: item for item in draw_flanks(of_shown_scene(meshes))}
+    assert set(items) == {"wear_depth", "mean_pressure", "worn_profile"}
+    assert "mesh 1" in items["worn_profile"].caption
+
+
+def test_panels_of_each_scene_name_places_in_the_file(meshes: Result) -> None:
+    content = build_page_data(meshes, 4e6).content
+    assert content is not None
+    maps: Any = content["maps"]
+    assert maps["scenes"] == [meshes.axes.index("mesh")]
+    for panels, n_pairs in zip(maps["panels"], (FEW, MANY), strict=True):
+        pairs = np.concatenate([np.ravel(panel["pairs"]) for panel in panels])
+        assert sorted(pairs) == list(range(n_pairs))
+
+
+def test_the_depth_of_the_last_count_is_drawn(samples: Result) -> None:
+    with style():
+        items = {item.name: item for item in draw_flanks(samples)}
+    assert "worn_profile" in items
+    depth = samples.at(LAST_DEPTH, samples.shown_point()).values
+    assert f"at pair {int(np.argmax(depth))}" in items["wear_depth"].caption
+
+
+def test_the_page_holds_the_depth_of_every_sample(samples: Result, page: Any) -> None:
+    entry = page["maps"]["variables"][LAST_DEPTH]
+    expected = samples.dataset[LAST_DEPTH].values.reshape(len(entry["points"]), 1, -1)
+    np.testing.assert_array_equal(decode(entry, *expected.shape), expected.astype("f4"))
+
+
+def test_the_page_holds_what_samples_draw(samples: Result, page: Any) -> None:
+    scatter = page["scatter"]
+    assert scatter["axis"] == samples.axes.index("sample")
+    by_label = {entry["label"]: entry for entry in scatter["inputs"]}
+    wear = samples.dataset["sample_wear_coefficient"].values
+    np.testing.assert_array_equal(decode(by_label["wear coefficient"], 1, wear.size)[0], wear.astype("f4"))
+    labels = [entry["label"] for entry in scatter["inputs"]]
+    assert [labels[place] for place in scatter["deciding"]] == ["wear coefficient"] * 2
+
+
+def test_little_room_takes_the_shown_combination(samples: Result) -> None:
+    data = build_page_data(samples, 3e4)
+    assert data.content is not None
+    scatter: Any = data.content["scatter"]
+    assert scatter["held"] == [samples.shown_point()["frequency"]]
+    assert "The scatter is on this page for one of 2 combinations of the other axes." in data.notes
+
+
+@pytest.mark.parametrize(("kind", "n_files"), [("meshes", 3), ("samples", 1)])
+def test_the_root_of_one_scene_is_written(
+    kind: str, n_files: int, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    result = request.getfixturevalue(kind)
+    series = find_writer(result)(tmp_path)
+    assert series.n_files == n_files
+    mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
+    expected = last_depth(result, result.shown_point())
+    assert np.nanmax(mesh.point_data["wear_depth"]) == np.nanmax(expected)
+
+
+def test_drawn_values_are_taken() -> None:
+    checked = check_dataset(sample_file(), "samples.nc")
+    assert {name for name in map(str, checked.coords) if name.startswith("sample_")} == {
+        "sample_friction_coefficient",
+        "sample_wear_coefficient",
+        "sample_gap",
+    }
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("cycle", np.zeros(3)),
+        (("contact", "sample"), np.zeros((24, 64))),
+        (("sample", "frequency"), np.zeros((64, 2))),
+        ("sample", np.array(["text"] * 64)),
+        ("sample", np.full(64, np.nan)),
+        ("sample", np.full(64, 1e31)),
+    ],
+)
+def test_drawn_values_that_lie_are_refused(wrong: Any) -> None:
+    with pytest.raises(UserError, match="sample_other"):
+        check_dataset(sample_file().assign_coords(sample_other=wrong), "samples.nc")
+
+
+def test_too_many_inputs_or_values_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from studyrunner.report.reading import schema_check
+
+    monkeypatch.setattr(schema_check, "_MOST_DRAWN", 100)
+    with pytest.raises(UserError, match="sample_gap"):
+        check_dataset(sample_file(), "samples.nc")
+    monkeypatch.setattr(schema_check, "_MOST_INPUTS", 2)
+    with pytest.raises(UserError, match="3 inputs"):
+        check_dataset(sample_file(), "samples.nc")
+
+
+def test_a_result_without_samples_has_no_drawn_values() -> None:
+    dataset: xr.Dataset = sample_file().isel(sample=0, drop=True)
+    with pytest.raises(UserError, match="sample_gap = dimensions contact"):
+        check_dataset(dataset, "samples.nc")
