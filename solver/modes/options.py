@@ -1,0 +1,39 @@
+"""Tuning constants of the nonlinear modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ModeOptions:
+    """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
+
+    rigid: float = 1e-6
+    """Square of a natural frequency over the shift of the eigenvalue problem, below which a motion is rigid."""
+    shift: float = 1e-6
+    """Shift of the eigenvalue problem over the ratio of the traces of stiffness and mass."""
+
+    first_load: float = 1e-3
+    """Vibrating contact forces at the first amplitude, over the friction limits under the static load."""
+    first_amplitude: float = 1e-6
+    """First amplitude of a joint without static normal forces, m sqrt(kg)."""
+    longest_ratio: float = 2.0
+    """Largest ratio of the amplitudes of two nodes."""
+    shortest_ratio: float = 1.001
+    """Smallest ratio of the amplitudes of two nodes; where a smaller one is needed, the mode is lost."""
+    top_base: float = 4.0
+    """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point. All points with
+    one such power have one way."""
+    sliding_starts: int = 4
+    """Attempts to find a mode of a sliding joint, each at an amplitude higher by `top_base`."""
+    difference: float = 1e-7
+    """Relative step of the derivatives by frequency, damping ratio and drive: their error does not change the mode,
+    whose residual is exact."""
+    largest_change: float = 0.3
+    """Largest change of the frequency (relative) and of the damping ratio in one iteration."""
+    near_resonance: float = 0.02
+    """Distance of a harmonic from a natural frequency, relative, that the message of a lost mode names."""
+
+
+MODES = ModeOptions()
