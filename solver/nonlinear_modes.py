@@ -8,9 +8,11 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.forced_response import check_friction, check_numbers, check_settings, check_word, worn_model
-from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.modes.mode_point import ModePoint
 from solver.modes.points import Direction, follow_mode
 from solver.outcome import Outcome
@@ -117,6 +119,13 @@ def backbone(
     )
 
 
+def _slips(at: Evaluation) -> BoolArray:
+    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
+    moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
+    least = ACCURACY.round_off_change * np.abs(at.state_t).max(axis=(1, 2))
+    return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))
+
+
 def _reported(model: ReducedModel, point: ModePoint) -> dict[str, ComplexArray | FloatArray | float | int]:
     """Values of a point by the names of `Backbone`."""
     state, problem, n_contact = point.state, point.problem, model.contact.n_contact
@@ -141,7 +150,7 @@ def _reported(model: ReducedModel, point: ModePoint) -> dict[str, ComplexArray |
         "damping_error": float(point.errors[1]),
         "response": response,
         "shape": state.shape,
-        "slip_fraction": (at.status_t == SLIP).mean(axis=1),
+        "slip_fraction": _slips(at).mean(axis=1),
         "open_fraction": (at.status_t == SEPARATED).mean(axis=1),
         "harmonics_used": problem.case.resolution.highest,
         "samples_used": problem.case.resolution.samples,

@@ -18,6 +18,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import history_at_rest
 from solver.loading_history.node_resolution import choose_resolution
 from solver.loading_history.options import LOADING
+from solver.model import FloatArray
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.options import MODES
 from solver.newton.linear_solver import JacobianSolver
@@ -43,20 +44,32 @@ class Nodes:
 
         Newton's method starts on the line through the last two nodes, or through the current one and the next, `ahead`.
         """
-        here, other = self.here, ahead or (self.states[0] if len(self.states) > 1 else None)
+        here, problem = self.here, self.problem
+        other = ahead or (self.states[0] if len(self.states) > 1 else None)
+        history = history_at_rest(problem.joint_of(here), here.point)
+        # grown in proportion, the start contains no noise of two near nodes
+        for start, values in (*self._on_line(amplitude, other), self._grown(amplitude)):
+            tolerance, most = problem.case.settings.tolerance, CONTINUATION.near_iterations
+            found = problem.solve(amplitude, start, values, history, solver, tolerance, budget, most)
+            if found is not None:
+                return found
+        return None
+
+    def _on_line(self, amplitude: float, other: ModeState | None) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Predicted force and values on the line through the current node and another of equal harmonics, if any."""
+        here = self.here
         predicted = here.point.evaluation.predicted_h
-        growth = amplitude / here.amplitude
-        if other is not None and other.point.evaluation.predicted_h.shape == predicted.shape:
-            ratio = (amplitude - here.amplitude) / (other.amplitude - here.amplitude)
-            start = predicted + ratio * (other.point.evaluation.predicted_h - predicted)
-            values = here.values + ratio * (other.values - here.values)
-        else:
-            start = predicted.copy()
-            start[:, 1:] *= growth
-            values = here.values * np.array([1.0, 1.0, growth])
-        history = history_at_rest(self.problem.joint_of(here), here.point)
-        tolerance, most = self.problem.case.settings.tolerance, CONTINUATION.near_iterations
-        return self.problem.solve(amplitude, start, values, history, solver, tolerance, budget, most)
+        if other is None or other.point.evaluation.predicted_h.shape != predicted.shape:
+            return ()
+        ratio = (amplitude - here.amplitude) / (other.amplitude - here.amplitude)
+        start = predicted + ratio * (other.point.evaluation.predicted_h - predicted)
+        return ((start, here.values + ratio * (other.values - here.values)),)
+
+    def _grown(self, amplitude: float) -> tuple[FloatArray, FloatArray]:
+        """Predicted force and values of the current node, the vibration in proportion to the amplitude."""
+        start, growth = self.here.point.evaluation.predicted_h.copy(), amplitude / self.here.amplitude
+        start[:, 1:] *= growth
+        return start, self.here.values * np.array([1.0, 1.0, growth])
 
 
 def shape_change(before: ModeState, after: ModeState) -> float:

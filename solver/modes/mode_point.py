@@ -22,7 +22,7 @@ from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.options import MODES
 from solver.newton.solve_balance import Budget
-from solver.outcome import Outcome
+from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.settings import Resolution
 
 
@@ -86,26 +86,32 @@ def judge_point(
     by_friction = float(friction_work(joint, found.point.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.amplitude) ** 2
     )
-    inaccurate = not accurate or errors[0] > rtol * found.omega
-    inaccurate |= bool(errors[1] > rtol * max(by_friction, abs(found.damping_ratio), rtol))
+    damping = max(by_friction, abs(found.damping_ratio))
+    if errors[1] > SENSITIVE_ERROR * damping:
+        return ModePoint(Outcome.BRANCH_LOST, "other harmonics change the damping by more than half: there is no such mode")
+    inaccurate = not (accurate and errors[0] <= rtol * found.omega and errors[1] <= rtol * damping)
     outcome = Outcome.INACCURATE if inaccurate else Outcome.CONVERGED
     return ModePoint(outcome, "", problem, found, errors)
 
 
 def _errors_by_resolution(problem: ModeProblem, state: ModeState, budget: Budget) -> FloatArray:
     """Errors (2,) of frequency, rad/s, and damping ratio by harmonics and samples; NaN where they are not known."""
-    resolution, model = problem.case.resolution, problem.model
     if nothing_happens(state.point.evaluation):
         return np.zeros(2)
+    here, errors = problem.case.resolution, np.full(2, np.nan)
     for levels, safety in ((2, ACCURACY.two_levels_safety), (1, ACCURACY.one_level_safety), (-1, 1.0)):
-        orders = shifted(resolution, levels).orders
-        samples = max(2 * resolution.samples, shifted(resolution, max(levels, 1)).samples)
-        if orders != resolution.orders and model.holds(orders[-1]):
-            other = problem.at(Resolution(orders, samples))
-            moved = problem.move(state, other, budget, problem.case.settings.tolerance)
-            if moved is not None:
-                return safety * np.abs(moved.values - state.values)[:2]
-    return np.full(2, np.nan)
+        other = shifted(here, levels)
+        if other.orders != here.orders and problem.model.holds(other.highest) and np.isnan(errors).any():
+            errors = safety * _change(problem, state, other, budget)
+    # samples of their own: an event may stay next to the same sample of twice as many
+    finer = Resolution(here.orders, 3 * here.samples + 2)
+    return errors + ACCURACY.triple_samples_safety * _change(problem, state, finer, budget)
+
+
+def _change(problem: ModeProblem, state: ModeState, resolution: Resolution, budget: Budget) -> FloatArray:
+    """Change (2,) of frequency, rad/s, and damping ratio with another resolution; NaN where there is no state."""
+    moved = problem.move(state, problem.at(resolution), budget, problem.case.settings.tolerance)
+    return np.full(2, np.nan) if moved is None else np.abs(moved.values - state.values)[:2]
 
 
 def describe_loss(sweep: AmplitudeSweep) -> str:
