@@ -167,10 +167,10 @@ class ModeProblem:
         start = np.concatenate([predicted_h.ravel(), values])
         end = solve_newton(evaluate, direction, start, tolerance, most)
         budget.iterations += end.iterations
-        if not end.converged:
-            return None
         found = end.evaluation
         omega, damping_ratio, drive = map(float, found.values)
+        if not end.converged or abs(damping_ratio) > MODES.most_damping:
+            return None
         point = PathPoint(amplitude, found.at, final_history(found.balance, found.at))
         return ModeState(amplitude, omega, damping_ratio, drive, point, found.shape)
 

@@ -32,6 +32,9 @@ class ModeOptions:
     whose residual is exact."""
     largest_change: float = 0.3
     """Largest change of the frequency (relative) and of the damping ratio in one iteration."""
+    most_damping: float = 1.0
+    """Largest magnitude of a damping ratio. Where friction stops a mass on a rigid slider for good, zeta goes to
+    infinity; balances of few harmonics have further states there, which do not exist."""
     near_resonance: float = 0.02
     """Distance of a harmonic from a natural frequency, relative, that the message of a lost mode names."""
 

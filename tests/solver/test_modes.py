@@ -33,10 +33,10 @@ def slider(damping: float = 0.0) -> ReducedModel:
 
 
 def foot(loss: float = 1e-5) -> ReducedModel:
-    """A pressed foot with a tip on a spring above it; damping: `loss` times stiffness."""
+    """A pressed light foot with a tip on a spring above it; damping: `loss` times stiffness."""
     stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e6, -2e6], [0.0, -2e6, 2e6]])
     return build_model(
-        np.diag([0.05, 0.05, 0.2]),
+        np.diag([1e-3, 1e-3, 0.2]),
         loss * stiffness,
         stiffness,
         [[0, 1, -1]],
@@ -47,7 +47,7 @@ def foot(loss: float = 1e-5) -> ReducedModel:
     )
 
 
-FOOT_AMPLITUDES = np.array([1e-8, 6e-6, 2e-5, 1e-4, 3e-3])
+FOOT_AMPLITUDES = np.array([1e-8, 8e-6, 2e-5, 1e-4, 3e-3])
 
 
 @lru_cache
