@@ -6,7 +6,7 @@ the difference to the reference sweep, which has fewer harmonics and longer step
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.options import MODES
 from solver.newton.solve_balance import Budget
-from solver.outcome import SENSITIVE_ERROR, Outcome
+from solver.outcome import Outcome, known_to
 from solver.settings import Resolution
 
 
@@ -66,7 +66,10 @@ def judge_point(
         As in `solve_balance`.
     """
     tolerance, rtol = problem.case.settings.tolerance, problem.case.settings.rtol
-    refined = refine(problem.case_at(found.omega, found.damping_ratio), found.omega, found.drive, found.point, budget)
+    # half of rtol is left for the error by the steps of the sweep
+    finer = replace(problem.case.settings, rtol=0.5 * rtol)
+    case = replace(problem, case=replace(problem.case, settings=finer)).case_at(found.omega, found.damping_ratio)
+    refined = refine(case, found.omega, found.drive, found.point, budget)
     accurate = refined.accurate
     other = problem.at(refined.case.resolution)
     if other.case.resolution != problem.case.resolution:
@@ -86,22 +89,22 @@ def judge_point(
     by_friction = float(friction_work(joint, found.point.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.amplitude) ** 2
     )
-    damping = max(by_friction, abs(found.damping_ratio))
-    if errors[1] > SENSITIVE_ERROR * damping:
-        return ModePoint(Outcome.BRANCH_LOST, "other harmonics change the damping by more than half: there is no such mode")
-    inaccurate = not (accurate and errors[0] <= rtol * found.omega and errors[1] <= rtol * damping)
-    outcome = Outcome.INACCURATE if inaccurate else Outcome.CONVERGED
-    return ModePoint(outcome, "", problem, found, errors)
+    known = [errors[0] / found.omega, errors[1] / max(by_friction, abs(found.damping_ratio))]
+    if accurate and max(known) <= rtol:
+        return ModePoint(Outcome.CONVERGED, "", problem, found, errors)
+    names = ("natural frequency", "damping ratio")
+    said = [f"the {name} {known_to(error, rtol)}" for name, error in zip(names, known, strict=True) if error > rtol]
+    return ModePoint(Outcome.INACCURATE, "; ".join(said), problem, found, errors)
 
 
 def _errors_by_resolution(problem: ModeProblem, state: ModeState, budget: Budget) -> FloatArray:
-    """Errors (2,) of frequency, rad/s, and damping ratio by harmonics and samples; NaN where they are not known."""
+    """Errors (2,) of frequency, rad/s, and damping ratio by harmonics and samples; inf where they are not known."""
     if nothing_happens(state.point.evaluation):
         return np.zeros(2)
-    here, errors = problem.case.resolution, np.full(2, np.nan)
+    here, errors = problem.case.resolution, np.full(2, np.inf)
     for levels, safety in ((2, ACCURACY.two_levels_safety), (1, ACCURACY.one_level_safety), (-1, 1.0)):
         other = shifted(here, levels)
-        if other.orders != here.orders and problem.model.holds(other.highest) and np.isnan(errors).any():
+        if other.orders != here.orders and problem.model.holds(other.highest) and np.isinf(errors).any():
             errors = safety * _change(problem, state, other, budget)
     # samples of their own: an event may stay next to the same sample of twice as many
     finer = Resolution(here.orders, 3 * here.samples + 2)
@@ -109,9 +112,9 @@ def _errors_by_resolution(problem: ModeProblem, state: ModeState, budget: Budget
 
 
 def _change(problem: ModeProblem, state: ModeState, resolution: Resolution, budget: Budget) -> FloatArray:
-    """Change (2,) of frequency, rad/s, and damping ratio with another resolution; NaN where there is no state."""
+    """Change (2,) of frequency, rad/s, and damping ratio with another resolution; inf where there is no state."""
     moved = problem.move(state, problem.at(resolution), budget, problem.case.settings.tolerance)
-    return np.full(2, np.nan) if moved is None else np.abs(moved.values - state.values)[:2]
+    return np.full(2, np.inf) if moved is None else np.abs(moved.values - state.values)[:2]
 
 
 def describe_loss(sweep: AmplitudeSweep) -> str:
