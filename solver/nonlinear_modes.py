@@ -28,7 +28,7 @@ class Backbone:
       displacements.
     - frequency (n_amplitude,): natural frequency, Hz.
     - damping_ratio (n_amplitude,): zeta, dimensionless; positive where the vibration decays.
-    - frequency_error, damping_error (n_amplitude,): estimated absolute errors, Hz and dimensionless.
+    - frequency_error, damping_error (n_amplitude,): estimated absolute errors, Hz and dimensionless; inf where unknown.
     - response (n_amplitude, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)). The phase
       is such that the vibration is in phase with the linear mode.
     - shape (n_amplitude, n): complex x_1, m. Divided by the amplitude, the mass-normalised shape of the mode.

@@ -153,15 +153,13 @@ class FirstHarmonic:
         return float(np.sqrt(max(np.real(np.vdot(shape, self.mass @ shape)), 0.0)))
 
 
-def first_harmonic(model: ModalModel, mode: LinearMode, omega: float, drive: float) -> FirstHarmonic:
-    """The displacements of harmonic 1 at a frequency, rad/s, and a drive, m sqrt(kg)."""
+def first_harmonic(model: ReducedModel, mode: LinearMode, omega: float, drive: float) -> FirstHarmonic:
+    """The displacements of harmonic 1 of a modal model at a frequency, rad/s, and a drive, m sqrt(kg)."""
     relative, _ = relative_indices(model.contact)
     linear, folded = model.harmonic_structure(1)
-    full = linear.stiffness + 1j * omega * linear.damping - omega**2 * linear.mass
-    mass, projection = linear.mass, np.conj(mode.shape) @ linear.mass
-    if folded:
-        full = linear.stiffness.conj() + 1j * omega * linear.damping.conj() - omega**2 * linear.mass.conj()
-        mass, projection = mass.conj(), projection.conj()
-    load = drive * (linear.load_harmonic.conj() if folded else linear.load_harmonic)
-    found = condense(full, relative, load)
-    return FirstHarmonic(found.motion, found.held_motion, mass, projection)
+    mass, damping, stiffness, load, shape = (
+        part.conj() if folded else part
+        for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, mode.shape)
+    )
+    found = condense(stiffness + 1j * omega * damping - omega**2 * mass, relative, drive * load)
+    return FirstHarmonic(found.motion, found.held_motion, mass, shape.conj() @ mass)

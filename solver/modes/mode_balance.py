@@ -118,8 +118,7 @@ class ModeProblem:
         joint = case.joint(omega, drive)
         balance = Balance.frozen(joint, history, np.zeros(self.model.contact.n_contact))
         at = balance.evaluate(predicted_h)
-        model = modal_model(self.model, self.mode, 2.0 * damping_ratio * omega)
-        first = first_harmonic(model, self.mode, omega, drive)
+        first = first_harmonic(case.model, self.mode, omega, drive)
         shape = first.shape(to_complex(joint.to_relative(at.displacement_h))[:, 0])
         coordinate = first.coordinate(shape)
         errors = np.array(

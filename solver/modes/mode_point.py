@@ -89,7 +89,8 @@ def judge_point(
     by_friction = float(friction_work(joint, found.point.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.amplitude) ** 2
     )
-    known = [errors[0] / found.omega, errors[1] / max(by_friction, abs(found.damping_ratio))]
+    damping = max(by_friction, abs(found.damping_ratio), MODES.least_damping)
+    known = [float(errors[0]) / found.omega, float(errors[1]) / damping]
     if accurate and max(known) <= rtol:
         return ModePoint(Outcome.CONVERGED, "", problem, found, errors)
     names = ("natural frequency", "damping ratio")
@@ -122,7 +123,7 @@ def describe_loss(sweep: AmplitudeSweep) -> str:
     here, problem = sweep.nodes.here, sweep.nodes.problem
     way = "up" if sweep.direction > 0.0 else "down"
     said = f"the mode is followed {way} to the amplitude {here.amplitude:.4g} m sqrt(kg), at {_hertz(here.omega)}"
-    for order in problem.case.resolution.orders[1:]:
+    for order in (n for n in problem.case.resolution.orders if 1 < n <= MODES.resonant_order):
         linear, _ = problem.model.harmonic_structure(order)
         dofs = problem.model.contact.dofs.ravel()
         omegas, _ = natural_frequencies(linear, dofs[dofs >= 0])

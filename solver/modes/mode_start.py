@@ -54,8 +54,9 @@ def find_rest(
     first = linear_mode(model, number, closed, friction) or linear_mode(model, number, closed, 0.0 * friction)
     if first is None:
         return Outcome.START_FAILED, f"mode = {number}: the joint has fewer linear modes"
-    plain = build_case(model, friction_coefficient, first.omega, settings)
-    static = solve_static_state(plain.joint(first.omega, 0.0), np.zeros(closed.size), settings.tolerance, budget)
+    # with the spring on the modal coordinate: without the spring the held structure is singular at its own frequency
+    case = build_case(modal_model(model, first, 0.0), friction_coefficient, first.omega, settings)
+    static = solve_static_state(case.joint(first.omega, 0.0), np.zeros(closed.size), settings.tolerance, budget)
     if static is None:
         return Outcome.STATIC_FAILED, ""
     closed = static.evaluation.status_t[:, 0] != SEPARATED

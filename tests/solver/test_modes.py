@@ -14,7 +14,7 @@ from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.points import follow_mode
 from solver.structure.condensation import condense, relative_indices
 from solver.structure.fourier import to_complex
-from tests.solver.models import cyclic_model, dovetail
+from tests.solver.models import cyclic_model, dovetail, scene
 
 MASS, STIFFNESS, LIMIT = 0.1, 1.6e5, 5.0  # kg, N/m, N
 SIZE = LIMIT / STIFFNESS  # m
@@ -33,11 +33,11 @@ def slider(damping: float = 0.0) -> ReducedModel:
     )
 
 
-def foot(loss: float = 1e-5) -> ReducedModel:
-    """A pressed light foot with a tip on a spring above it; damping: `loss` times stiffness."""
+def foot(loss: float = 1e-5, mass: float = 1e-3) -> ReducedModel:
+    """A pressed foot, kg, with a tip on a spring above it; damping: `loss` times stiffness."""
     stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e6, -2e6], [0.0, -2e6, 2e6]])
     return build_model(
-        np.diag([1e-3, 1e-3, 0.2]),
+        np.diag([mass, mass, 0.2]),
         loss * stiffness,
         stiffness,
         [[0, 1, -1]],
@@ -114,11 +114,40 @@ def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping() ->
     assert found.damping_ratio[2] > 3.0 * found.damping_ratio[0]
 
 
+def test_a_joint_without_damping_and_slip_has_none() -> None:
+    found = backbone(foot(0.0), [1e-6], 0.5)
+    assert found.outcome == (Outcome.CONVERGED,)
+    assert abs(found.damping_ratio[0]) < 1e-12
+
+
 def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it() -> None:
     found, mass = foot_modes(), foot().linear[0].mass
     modal = np.sqrt(np.einsum("ai,ij,aj->a", found.shape.conj(), mass, found.shape).real)
     np.testing.assert_allclose(modal, FOOT_AMPLITUDES, rtol=1e-6)
     np.testing.assert_allclose(found.response[:, 0], found.shape[:, 2], rtol=1e-6)
+
+
+def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs() -> None:
+    """Without damping the mode is the free motion: a spring of 1 N/m, and from the gap on one of 100 N/m beside it."""
+    gap, stiff = 0.1, 101.0
+    speed = np.array([0.15, 0.2])  # m/s at the wall
+    free, centre = np.hypot(gap, speed), 100.0 * gap / stiff
+    pressed = np.hypot(gap - centre, speed / np.sqrt(stiff))
+    half_open = np.pi - np.arccos(gap / free)
+    half_closed = np.arccos((gap - centre) / pressed) / np.sqrt(stiff)
+    half = half_open + half_closed
+    # from the deepest point in the wall to the farthest one from the wall
+    time = np.linspace(0.0, half, 200_001)
+    inside = centre + pressed * np.cos(np.sqrt(stiff) * time)
+    outside = -free * np.cos(half - time)
+    moved = np.where(time < half_closed, inside, outside)
+    omega = np.pi / half
+    first = 2.0 / half * np.trapezoid(moved * np.cos(omega * time), time, axis=0)
+    found = backbone(scene("vibro_impact", damping=0.0), first, 0.0)
+    np.testing.assert_allclose(2.0 * np.pi * found.frequency, omega, rtol=1e-2)
+    assert (abs(2.0 * np.pi * found.frequency - omega) <= 2.0 * 2.0 * np.pi * found.frequency_error).all()
+    assert (abs(found.damping_ratio) < 1e-9).all()
+    np.testing.assert_allclose(1.0 - found.open_fraction[:, 0], half_closed / half, atol=0.03)
 
 
 def energies(problem: ModeProblem, state: ModeState) -> tuple[float, float]:
@@ -168,6 +197,7 @@ def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint: str
     assert seen == len(amplitudes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_a_point_does_not_depend_on_the_others(direction: str) -> None:
     together = foot_modes(direction)
@@ -207,6 +237,16 @@ def test_what_has_no_mode_says_so() -> None:
     found = backbone(slider(), [1e-3], 0.5)
     assert found.outcome == (Outcome.START_FAILED,)
     assert 'direction = "down"' in found.message[0]
+
+
+@pytest.mark.slow
+def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points() -> None:
+    """A heavy foot whose own vibration the harmonics meet stops several times in a period."""
+    found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5)
+    assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
+    assert np.isnan(found.frequency[0])
+    assert 350.0 < found.frequency[1] < 450.0
+    assert "the mode is followed up to the amplitude" in found.message[0]
 
 
 def test_wrong_arguments_are_named() -> None:
