@@ -223,11 +223,14 @@ def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(n_sectors: int
 def test_wear_opens_the_joint_as_a_gap_does() -> None:
     model = foot()
     depth = 2e-6  # m; 20 of the 50 N are left
-    worn = backbone(model, FOOT_AMPLITUDES[1:3], 0.5, wear_depth=[depth])
+    worn = backbone(model, FOOT_AMPLITUDES[2], 0.5, wear_depth=[depth])
     with_gap = replace(model, contact=replace(model.contact, gap=np.array([depth])))
-    as_gap = backbone(with_gap, FOOT_AMPLITUDES[1:3], 0.5)
+    as_gap = backbone(with_gap, FOOT_AMPLITUDES[2], 0.5)
     np.testing.assert_array_equal(worn.damping_ratio, as_gap.damping_ratio)
-    assert worn.slip_fraction[0, 0] > foot_modes().slip_fraction[1, 0]
+    # the mode depends on the amplitude over the normal force alone
+    less = backbone(model, FOOT_AMPLITUDES[2] * 50.0 / 30.0, 0.5)
+    assert worn.damping_ratio[0] == pytest.approx(less.damping_ratio[0], rel=1e-2)
+    assert worn.frequency[0] == pytest.approx(less.frequency[0], rel=1e-3)
 
 
 def test_what_has_no_mode_says_so() -> None:
