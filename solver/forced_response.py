@@ -1,9 +1,9 @@
-"""The forced response of an unworn joint over frequency: one frequency response from a model in Python."""
+"""The forced response of a joint over frequency: one frequency response from a model in Python."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -19,12 +19,12 @@ from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_wear
 from solver.wear.solutions import SlowTime
 
-_UNWORN = np.zeros(1)  # the only cycle count
+_START = np.zeros(1)  # the only cycle count
 
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """Unworn periodic states over frequency, at `n_frequency` points.
+    """Periodic states over frequency, at `n_frequency` points, of an unworn joint or at a fixed wear depth.
 
     - frequency (n_frequency,): Hz, as given.
     - response (n_frequency, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
@@ -56,8 +56,9 @@ def frequency_response(
     *,
     sweep: Sweep = "up",
     settings: SolverSettings | None = None,
+    wear_depth: ArrayLike | None = None,
 ) -> FrequencyResponse:
-    """Frequency response of an unworn joint.
+    """Frequency response of a joint at fixed wear depth.
 
     Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
 
@@ -75,6 +76,8 @@ def frequency_response(
         Way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     settings
         The defaults of `SolverSettings` if not given.
+    wear_depth
+        (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
     Raises
     ------
@@ -85,12 +88,13 @@ def frequency_response(
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
     found: dict[int, WearHistory] = {}
     branch = follow_branch(model, friction, load, ascending, sweep, settings)
     for index, start in branch:
-        # an unworn state is a wear history with cycle 0 alone
-        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _UNWORN, 1.0))
+        # a state is a wear history with cycle 0 alone
+        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _START, 1.0))
     points = [found[index] for index in place.tolist()]
     return FrequencyResponse(
         frequency=wanted,
@@ -115,12 +119,30 @@ def check_case(
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
     friction = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Sweep))
+    check_settings(model, settings)
+    return load, friction
+
+
+def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
+    """Raises ValueError where harmonics do not fit to the model, or samples not to the harmonics."""
     highest = 1 if settings.harmonics == "auto" else settings.harmonics
     if not model.holds(highest):
         raise ValueError(f"the model does not hold the nodal diameters that harmonics up to {highest} see")
     if settings.samples != "auto" and settings.samples <= 2 * highest:
         raise ValueError(f"settings.samples: give more than {2 * highest}, twice the harmonics")
-    return load, friction
+
+
+def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedModel:
+    """The model of a joint that is worn by a depth (n_contact,), m, which opens its pairs; as given for None.
+
+    Raises ValueError where there is no depth for each pair, or where a depth is negative.
+    """
+    if wear_depth is None:
+        return model
+    depth = check_numbers("wear_depth", wear_depth, least=0.0)
+    if depth.size != model.contact.n_contact:
+        raise ValueError(f"wear_depth: give {model.contact.n_contact} depths, m, one for each pair, not {depth.size}")
+    return replace(model, contact=replace(model.contact, gap=model.contact.gap + depth))
 
 
 def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:

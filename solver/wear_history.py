@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
-from solver.forced_response import check_case, check_number, check_numbers, check_word
+from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
 from solver.model import ReducedModel
@@ -37,8 +37,9 @@ def march_wear(
     until: WearTarget | None = None,
     outputs: int = 101,
     final_share: float = 1e-4,
+    wear_depth: ArrayLike | None = None,
 ) -> WearHistory:
-    """Wear history of a joint that vibrates at one frequency, from its unworn state on.
+    """Wear history of a joint that vibrates at one frequency, from its unworn state or from given depths on.
 
     A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
 
@@ -74,13 +75,17 @@ def march_wear(
         For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles; the history has
         their counts. final_share: the history ends where the wear rate of each pair is below this share of its own
         largest wear rate.
+    wear_depth
+        (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of the
+        history count from there. Unworn if not given.
 
     Raises
     ------
     ValueError
         A number is out of its range; counts do not ascend; the scheme needs a step that is not given; the model lacks
         nodal diameters that the harmonics need; friction coefficients are given twice, not at all, or not to each pair;
-        the law is not in `wear_law.LAWS` or names surfaces that the model does not have.
+        the law is not in `wear_law.LAWS` or names surfaces that the model does not have; the law "table", whose factors
+        depend on the depth, is given together with `wear_depth`.
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
@@ -107,6 +112,9 @@ def march_wear(
     if until is not None:
         check_word("until.quantity", until.quantity, TARGETS)
         check_number("until.value", until.value, above=0.0)
+    if wear_depth is not None and law.name == "table":
+        raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
+    model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))

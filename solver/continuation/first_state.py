@@ -147,7 +147,7 @@ def solve_first_state(
         if accepted(slid):
             return Outcome.CONVERGED, slid
     for fraction in CONTINUATION.relief:
-        relieved = Balance.frozen(quiet, _relieved(quiet, static, fraction), wear_depth)
+        relieved = Balance.frozen(quiet, relieved_history(quiet, static, fraction), wear_depth)
         result = solve_balance(relieved, start, solver, tolerance, budget)
         if result.converged:
             held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
@@ -169,7 +169,7 @@ def solve_first_state(
     return Outcome.UNSTABLE if unstable else why, None
 
 
-def _relieved(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:
+def relieved_history(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:
     """Tangential history (n_contact, 2), m, that reduces the static friction forces by a fraction."""
     return static.history + fraction * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 

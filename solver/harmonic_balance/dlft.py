@@ -185,14 +185,19 @@ class Linearisation:
     def _active(self) -> IntArray:
         return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
 
-    def apply(self, step: FloatArray) -> FloatArray:
-        """Jacobian times a step (n_rel, m), N."""
+    def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
         joint = self.joint
         spread = joint.to_pairs(step)
         force = np.matmul(self.force_tangent, spread.reshape(joint.contact.n_contact, -1, 1)).reshape(spread.shape)
         motion = joint.motion(spread - force)
         motion[:, 0, 0] += (self.growth_tangent * spread.reshape(joint.contact.n_contact, -1)).sum(axis=1)
-        return joint.structure.apply(joint.to_relative(motion)) + joint.to_relative(force)
+        return motion, force
+
+    def apply(self, step: FloatArray) -> FloatArray:
+        """Jacobian times a step (n_rel, m), N."""
+        motion, force = (self.joint.to_relative(part) for part in self.transmit(step))
+        return self.joint.structure.apply(motion) + force
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""

@@ -1,0 +1,1 @@
+"""Nonlinear modes of a joint by the extended periodic motion concept: frequency and damping over the amplitude."""

@@ -1,0 +1,165 @@
+"""Linear modes of the joint, and the model whose periodic states are nonlinear modes.
+
+The extended periodic motion concept (Krack, "Nonlinear modal analysis of nonconservative systems: extension of the
+periodic motion concept", Computers and Structures 154 (2015) 59-71) seeks periodic motions without excitation,
+
+    M x'' + (C - 2 zeta omega M) x' + K x + (contact forces) = f_0,
+
+where the negative damping `-2 zeta omega M` feeds in the energy that the joint dissipates. The structure with its joint
+held is singular at the frequency of its own mode. So harmonic 1 gets a spring on its modal coordinate
+`q = phi^H M x_1`, with the mass-normalised linear mode phi. The other end of the spring moves with the real amplitude
+Q (the drive):
+
+    M x'' + (C - 2 zeta omega M) x' + K x + omega_0^2 M phi (q - Q) + (contact forces) = f_0.
+
+At a nonlinear mode `q = Q`, so that the spring has no force. For any other frequency and damping ratio this is a forced
+vibration, which all parts of the solver treat as any other one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import numpy as np
+import scipy.linalg
+
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.modes.options import MODES
+from solver.structure.condensation import condense, relative_indices
+
+
+@dataclass(frozen=True)
+class LinearMode:
+    """A mode of the linear structure that harmonic 1 sees.
+
+    - omega: natural frequency without damping, rad/s.
+    - shape (n,): phi, with `phi^H M phi = 1`; its largest component is real and positive. 0 where the joint is held.
+    - damping_ratio: of the damping matrix alone, `phi^H C phi / (2 omega)`.
+    """
+
+    omega: float
+    shape: Matrix
+    damping_ratio: float
+
+
+def natural_frequencies(linear: LinearModel, held: IntArray) -> tuple[FloatArray, Matrix]:
+    """Natural frequencies (k,), rad/s, ascending, and mass-normalised modes (n, k), rigid motions left out.
+
+    held: indices of the displacements that are 0.
+    """
+    free = np.setdiff1d(np.arange(len(linear.mass)), held)
+    if not free.size:
+        return np.zeros(0), np.zeros((len(linear.mass), 0))
+    mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness))
+    shift = MODES.shift * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
+    # eigenvalues 1 / (omega^2 + shift), largest first: a mass matrix may be singular, a stiffness as well
+    values, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
+    values, vectors = values[::-1], vectors[:, ::-1]
+    with np.errstate(divide="ignore"):
+        square = 1.0 / np.maximum(values, 0.0) - shift
+    elastic = (square > MODES.rigid * shift) & (values > 1e-12 * values[0])
+    shapes = np.zeros((len(linear.mass), int(elastic.sum())), vectors.dtype)
+    shapes[free] = vectors[:, elastic] / np.sqrt(values[elastic])
+    return np.sqrt(square[elastic]), cast("Matrix", shapes)
+
+
+def linear_mode(model: ReducedModel, number: int, closed: BoolArray, friction: FloatArray) -> LinearMode | None:
+    """A mode of the joint with its closed pairs held; None where the structure has fewer modes.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    number : int
+        Number of the mode, from 1 on in ascending frequency.
+    closed : array (n_contact,)
+        Pairs that are held in the normal direction.
+    friction : array (n_contact,)
+        Friction coefficients: closed pairs with a positive one are held in the tangential directions as well.
+    """
+    linear, _ = model.harmonic_structure(1)
+    dofs = model.contact.dofs
+    held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
+    omegas, shapes = natural_frequencies(linear, held[held >= 0])
+    if len(omegas) < number:
+        return None
+    omega, shape = float(omegas[number - 1]), shapes[:, number - 1]
+    largest = shape[np.argmax(np.abs(shape))]
+    shape = cast("Matrix", shape * (np.conj(largest) / np.abs(largest)))
+    return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))
+
+
+@dataclass(frozen=True)
+class ModalModel(ReducedModel):
+    """A model in which harmonic 1 has a spring on its modal coordinate. The excitation amplitude is the drive Q.
+
+    first: linear model of harmonic 1.
+    """
+
+    first: LinearModel = field(kw_only=True)
+
+    def harmonic_structure(self, harmonic: int) -> tuple[LinearModel, bool]:
+        """As in ReducedModel."""
+        linear, folded = super().harmonic_structure(harmonic)
+        return (self.first, folded) if harmonic == 1 else (linear, folded)
+
+
+def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> ModalModel:
+    """The model with a spring on a modal coordinate, and with the damping `C - damping_rate M`.
+
+    damping_rate: `2 zeta omega`, rad/s.
+    """
+    first, _ = model.harmonic_structure(1)
+    force = mode.omega**2 * (first.mass @ mode.shape)
+
+    def damped(linear: LinearModel) -> LinearModel:
+        return replace(linear, damping=linear.damping - damping_rate * linear.mass)
+
+    sprung = replace(
+        damped(first),
+        stiffness=first.stiffness + np.outer(force, force.conj()) / mode.omega**2,
+        load_harmonic=force.astype(complex),
+    )
+    linear = {k: damped(each) for k, each in model.linear.items()}
+    kept = {name: getattr(model, name) for name in ("contact", "response_names", "n_sectors", "nodal_diameter")}
+    return ModalModel(linear=linear, **kept, first=sprung)
+
+
+@dataclass(frozen=True)
+class FirstHarmonic:
+    """All displacements of harmonic 1 as a function of the relative ones: `x_1 = motion u_1 + offset`.
+
+    - motion (n, n_rel), offset (n,): dimensionless, and m.
+    - mass (n, n): of harmonic 1.
+    - projection (n,): `q = projection . x_1` is the modal coordinate, m sqrt(kg).
+    """
+
+    motion: Matrix
+    offset: Matrix
+    mass: Matrix
+    projection: Matrix
+
+    def shape(self, relative: ComplexArray) -> ComplexArray:
+        """x_1 (n,), m, from u_1 (n_rel,), m."""
+        return self.motion @ relative + self.offset
+
+    def coordinate(self, shape: ComplexArray) -> complex:
+        """The modal coordinate q of x_1, m sqrt(kg)."""
+        return complex(self.projection @ shape)
+
+    def amplitude(self, shape: ComplexArray) -> float:
+        """The modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg)."""
+        return float(np.sqrt(max(np.real(np.vdot(shape, self.mass @ shape)), 0.0)))
+
+
+def first_harmonic(model: ReducedModel, mode: LinearMode, omega: float, drive: float) -> FirstHarmonic:
+    """The displacements of harmonic 1 of a modal model at a frequency, rad/s, and a drive, m sqrt(kg)."""
+    relative, _ = relative_indices(model.contact)
+    linear, folded = model.harmonic_structure(1)
+    mass, damping, stiffness, load, shape = (
+        part.conj() if folded else part
+        for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, mode.shape)
+    )
+    found = condense(stiffness + 1j * omega * damping - omega**2 * mass, relative, drive * load)
+    return FirstHarmonic(found.motion, found.held_motion, mass, shape.conj() @ mass)

@@ -1,0 +1,157 @@
+"""Nonlinear modes of a joint: natural frequency and damping over the amplitude, from a model in Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.accuracy.options import ACCURACY
+from solver.contact.coulomb import SEPARATED, SLIP
+from solver.forced_response import check_friction, check_numbers, check_settings, check_word, worn_model
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.modes.mode_point import ModePoint
+from solver.modes.points import Direction, follow_mode
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.structure.fourier import to_complex
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """A nonlinear mode at `n_amplitude` amplitudes.
+
+    - amplitude (n_amplitude,): modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg), as given; x_1: first harmonic of all
+      displacements.
+    - frequency (n_amplitude,): natural frequency, Hz.
+    - damping_ratio (n_amplitude,): zeta, dimensionless; positive where the vibration decays.
+    - frequency_error, damping_error (n_amplitude,): estimated absolute errors, Hz and dimensionless; inf where unknown.
+    - response (n_amplitude, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)). The phase
+      is such that the vibration is in phase with the linear mode.
+    - shape (n_amplitude, n): complex x_1, m. Divided by the amplitude, the mass-normalised shape of the mode.
+    - slip_fraction, open_fraction (n_amplitude, n_contact): fraction of the period in which a pair slips, or is open.
+    - harmonics_used, samples_used (n_amplitude,): highest harmonic and samples; 0 where there is no state.
+    - outcome: how the computation of each point ended.
+    - message: details of each outcome.
+
+    Values are NaN where no state was found.
+    """
+
+    amplitude: FloatArray
+    frequency: FloatArray
+    damping_ratio: FloatArray
+    frequency_error: FloatArray
+    damping_error: FloatArray
+    response: ComplexArray
+    shape: ComplexArray
+    slip_fraction: FloatArray
+    open_fraction: FloatArray
+    harmonics_used: IntArray
+    samples_used: IntArray
+    outcome: tuple[Outcome, ...]
+    message: tuple[str, ...]
+
+
+def backbone(
+    model: ReducedModel,
+    amplitude: ArrayLike,
+    friction_coefficient: ArrayLike | None,
+    *,
+    mode: int = 1,
+    direction: Direction = "up",
+    settings: SolverSettings | None = None,
+    wear_depth: ArrayLike | None = None,
+) -> Backbone:
+    """Natural frequency and damping ratio of a joint over the amplitude: the backbone curve of a nonlinear mode.
+
+    Extended periodic motion concept, Krack, Computers and Structures 154 (2015) 59-71: periodic motion of
+    `M x'' + (C - 2 zeta omega M) x' + K x + (contact forces) = f_0` without excitation. f_0 is the static load.
+
+    Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
+
+    Parameters
+    ----------
+    model
+        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
+    amplitude
+        (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude `sqrt(x_1^H M x_1)`, with the first
+        harmonic x_1 of all displacements. The mode at an amplitude does not depend on the other amplitudes.
+    friction_coefficient
+        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
+    mode
+        Number of the linear mode, from 1 on in ascending frequency, from which the nonlinear one begins: closed pairs
+        stick. Of a joint that has fewer such modes, as a mass on a rigid slider: closed pairs slide.
+    direction
+        Loading history: the amplitude is raised from zero ("up"), or raised to at least twice the amplitude of the
+        point and then lowered ("down"). A joint whose mode exists only while it slides has "down" alone.
+    settings
+        The defaults of `SolverSettings` if not given.
+    wear_depth
+        (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range; the model lacks nodal diameters that the harmonics need; friction coefficients
+        are given twice, not at all, or not to each pair.
+    """
+    settings = SolverSettings() if settings is None else settings
+    wanted = check_numbers("amplitude", amplitude, above=0.0)
+    friction = check_friction(model, friction_coefficient)
+    check_word("direction", direction, get_args(Direction))
+    check_settings(model, settings)
+    if isinstance(mode, bool) or int(mode) != mode or mode < 1:
+        raise ValueError(f"mode: give a whole number from 1 on instead of {mode!r}")
+    worn = worn_model(model, wear_depth)
+    ascending, place = np.unique(wanted, return_inverse=True)
+    found = dict(follow_mode(worn, friction, ascending, int(mode), direction, settings))
+    points = [found[index] for index in place.tolist()]
+    columns = [_reported(model, point) for point in points]
+    gathered = {name: np.array([each[name] for each in columns]) for name in columns[0]}
+    return Backbone(
+        amplitude=wanted,
+        outcome=tuple(point.outcome for point in points),
+        message=tuple(point.message for point in points),
+        **gathered,
+    )
+
+
+def _slips(at: Evaluation) -> BoolArray:
+    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
+    moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
+    least = ACCURACY.round_off_change * np.abs(at.state_t).max(axis=(1, 2))
+    return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))
+
+
+def _reported(model: ReducedModel, point: ModePoint) -> dict[str, ComplexArray | FloatArray | float | int]:
+    """Values of a point by the names of `Backbone`."""
+    state, problem, n_contact = point.state, point.problem, model.contact.n_contact
+    if state is None or problem is None or point.errors is None:
+        linear = model.linear[0]
+        nothing = np.full(n_contact, np.nan)
+        return {
+            **dict.fromkeys(("frequency", "damping_ratio", "frequency_error", "damping_error"), np.nan),
+            "response": np.full(len(linear.response), np.nan, complex),
+            "shape": np.full(len(linear.mass), np.nan, complex),
+            "slip_fraction": nothing,
+            "open_fraction": nothing,
+            "harmonics_used": 0,
+            "samples_used": 0,
+        }
+    joint, at = problem.joint_of(state), state.point.evaluation
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    return {
+        "frequency": state.omega / (2.0 * np.pi),
+        "damping_ratio": state.damping_ratio,
+        "frequency_error": float(point.errors[0]) / (2.0 * np.pi),
+        "damping_error": float(point.errors[1]),
+        "response": response,
+        "shape": state.shape,
+        "slip_fraction": _slips(at).mean(axis=1),
+        "open_fraction": (at.status_t == SEPARATED).mean(axis=1),
+        "harmonics_used": problem.case.resolution.highest,
+        "samples_used": problem.case.resolution.samples,
+    }

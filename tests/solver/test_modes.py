@@ -1,0 +1,299 @@
+"""Nonlinear modes against closed forms, the linear limits, energy, and forced responses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver import Backbone, Outcome, ReducedModel, SolverSettings, backbone, build_model, frequency_response
+from solver.contact.alternating_frequency_time import friction_work
+from solver.modes.mode_balance import ModeProblem, ModeState
+from solver.modes.points import follow_mode
+from solver.structure.condensation import condense, relative_indices
+from solver.structure.fourier import to_complex
+from tests.solver.models import cyclic_model, dovetail, scene
+
+MASS, STIFFNESS, LIMIT = 0.1, 1.6e5, 5.0  # kg, N/m, N
+SIZE = LIMIT / STIFFNESS  # m
+NATURAL = float(np.sqrt(STIFFNESS / MASS))  # rad/s
+# peak amplitude and first harmonic of a mass on a rigid slider, both over the friction limit over the stiffness
+PEAKS = np.array([1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0])
+FIRST = np.array([1.23322403, 1.51974485, 2.01257092, 3.00760511, 5.00436220, 10.00214181, 30.00071016])
+DAMPING = np.log((PEAKS + 1.0) / (PEAKS - 1.0)) / np.pi
+
+
+def slider(damping: float = 0.0) -> ReducedModel:
+    """A mass on a rigid slider. damping: N s/m."""
+    contact = [[-1, 0, -1]]
+    return build_model(
+        [[MASS]], [[damping]], [[STIFFNESS]], contact, 1e-4, load_harmonic=[1.0], normal_load=2.0 * LIMIT
+    )
+
+
+def foot(loss: float = 1e-5, mass: float = 1e-3) -> ReducedModel:
+    """A pressed foot, kg, with a tip on a spring above it; damping: `loss` times stiffness."""
+    stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e6, -2e6], [0.0, -2e6, 2e6]])
+    return build_model(
+        np.diag([mass, mass, 0.2]),
+        loss * stiffness,
+        stiffness,
+        [[0, 1, -1]],
+        1e-4,
+        load_static=[50.0, 0.0, 0.0],
+        load_harmonic=[0.0, 0.0, 1.0],
+        response=[2],
+    )
+
+
+FOOT_AMPLITUDES = np.array([1e-8, 8e-6, 2e-5, 1e-4, 3e-3])
+
+
+@lru_cache
+def slider_modes() -> Backbone:
+    settings = SolverSettings(rtol=1e-3)
+    return backbone(slider(), FIRST * SIZE * np.sqrt(MASS), 0.5, direction="down", settings=settings)
+
+
+@lru_cache
+def foot_modes(direction: str = "up") -> Backbone:
+    return backbone(foot(), FOOT_AMPLITUDES, 0.5, direction=direction)  # type: ignore[arg-type]
+
+
+def test_a_mass_on_a_rigid_slider_has_the_closed_form() -> None:
+    found = slider_modes()
+    assert set(found.outcome) == {Outcome.CONVERGED}
+    exact = NATURAL / np.sqrt(1.0 + DAMPING**2) / (2.0 * np.pi)
+    np.testing.assert_allclose(found.damping_ratio, DAMPING, rtol=1e-3)
+    np.testing.assert_allclose(found.frequency, exact, rtol=1e-3)
+    np.testing.assert_allclose(abs(found.response[:, 0]), FIRST * SIZE, rtol=1e-6)
+    assert (found.damping_error >= 0.5 * abs(found.damping_ratio - DAMPING)).all()
+    assert (found.frequency_error >= 0.5 * abs(found.frequency - exact)).all()
+
+
+def test_below_the_friction_limit_the_slider_has_no_mode() -> None:
+    found = backbone(slider(), [0.5 * SIZE * np.sqrt(MASS)], 0.5, direction="down")
+    assert found.outcome[0] is Outcome.BRANCH_LOST
+    assert np.isnan(found.frequency).all()
+    assert found.message[0]
+
+
+def test_negative_damping_gives_the_limit_cycle_of_the_closed_form() -> None:
+    """Where the mass grows by as much as friction takes: zeta is zero."""
+    grows = 0.1
+    exponent = np.pi * grows / np.sqrt(1.0 - grows**2)
+    peak = 1.0 / np.tanh(0.5 * exponent)
+    # first harmonic of one half period from -peak to +peak about the centre -1 (friction against the motion)
+    phase = np.linspace(0.0, np.pi, 200_001)
+    moved = (peak - 1.0) * np.exp(grows / np.sqrt(1.0 - grows**2) * phase)
+    # zero velocity at the begin: the sine part belongs to the damped motion
+    rate = grows / np.sqrt(1.0 - grows**2)
+    moved = -moved * (np.cos(phase) - rate * np.sin(phase)) - 1.0
+    first = 2.0 / np.pi * abs(np.trapezoid(moved * np.exp(-1j * phase), phase))
+    model = slider(-2.0 * grows * NATURAL * MASS)
+    found = backbone(model, [first * SIZE * np.sqrt(MASS)], 0.5, direction="down", settings=SolverSettings(rtol=1e-3))
+    assert abs(found.damping_ratio[0]) < 1e-3 * grows
+    assert found.frequency[0] == pytest.approx(NATURAL * np.sqrt(1.0 - grows**2) / (2.0 * np.pi), rel=1e-3)
+
+
+def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping() -> None:
+    found, model = foot_modes(), foot().linear[0]
+    glued = np.sqrt(2e6 / 0.2)
+    assert found.frequency[0] == pytest.approx(glued / (2.0 * np.pi), rel=1e-9)
+    assert found.damping_ratio[0] == pytest.approx(0.5e-5 * glued, rel=1e-9)
+    assert found.slip_fraction[0, 0] == 0.0
+    sliding = np.sqrt(np.linalg.eigvals(np.linalg.solve(model.mass[1:, 1:], model.stiffness[1:, 1:])).min())
+    assert found.frequency[-1] == pytest.approx(sliding / (2.0 * np.pi), rel=1e-3)
+    assert found.slip_fraction[-1, 0] == pytest.approx(1.0)
+    # friction adds its work: 4 mu N times the amplitude of the foot in a period
+    omega, foot_motion = 2.0 * np.pi * found.frequency[-1], abs(found.shape[-1, 1])
+    friction = 4.0 * 25.0 * foot_motion / (2.0 * np.pi * (omega * FOOT_AMPLITUDES[-1]) ** 2)
+    assert found.damping_ratio[-1] == pytest.approx(0.5e-5 * sliding + friction, rel=1e-3)
+    assert found.damping_ratio[2] > 3.0 * found.damping_ratio[0]
+
+
+def test_a_joint_without_damping_and_slip_has_none() -> None:
+    found = backbone(foot(0.0), [1e-6], 0.5)
+    assert found.outcome == (Outcome.CONVERGED,)
+    assert abs(found.damping_ratio[0]) < 1e-12
+
+
+def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it() -> None:
+    found, mass = foot_modes(), foot().linear[0].mass
+    modal = np.sqrt(np.einsum("ai,ij,aj->a", found.shape.conj(), mass, found.shape).real)
+    np.testing.assert_allclose(modal, FOOT_AMPLITUDES, rtol=1e-6)
+    np.testing.assert_allclose(found.response[:, 0], found.shape[:, 2], rtol=1e-6)
+
+
+def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs() -> None:
+    """Without damping the mode is the free motion: a spring of 1 N/m, and from the gap on one of 100 N/m beside it."""
+    gap, stiff = 0.1, 101.0
+    speed = np.array([0.15, 0.2])  # m/s at the wall
+    free, centre = np.hypot(gap, speed), 100.0 * gap / stiff
+    pressed = np.hypot(gap - centre, speed / np.sqrt(stiff))
+    half_open = np.pi - np.arccos(gap / free)
+    half_closed = np.arccos((gap - centre) / pressed) / np.sqrt(stiff)
+    half = half_open + half_closed
+    # from the deepest point in the wall to the farthest one from the wall
+    time = np.linspace(0.0, half, 200_001)
+    inside = centre + pressed * np.cos(np.sqrt(stiff) * time)
+    outside = -free * np.cos(half - time)
+    moved = np.where(time < half_closed, inside, outside)
+    omega = np.pi / half
+    first = 2.0 / half * np.trapezoid(moved * np.cos(omega * time), time, axis=0)
+    found = backbone(scene("vibro_impact", damping=0.0), first, 0.0)
+    np.testing.assert_allclose(2.0 * np.pi * found.frequency, omega, rtol=1e-2)
+    assert (abs(2.0 * np.pi * found.frequency - omega) <= 2.0 * 2.0 * np.pi * found.frequency_error).all()
+    assert (abs(found.damping_ratio) < 1e-9).all()
+    np.testing.assert_allclose(1.0 - found.open_fraction[:, 0], half_closed / half, atol=0.03)
+
+
+def energies(problem: ModeProblem, state: ModeState) -> tuple[float, float]:
+    """Energy fed in by the negative damping, and dissipated by damping and contact, J in a period."""
+    model, omega, at = problem.model, state.omega, state.point.evaluation
+    joint = problem.joint_of(state)
+    relative, _ = relative_indices(model.contact)
+    moved = to_complex(joint.to_relative(at.displacement_h))
+    force = to_complex(joint.to_relative(at.force_h))
+    fed, taken = 0.0, 0.0
+    for place, order in enumerate(joint.basis.orders):
+        linear, folded = model.harmonic_structure(order)
+        mass, drag, elastic = (
+            np.conj(part) if folded else part for part in (linear.mass, linear.damping, linear.stiffness)
+        )
+        rate = order * omega
+        left = drag - 2.0 * state.damping_ratio * omega * mass
+        full = elastic + 1j * rate * left - rate**2 * mass
+        free = condense(full, relative, np.zeros(len(mass), complex)).motion @ moved[:, place]
+        x = state.shape if order == 1 else free
+        fed += np.pi * order * rate * 2.0 * state.damping_ratio * omega * float(np.vdot(x, mass @ x).real)
+        taken += np.pi * order * rate * float(np.vdot(x, drag @ x).real)
+        taken += np.pi * order * float(np.imag(np.vdot(moved[:, place], force[:, place])))
+    # the slip of the samples takes what the series of the balance does
+    friction = float(friction_work(joint, at).sum())
+    contact = float(np.pi * (np.imag(moved.conj() * force) * np.array(joint.basis.orders)).sum())
+    assert friction == pytest.approx(contact, rel=1e-2, abs=1e-9 * taken)
+    return fed, taken
+
+
+@pytest.mark.parametrize("joint", ["foot", "slider", "travelling wave"])
+def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint: str) -> None:
+    if joint == "foot":
+        model, amplitudes, way, friction = foot(), FOOT_AMPLITUDES, "up", 0.5
+    elif joint == "slider":
+        model, amplitudes, way, friction = slider(0.3), SIZE * np.sqrt(MASS) * np.array([1.3, 4.0]), "down", 0.5
+    else:
+        model, amplitudes, way, friction = cyclic_model(3, ("3d", "3d"), 7, 2), np.array([1e-4, 1e-3]), "up", 0.4
+    settings = SolverSettings(harmonics=3) if joint == "travelling wave" else SolverSettings()
+    found = dict(follow_mode(model, friction, amplitudes, 1, way, settings))  # type: ignore[arg-type]
+    seen = 0
+    for point in found.values():
+        if point.problem is not None and point.state is not None:
+            fed, taken = energies(point.problem, point.state)
+            assert fed == pytest.approx(taken, rel=1e-6)
+            seen += 1
+    assert seen == len(amplitudes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_a_point_does_not_depend_on_the_others(direction: str) -> None:
+    together = foot_modes(direction)
+    for index in (1, 3):
+        alone = backbone(foot(), FOOT_AMPLITUDES[index], 0.5, direction=direction)  # type: ignore[arg-type]
+        for name in ("frequency", "damping_ratio", "frequency_error", "damping_error", "response", "shape"):
+            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[index])
+
+
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(7, 2), (7, 5)])
+def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(n_sectors: int, nodal_diameter: int) -> None:
+    model = cyclic_model(3, ("3d", "3d"), n_sectors, nodal_diameter)
+    linear = model.linear[2]
+    free = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
+    mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness))
+    omega = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real.min()))
+    found = backbone(model, [1e-7], 0.4, settings=SolverSettings(harmonics=3))
+    assert found.frequency[0] == pytest.approx(omega / (2.0 * np.pi), rel=1e-9)
+    # damping is proportional to stiffness
+    assert found.damping_ratio[0] == pytest.approx(0.5 * 5e-5 * omega, rel=1e-9)
+
+
+def test_wear_opens_the_joint_as_a_gap_does() -> None:
+    model = foot()
+    depth = 2e-6  # m; 20 of the 50 N are left
+    worn = backbone(model, FOOT_AMPLITUDES[2], 0.5, wear_depth=[depth])
+    with_gap = replace(model, contact=replace(model.contact, gap=np.array([depth])))
+    as_gap = backbone(with_gap, FOOT_AMPLITUDES[2], 0.5)
+    np.testing.assert_array_equal(worn.damping_ratio, as_gap.damping_ratio)
+    # the mode depends on the amplitude over the normal force alone
+    less = backbone(model, FOOT_AMPLITUDES[2] * 50.0 / 30.0, 0.5)
+    assert worn.damping_ratio[0] == pytest.approx(less.damping_ratio[0], rel=1e-2)
+    assert worn.frequency[0] == pytest.approx(less.frequency[0], rel=1e-3)
+
+
+def test_what_has_no_mode_says_so() -> None:
+    found = backbone(foot(), [1e-6], 0.5, mode=4)
+    assert found.outcome == (Outcome.START_FAILED,)
+    assert "fewer linear modes" in found.message[0]
+    found = backbone(slider(), [1e-3], 0.5)
+    assert found.outcome == (Outcome.START_FAILED,)
+    assert 'direction = "down"' in found.message[0]
+
+
+@pytest.mark.slow
+def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points() -> None:
+    """A heavy foot whose own vibration the harmonics meet stops several times in a period."""
+    found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5)
+    assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
+    assert np.isnan(found.frequency[0])
+    assert 350.0 < found.frequency[1] < 450.0
+    assert "the mode is followed up to the amplitude" in found.message[0]
+
+
+def test_wrong_arguments_are_named() -> None:
+    for wrong, said in (
+        ({"amplitude": 0.0}, "amplitude: give values above 0"),
+        ({"direction": "left"}, "direction: give one of up, down"),
+        ({"mode": 0}, "mode: give a whole number"),
+        ({"wear_depth": [1e-6, 1e-6]}, "wear_depth: give 1 depths"),
+        ({"wear_depth": -1e-6}, "wear_depth: give values of at least 0"),
+        ({"settings": SolverSettings(harmonics=5, samples=8)}, "settings.samples"),
+    ):
+        given = {"amplitude": 1e-6, **wrong}
+        amplitude = given.pop("amplitude")
+        with pytest.raises(ValueError, match=said):
+            backbone(foot(), amplitude, 0.5, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees() -> None:
+    model = dovetail(21)
+    amplitudes = np.array([1e-6, 7e-4, 1e-3])
+    found = backbone(model, amplitudes, 0.5)
+    assert set(found.outcome) == {Outcome.CONVERGED}
+    assert found.frequency[0] == pytest.approx(212.856, abs=1e-3)
+    assert (np.diff(found.frequency) < 0.0).all()
+    assert (np.diff(found.damping_ratio) > 0.0).all()
+    # at phase resonance the excitation feeds in what the mode dissipates: |phi^H F| = 2 zeta omega^2 a
+    at, linear = 1, model.linear[0]
+    omega = 2.0 * np.pi * found.frequency[at]
+    share = np.vdot(found.shape[at], linear.load_harmonic) / amplitudes[at]
+    force = 2.0 * found.damping_ratio[at] * omega**2 * amplitudes[at] / abs(share)
+    forced = frequency_response(model, found.frequency[at], force, 0.5)
+    # the response in quadrature with the modal force, within the errors of both and of single-mode theory
+    expected = -1j * share / abs(share) * found.response[at, 0]
+    assert abs(forced.response[0, 0] - expected) < 0.01 * abs(expected)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nodal_diameter", [3, 20])
+def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips(nodal_diameter: int) -> None:
+    model = dovetail(3, nodal_diameter)
+    found = backbone(model, [1e-6, 1e-3], 0.5, settings=SolverSettings(harmonics=3, samples=64))
+    assert found.frequency[0] == pytest.approx({3: 214.638, 20: 215.031}[nodal_diameter], abs=2e-3)
+    assert all(outcome.complete for outcome in found.outcome)
+    assert found.frequency[1] < found.frequency[0]
+    assert found.damping_ratio[1] > 2.0 * found.damping_ratio[0]
+    assert found.slip_fraction[1].max() > 0.1
