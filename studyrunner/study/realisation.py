@@ -128,7 +128,7 @@ def _numbers_of(study: Study) -> list[str]:
 
 
 def _own_value(study: Study, name: str) -> ArrayLike:
-    """The study's own value of an input; 0 where a scene or its contact pairs have one."""
+    """The study's own value of an input; 1, for any, where the contact pairs have their own."""
     if name in _OF_AXES:
         return np.array(getattr(study.axes, name))[:, None]
     value = study.wear.threshold if name == "threshold" else dict(study.scene.parameters).get(name)

@@ -9,12 +9,13 @@ from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
-from pydantic import BeforeValidator, Field, TypeAdapter
+from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
 
+from studyrunner.study.checked_table import check_table
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.values import NotNegative, Section, Text, read
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.user_error import UserError, Verbatim, WrongValueError
 
 AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
@@ -57,6 +58,14 @@ class Worn(Section):
     )
     result: Text = Field("", description="result file")
 
+    @model_validator(mode="after")
+    def _check_states(self) -> Worn:
+        if len(self.depth) != max(1, len(self.cycle)):
+            found = Verbatim(f"{len(self.depth)} states with {len(self.cycle)} cycle counts")
+            remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
+            raise WrongValueError(found, remedy, "scene.worn.depth")
+        return self
+
     def depths(self, n_contact: int) -> tuple[float, ...]:
         """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
         (depth,) = self.depth
@@ -81,7 +90,8 @@ def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
         remedy = 'give {result = "OUT.nc", cycle = [...]} with the axes of a point, or {depth = ...}'
         raise UserError(source, "scene.worn", table, remedy)
     if "depth" in table:
-        return dict(table)
+        given = check_table(Worn, table, source, "scene.worn")
+        return {"depth": [list(each) for each in given.depth], "cycle": list(given.cycle), "result": given.result}
     for key in ("result", "cycle"):
         if key not in table:
             raise UserError(source, f"scene.worn.{key}", None, "missing: give it, or depth in place of a result")
@@ -140,8 +150,8 @@ def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:
 
 def worn_axis(table: Mapping[str, Any]) -> tuple[SceneAxis, ...]:
     """The axis of worn states; none where their cycle counts are not known. table: as `read_worn` gives it."""
-    counts, depths = table.get("cycle", []), table.get("depth", [])
-    if not isinstance(counts, list) or not counts or not isinstance(depths, list) or len(depths) != len(counts):
+    counts = table.get("cycle", [])
+    if not counts:
         return ()
     meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(AXIS, "scene", ("worn",), tuple(map(float, counts)), "1", meaning),)
+    return (SceneAxis(AXIS, "scene", ("worn",), tuple(counts), "1", meaning),)

@@ -85,6 +85,11 @@ def test_depths_may_be_given(tmp_path: Path) -> None:
         ({"scheme": "explicit"}, "give one of ['adaptive']"),
         ({"result": "none.nc"}, "there is none of this name"),
         ({"depth": -1.0}, "scene.worn.depth = -1.0: give a finite number that is 0 or more"),
+        (
+            {"depth": [[1e-6], [2e-6], [3e-6]]},
+            "3 states with 2 cycle counts: give one cycle count",
+        ),
+        ({"depth": [[1e-6], [2e-6]], "cycle": ["a", 1]}, 'scene.worn.cycle = "a": give a finite number'),
         ({"result": 3}, "give the path of a result file, in quotes"),
     ],
 )
