@@ -145,7 +145,8 @@ class Study(Section):
         study_file = self.folder / Path(self.source).name
         scene = () if self.scene.path is None else (self.scene.path,)
         model = () if self.scene.files is None else self.scene.files.all
-        return (study_file, *scene, *model)
+        worn = () if self.scene.worn is None or not self.scene.worn.result else (self.folder / self.scene.worn.result,)
+        return (study_file, *scene, *model, *worn)
 
     @property
     def friction_coefficient(self) -> float | None:

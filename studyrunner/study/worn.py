@@ -105,8 +105,13 @@ def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
     except WrongValueError as error:
         raise UserError(source, "scene.worn.cycle", error.value, error.remedy) from None
     point = {key: value for key, value in table.items() if key not in _OWN_KEYS}
-    with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
-        depth = _depths_in(dataset, point, cycle, source)
+    try:
+        with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
+            depth = _depths_in(dataset, point, cycle, source)
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError, IndexError):
+        # what the libraries raise where a file is no result, or damaged
+        remedy = "give a result file of run-study that is whole"
+        raise UserError(str(path), "the file", Verbatim("damaged"), remedy) from None
     return {"depth": depth.tolist(), "cycle": list(cycle), "result": name}
 
 

@@ -103,3 +103,17 @@ def test_a_table_law_counts_depths_from_the_unworn_joint() -> None:
     law = {"law": "table", "pressure": [0.0], "depth": [0.0], "factor": [[1.0]]}
     with pytest.raises(UserError, match=r'wear.law = "table": give another law'):
         read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 1e-6}, "wear": law})
+
+
+def test_the_result_that_the_depths_are_from_is_not_replaced(whole: Path) -> None:
+    before = whole.read_bytes()
+    with pytest.raises(UserError, match=r"this one is read by the run"):
+        run_study("sdof_slider", whole, overrides=worn(whole), progress=False, overwrite=True)
+    assert whole.read_bytes() == before
+
+
+def test_a_file_that_is_no_whole_result_is_said(whole: Path, tmp_path: Path) -> None:
+    with xr.open_dataset(whole) as result:
+        result[["wear_depth"]].isel(cycle=0, contact=0).to_netcdf(tmp_path / "part.nc")
+    with pytest.raises(UserError, match=r"part\.nc: the file = damaged: give a result file"):
+        read_study("sdof_slider", worn(tmp_path / "part.nc"))
