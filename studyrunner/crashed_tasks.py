@@ -13,13 +13,15 @@ from studyrunner.mpi.crashes import MOST_DEATHS, Crash, count_crashes, forget_cr
 
 @contextlib.contextmanager
 def crash_notes(folder: Path) -> Iterator[None]:
-    """The folder of the notes on crashes, which goes with the run where it is empty."""
+    """The folder of the notes on crashes, which goes with the run where no task has crashed."""
     # a disk that is full is met by what is written next
     with contextlib.suppress(OSError):
         folder.mkdir(exist_ok=True)
     try:
         yield
     finally:
+        # A rank that is interrupted may end later than this one, or be ended before it removes its note.
+        count_crashes(folder)
         with contextlib.suppress(OSError):
             folder.rmdir()
 

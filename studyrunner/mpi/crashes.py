@@ -88,6 +88,10 @@ def note_tasks(evaluate: Evaluate, folder: Path, rank: int) -> Iterator[Evaluate
         with lock:
             file.close()
         path.unlink(missing_ok=True)
+        # Rank 0 may have ended already, and could not remove the folder then.
+        if rank:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
 
 
 def count_crashes(folder: Path, rank: int | None = None) -> tuple[Crash, ...]:
