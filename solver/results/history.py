@@ -73,48 +73,48 @@ class WearHistory:
 
     At output counts that were not reached, real values are NaN and whole numbers 0.
 
-    cycles (n_output,): cycle counts.
-    worn_volume (n_output,): m3.
-    wear_rate (n_output,): m3 per cycle.
-    wear_depth (n_output, n_contact): m.
-    mean_pressure (n_output, n_contact): Pa.
-    slip_range (n_output, n_contact): m.
-    open_fraction (n_output, n_contact): fraction of the period.
-    response (n_output, n_response): complex first harmonic, m.
-    response_peak (n_output, n_response): m.
-    last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
-    loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
-        `solver.results.loops.contact_loops`.
-    jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    cycles_to_target: count at which the target of the wear was reached, NaN if never or without a target. The history
-        ends with the step that reaches the target.
-    worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
-        harmonics, samples and start state; 0 where nothing has worn.
-    wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
-    error_estimate: `worn_volume_error` at the last count that was reached.
-    residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
-        certificate of the states, all relative; NaN where not estimated.
-    stable (n_output,): bool.
-    harmonics_used, samples_used (n_output,): int, 0 where there is no state.
-    run_time: CPU seconds of the computing thread, start state included.
-    branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
-    step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
-        there is no limit.
-    oscillates: whether the wear rate went up and down from step to step without decay, as in an unstable explicit
-        scheme.
-    final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
-        other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
-        final one is known.
-    cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries load
-        or has worn, NaN if never.
-    reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
-    inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
-        never.
-    inaccurate_in: name of the inaccurate result.
-    inaccurate_error: largest error from `inaccurate_from` on.
-    held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
-        reached; empty where there is nothing to add.
+    - cycles (n_output,): cycle counts.
+    - worn_volume (n_output,): m3.
+    - wear_rate (n_output,): m3 per cycle.
+    - wear_depth (n_output, n_contact): m.
+    - mean_pressure (n_output, n_contact): Pa.
+    - slip_range (n_output, n_contact): m.
+    - open_fraction (n_output, n_contact): fraction of the period.
+    - response (n_output, n_response): complex first harmonic, m.
+    - response_peak (n_output, n_response): m.
+    - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
+    - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
+      `solver.results.loops.contact_loops`.
+    - jump_cycle: first cycle count at which the branch was lost, NaN if never.
+    - cycles_to_target: count at which the target of the wear was reached, NaN if never or without a target. The history
+      ends with the step that reaches the target.
+    - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
+      harmonics, samples and start state; 0 where nothing has worn.
+    - wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
+    - error_estimate: `worn_volume_error` at the last count that was reached.
+    - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
+      certificate of the states, all relative; NaN where not estimated.
+    - stable (n_output,): bool.
+    - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
+    - run_time: CPU seconds of the computing thread, start state included.
+    - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
+    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
+      there is no limit.
+    - oscillates: whether the wear rate went up and down from step to step without decay, as in an unstable explicit
+      scheme.
+    - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
+      other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
+      final one is known.
+    - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries load
+      or has worn, NaN if never.
+    - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
+    - inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
+      never.
+    - inaccurate_in: name of the inaccurate result.
+    - inaccurate_error: largest error from `inaccurate_from` on.
+    - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
+    - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
+      reached; empty where there is nothing to add.
     """
 
     outcome: Outcome
