@@ -105,8 +105,8 @@ class WearHistory:
     - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
       other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
       final one is known.
-    - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries load
-      or has worn, NaN if never.
+    - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries
+      load or has worn, NaN if never.
     - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
     - inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
       never.

@@ -41,9 +41,9 @@ class Study(Section):
     - folder: folder of this file.
     - archived: attributes of a result file; None for a study file.
     - scene_axes: axes that are keys of [scene] or [wear].
-    - variants: for each combination of the values of `scene_axes`, the last of them fastest, the study with these values
-      in [scene] and [wear] and without these axes; none where there are no such axes. What [scene] and [wear] of this
-      study say of a key that is an axis is its first value.
+    - variants: for each combination of the values of `scene_axes`, the last of them fastest, the study with these
+      values in [scene] and [wear] and without these axes; none where there are no such axes. What [scene] and [wear] of
+      this study say of a key that is an axis is its first value.
     """
 
     study: StudySection
