@@ -196,7 +196,7 @@ def relax_to_periodic(
     left = CONTINUATION.transient_effort
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and not budget.exhausted:
+    while left > 0 and length >= CONTINUATION.shortest_fraction and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         result = solve_balance(balance, predicted, solver, tolerance, budget, most)
@@ -210,8 +210,6 @@ def relax_to_periodic(
             return Outcome.UNSTABLE, None
         if not result.converged or too_far or damped:
             length *= CONTINUATION.transient_cut
-            if length < CONTINUATION.shortest_fraction:
-                break
             continue
         motion, predicted = ahead, result.evaluation.predicted_h
         history = final_history(balance, result.evaluation)
