@@ -22,7 +22,7 @@ TUNABLE = {
     ),
     "LOADING": (
         "loading_history",
-        ("change_limits", "shortest_sweep_step", "first_iterations", "node_iterations", "sweep_iterations"),
+        ("change_limits", "shortest_sweep_step", "sweep_iterations"),
     ),
     "WEAR": (
         "wear",

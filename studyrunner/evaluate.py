@@ -105,7 +105,6 @@ def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartR
         task.settings,
         keep=keep,
         resume=task.resume,
-        tell=keep,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:

@@ -30,14 +30,13 @@ class AccuracyOptions:
     noticed_loss_factor: float = 1e-3
     """Loss factor too small to influence any structure."""
     round_off_vibration: float = 1e-6
-    """Fraction of the mean: a smaller vibration is round-off."""
+    """Fraction of the mean: a smaller vibration is round-off. Fraction of the largest force: a state with odd harmonics
+    only gets the even ones above."""
 
     # events in a period
     round_off_change: float = 1e-9
     """Relative change of the tangential state in a period, or relative size of the even harmonics of the force. Less
     is round-off (1e-12 and below in good states): the pair does not slip, or the state is symmetric."""
-    asymmetric_force: float = 1e-6
-    """Even harmonics of the force over its largest value: above, a state with odd harmonics only gets the even ones."""
 
     # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
@@ -67,22 +66,19 @@ class AccuracyOptions:
     """Unknowns of an expensive solve: above, no odd harmonics above 79, no homotopy, no 3 N + 2 samples to compare."""
     far_unknowns: int = 400
     """Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
-    compared_unknowns: int = 12000
-    """Most unknowns of a balance that is solved to estimate an error."""
     two_levels_safety: float = 1.5
-    """Error over the difference to the state two levels up: 2 to 1.2 where the error falls as 1/H to 1/H^3."""
+    """Error over the difference to the state two levels up, 2 to 1.2 where the error falls as 1/H to 1/H^3, and over
+    the difference to twice the samples, 2 to 1.3 for an error as the time step or its square."""
     one_level_safety: float = 2.5
     """Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
-    double_samples_safety: float = 1.5
-    """Error over the difference to twice the samples: 2 to 1.3 for an error as the time step or its square."""
     triple_samples_safety: float = 2.0
     """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
     small_slip_work: float = 1e-3
-    """Fraction of the work of the excitation: errors of a smaller slip work are relative to this fraction."""
-    no_slip_work: float = 1e-3
-    """Fraction of the small slip work: below, nothing wears."""
-    creep_fraction: float = 0.1
-    """Fraction of rtol: part of the slip work that may be creep."""
+    """Fraction of the work of the excitation: errors of a smaller slip work are relative to this fraction. Where the
+    slip work is below this fraction of this fraction, nothing wears."""
+    negligible: float = 0.1
+    """Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
+    contact need not be resolved."""
     small_peak: float = 0.01
     """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
     small_response: float = 1e-5
@@ -91,8 +87,6 @@ class AccuracyOptions:
     """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
     spare_fraction: float = 0.3
     """Fraction of the kept error: a state with a smaller error is tried with fewer harmonics and samples."""
-    faint_force: float = 0.1
-    """Fraction of rtol times the largest normal force: contacts with less force need not be resolved."""
 
     # refinement
     most_samples: int = 8192
@@ -105,9 +99,7 @@ class AccuracyOptions:
     """Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A
     joint of 48 pairs with nine harmonics may take 200."""
     most_unknowns: int = 8000
-    """Most unknowns of a balance in a history with "auto"."""
-    small_joint: int = 40
-    """Relative displacements up to which a joint is small."""
+    """Most unknowns of a balance in a history with "auto". States to compare with may have `compared_unknowns`."""
     few_pairs_unknowns: int = 2000
     """`most_unknowns` of a small joint: impacts couple all harmonics, and no preconditioner helps."""
     error_ratio: float = 3.0
@@ -125,6 +117,11 @@ class AccuracyOptions:
     error is the largest difference from this fraction of the count on (dovetail, 211.25 Hz, steps of 2000 cycles:
     without it the estimate at the crossing is a quarter of the true error). Later differences are not used: an error
     does not depend on the length of the study."""
+
+    @property
+    def compared_unknowns(self) -> int:
+        """Most unknowns of a balance that is solved to estimate an error."""
+        return 3 * self.most_unknowns // 2
 
     @property
     def violation_limits(self) -> dict[str, float]:

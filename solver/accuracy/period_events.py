@@ -24,7 +24,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
     """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
-    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ACCURACY.asymmetric_force)
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, ACCURACY.round_off_vibration)
 
 
 def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:

@@ -25,6 +25,7 @@ from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.converged import PathPoint
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
@@ -145,7 +146,7 @@ class _Search:
             return Refined(here.case, here.point, NOTHING, True)
         if self.settings.samples == "auto":
             return missed
-        missing = here.difference(missed).times(ACCURACY.double_samples_safety)
+        missing = here.difference(missed).times(ACCURACY.two_levels_safety)
         accurate = not self.settings.automatic or missing.largest <= self.settings.rtol
         return Refined(here.case, here.point, missing, accurate)
 
@@ -202,7 +203,7 @@ class _Search:
         room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
         if here.unknowns(resolution) * resolution.samples > room:
             return False
-        small = n_rel <= ACCURACY.small_joint
+        small = n_rel <= NEWTON.small_joint_displacements
         most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
             # more harmonics for friction without impacts only, whose harmonics are odd

@@ -107,7 +107,7 @@ class ResolvedState:
     def at_rest(self, budget: Budget) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         settings = self.case.settings
-        fraction = ACCURACY.creep_fraction * settings.rtol
+        fraction = ACCURACY.negligible * settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         rested = shake_down(self.joint, self.point, fraction, settings.tolerance, budget)
@@ -165,7 +165,7 @@ class ResolvedState:
         few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
         if finer is not None:
-            safety = ACCURACY.triple_samples_safety if few else ACCURACY.double_samples_safety
+            safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
             return self.difference(finer).times(safety), finer
         coarser = self.solve_at(Resolution(orders, samples // 2), budget) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
@@ -188,7 +188,7 @@ class ResolvedState:
         known: a state with more harmonics from an earlier comparison, used again where it has enough of them.
         """
         evaluation = self.point.evaluation
-        felt = ACCURACY.faint_force * self.case.settings.rtol
+        felt = ACCURACY.negligible * self.case.settings.rtol
         contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
         # a contact of one period of the highest harmonic is resolved well, one of half a period just resolved
         far, seeing = (levels_to_see(self.case.resolution, part * contact, 2) for part in (0.5, 1.0))
@@ -282,8 +282,8 @@ class ResolvedState:
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= ACCURACY.no_slip_work * work:
+        if max(its_slip, mine_slip) <= ACCURACY.small_slip_work * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, ACCURACY.no_slip_work * work)
+        slip = max(its_slip, ACCURACY.small_slip_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

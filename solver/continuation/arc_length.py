@@ -83,7 +83,7 @@ def follow_arc(
     direction[-1] = toward
     folds: list[float] = []
     turns: list[int] = []
-    length, left = CONTINUATION.first_arc, CONTINUATION.arc_correctors
+    length, left = CONTINUATION.longest_arc / 10.0, CONTINUATION.arc_correctors
     low = min(start.parameter, target) - CONTINUATION.farthest * abs(span)
     high = max(start.parameter, target) + CONTINUATION.farthest * abs(span)
     while left > 0 and not budget.exhausted:
@@ -92,13 +92,8 @@ def follow_arc(
         if tangent is None:
             break
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
-        reached = None
-        while reached is None and length > CONTINUATION.shortest_arc and left > 0:
-            reached = arc.step(point, tangent, length, tolerance, budget)
-            left -= 1
-            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
-        if reached is None:
-            reached = arc.step_over_corner(point, tangent, tolerance, budget)
+        reached, tried, length = arc.advance(point, tangent, length, left, tolerance, budget)
+        left -= tried
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
@@ -231,6 +226,22 @@ class _Arc:
             change = (ahead - tangent[:-1] @ held) / pivot
             unknown = unknown - np.append(held - change * moved, change)
         return _Corrected(False, unknown, CONTINUATION.near_iterations)
+
+    def advance(
+        self, point: PathPoint, tangent: FloatArray, length: float, most: int, tolerance: float, budget: Budget
+    ) -> tuple[PathPoint | None, int, float]:
+        """Next point of the branch, or None, the number of correctors, and the length of the next step.
+
+        The length is halved until the corrector converges, at most `most` times. Then a corner is tried.
+        """
+        reached, tried = None, 0
+        while reached is None and length > CONTINUATION.shortest_arc and tried < most:
+            reached = self.step(point, tangent, length, tolerance, budget)
+            tried += 1
+            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
+        if reached is None:
+            reached = self.step_over_corner(point, tangent, tolerance, budget)
+        return reached, tried, length
 
     def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget

@@ -126,31 +126,21 @@ def solve_first_state(
         unstable = unstable or not stable
         return stable
 
-    still = balance_at(0.0, static.history)
-    displacement_h, force_h = (
-        change_orders(part, (), case.resolution.orders)
-        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
-    )
-    start = still.predict(displacement_h, force_h)
-    result = solve_balance(still, start, solver, tolerance, budget)
-    if not result.converged:
+    start = _at_rest(case, quiet, static, wear_depth)
+    rest = _solved(balance_at(0.0, static.history), start, 0.0, solver, tolerance, budget)
+    if rest is None:
         return Outcome.START_FAILED, None
-    rest = PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
     point, arrived = follow_naturally(balance_at, rest, 1.0, solver, tolerance, budget)
     if arrived and accepted(point):
         return Outcome.CONVERGED, point
     whole = balance_at(1.0, static.history)
-    sliding = start + _free_motion(whole)
-    result = solve_balance(whole, sliding, solver, tolerance, budget)
-    if result.converged:
-        slid = PathPoint(1.0, result.evaluation, final_history(whole, result.evaluation))
-        if accepted(slid):
-            return Outcome.CONVERGED, slid
+    slid = _solved(whole, start + _free_motion(whole), 1.0, solver, tolerance, budget)
+    if slid is not None and accepted(slid):
+        return Outcome.CONVERGED, slid
     for fraction in CONTINUATION.relief:
         relieved = Balance.frozen(quiet, relieved_history(quiet, static, fraction), wear_depth)
-        result = solve_balance(relieved, start, solver, tolerance, budget)
-        if result.converged:
-            held = PathPoint(0.0, result.evaluation, final_history(relieved, result.evaluation))
+        held = _solved(relieved, start, 0.0, solver, tolerance, budget)
+        if held is not None:
             loaded, reached_load = follow_naturally(balance_at, held, 1.0, solver, tolerance, budget)
             if reached_load and accepted(loaded):
                 return Outcome.CONVERGED, loaded
@@ -167,6 +157,28 @@ def solve_first_state(
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None
+
+
+def _at_rest(case: Case, quiet: Joint, static: PathPoint, wear_depth: FloatArray) -> FloatArray:
+    """Predicted force (n_rel, 2H+1), N, of the static state with the harmonics of a case, none of which vibrates.
+
+    quiet: the joint without excitation, at the harmonics of the case.
+    """
+    displacement_h, force_h = (
+        change_orders(part, (), case.resolution.orders)
+        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
+    )
+    return Balance.frozen(quiet, static.history, wear_depth).predict(displacement_h, force_h)
+
+
+def _solved(
+    balance: Balance, start: FloatArray, load_factor: float, solver: JacobianSolver, tolerance: float, budget: Budget
+) -> PathPoint | None:
+    """State of a balance at a load factor by Newton's method; None where not converged."""
+    result = solve_balance(balance, start, solver, tolerance, budget)
+    if not result.converged:
+        return None
+    return PathPoint(load_factor, result.evaluation, final_history(balance, result.evaluation))
 
 
 def relieved_history(joint: Joint, static: PathPoint, fraction: float) -> FloatArray:

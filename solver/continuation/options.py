@@ -21,15 +21,12 @@ class ContinuationOptions:
     smooth_change: float = 0.2
     """Largest change over a smooth step of a branch. A step with a larger change is divided. A fold with a larger
     change is a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the
-    value leads to equal states."""
+    value leads to equal states. A relaxation in time seeks a periodic state below a tenth of this change."""
     shortest_fraction: float = 1.0 / 64.0
     """Shortest natural step over the range to the target; shortest relaxation step in periods; least friction of a
     homotopy over the moderate one. Where a shorter natural step is needed, the branch is assumed to fold."""
 
     # natural steps
-    linear_change: float = 1.0
-    """Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
-    resonance is a change of 2."""
     natural_failures: int = 25
     """Steps that may fail to converge; a branch with more corners is left to arc length. With half the number no static
     state of the dovetail is found at a friction coefficient of 1000."""
@@ -37,15 +34,13 @@ class ContinuationOptions:
     # arc length, in unknowns divided by the norm of the first predicted force
     arc_correctors: int = 300
     """Correctors of one continuation, converged or not."""
-    first_arc: float = 0.02
-    """Length of the first step. With ten times the length seven branches with folds take 1.5 % more iterations."""
     longest_arc: float = 0.2
-    """Largest length of a step."""
+    """Largest length of a step. The first step has a tenth; with the whole length seven branches with folds take 1.5 %
+    more iterations."""
     corner_arc: float = 1e-3
-    """Length of the step behind a corner, and least length after a step. Without such a least length the same branches
+    """Length of the step behind a corner, and least length after a step. Where no step of a tenth of this length
+    converges, the branch has a corner. Without such a least length the same branches
     take 46 % more iterations; with ten times the value 8 % more than with several lengths, with this value 5 %."""
-    shortest_arc: float = 1e-4
-    """Shortest length of a step. Where no such step converges, the branch has a corner."""
     arc_wander: float = 2.0
     """Distance of a corrector from its start over the length of the step, above which the corrector is given up.
     Without it the branch of `tests/solver/test_arc_length.py` is left for another one. Four times the length takes 1 %
@@ -80,17 +75,30 @@ class ContinuationOptions:
     """Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
     times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
     does not settle within the budget."""
-    relaxed_change: float = 0.02
-    """Change over a step below which a periodic state is sought."""
     runaway: float = 1e3
     """Mean relative displacement over the largest displacement of vibration and start; above it parts run away."""
 
-    # ratcheting and states after a fold
-    shakedown_steps: int = 30
-    """Largest number of shifts of the mean positions. Each shift removes at least two thirds of the ratcheting
-    (measured), in one to six iterations."""
+    # states after a fold
     fold_search_length: float = 0.01
     """Natural length of the frequency in the search behind a fold, over the frequency."""
+
+    @property
+    def linear_change(self) -> float:
+        """Largest change over a step between two states in which no pair slips or opens.
+
+        The reversal of phase at a linear resonance is a change of 2.
+        """
+        return 5.0 * self.smooth_change
+
+    @property
+    def relaxed_change(self) -> float:
+        """Change over a step of a relaxation in time below which a periodic state is sought."""
+        return self.smooth_change / 10.0
+
+    @property
+    def shortest_arc(self) -> float:
+        """Shortest length of an arc-length step."""
+        return self.corner_arc / 10.0
 
 
 CONTINUATION = ContinuationOptions()

@@ -15,8 +15,10 @@ for each D; for D -> infinity the equation is the balance. The friction law is p
 the history of the step before. The static harmonic has s = 1/D.
 
 A short step resolves the transient of the structure; a long step damps all decaying motions. Growing motions leave an
-unstable state as long as 1/D exceeds their rate. So D starts at one period, and the stability of the final state is
-tested.
+unstable state as long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D
+starts at one period, the stability of each periodic state is tested, and D is bounded by this rate once a state was
+unstable. A pair of a dovetail that begins to slip at both ends of its motion loses its hold of the mean position. The
+mean position then moves on to a stable state within some hundred periods, and the vibration changes by 2e-4.
 """
 
 from __future__ import annotations
@@ -178,7 +180,7 @@ def relax_to_periodic(
         - CONVERGED: the state is found and stable.
         - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
           state.
-        - UNSTABLE: the motion settles at an unstable periodic state.
+        - UNSTABLE: the motion is an unstable periodic state and does not leave this state.
         - UNSETTLED: the motion does not settle within `CONTINUATION.transient_effort` Newton iterations.
     point : PathPoint or None
         The state; its parameter is NaN. None where the outcome is not CONVERGED.
@@ -192,17 +194,22 @@ def relax_to_periodic(
     size = float(np.abs(start.displacement_h).max())
     tolerance, most = case.settings.tolerance, CONTINUATION.near_iterations
     left = CONTINUATION.transient_effort
-    while left > 0 and not budget.exhausted:
+    # whether an unstable state has been found, which the motion leaves
+    grows = False
+    while left > 0 and length >= CONTINUATION.shortest_fraction and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         result = solve_balance(balance, predicted, solver, tolerance, budget, most)
         left -= max(result.iterations, 1)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
-        if not result.converged or (change > 2.0 * CONTINUATION.smooth_change and length > 1.0):
+        too_far = change > 2.0 * CONTINUATION.smooth_change and length > 1.0
+        # a step over more than the time in which a motion grows would damp this motion
+        damped = grows and result.converged and not stays(balance, result.evaluation, solver, budget)
+        if damped and result.iterations == 0:
+            return Outcome.UNSTABLE, None
+        if not result.converged or too_far or damped:
             length *= CONTINUATION.transient_cut
-            if length < CONTINUATION.shortest_fraction:
-                break
             continue
         motion, predicted = ahead, result.evaluation.predicted_h
         history = final_history(balance, result.evaluation)
@@ -217,9 +224,7 @@ def relax_to_periodic(
             begun = budget.iterations
             found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, budget)
             left -= budget.iterations - begun
-            if found is not None and not stable and length >= CONTINUATION.longest_transient:
-                # the steps have their largest length and lead to an unstable state
-                return Outcome.UNSTABLE, None
+            grows = grows or (found is not None and not stable)
             if found is not None and stable:
                 distance = _change(transient.periodic(found.evaluation), motion)
                 if distance < CONTINUATION.smooth_change:

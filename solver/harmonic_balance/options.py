@@ -11,9 +11,6 @@ class BalanceOptions:
 
     peak_points: int = 1024
     """Points in a period at which the largest response is sought: a peak of harmonic 20 is found to 0.2 %."""
-    tail_orders: int = 3
-    """Last harmonic of the tail of a friction force, over the highest harmonic. Eight samples for each harmonic still
-    resolve this tail."""
 
 
 BALANCE = BalanceOptions()

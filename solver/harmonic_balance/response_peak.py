@@ -15,6 +15,7 @@ import numpy as np
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray
+from solver.settings import RESOLUTION
 from solver.structure.condensation import build_structure
 from solver.structure.fourier import build_basis, from_complex, to_complex
 from solver.structure.joint import Joint, step_mean_factor
@@ -39,7 +40,9 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
     if not orders or not joint.penalty.inertial.any():
         return ()
     stride = 2 if orders[-1] > 1 and all(order % 2 for order in orders) else 1
-    last = min(BALANCE.tail_orders * orders[-1], joint.basis.n_samples // 2 - orders[-1], BALANCE.peak_points // 4)
+    # three times the highest harmonic: what the usual samples of a harmonic still resolve
+    resolved = (RESOLUTION.samples_per_harmonic // 2 - 1) * orders[-1]
+    last = min(resolved, joint.basis.n_samples // 2 - orders[-1], BALANCE.peak_points // 4)
     return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
 
 

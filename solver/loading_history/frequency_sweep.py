@@ -219,7 +219,7 @@ class FrequencySweep:
     def _begin(self, nodes: NodeSweep, origin: Origin) -> None:
         """Find the first state of the sweep; no success where there is none, or where the structure is singular."""
         nodes.budget.limit = nodes.budget.iterations + LOADING.first_iterations
-        places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.first_load_factor]
+        places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.free_step]
         for place in places:
             if self._begin_at(nodes, place):
                 return

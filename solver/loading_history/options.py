@@ -22,13 +22,11 @@ class LoadingOptions:
     origin_candidates: int = 8
     """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen.
     They are 2 % apart and at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
-    first_load_factor: float = 1e-3
-    """Load factor at which a ramp begins."""
 
     # one step
     free_step: float = 1e-3
     """Fraction of the parameter: length of the steps with continuation through folds, or settling in time, where a
-    branch ends."""
+    branch ends. The load factor at which a ramp begins."""
     search_distance: float = 0.05
     """Fraction of the parameter: natural length of arc-length steps, and distance from the end of a sweep to the next
     attempt to begin it again."""
@@ -56,13 +54,9 @@ class LoadingOptions:
     node_residual: float = 1e-3
     """Scaled residual of a node, as a fraction of rtol. With a tenth and with ten times this value the motion of the
     dovetail is equal to 1e-4. With the tolerance of a result, nodes take 1.4 times the iterations."""
-    node_iterations: int = 2500
-    """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
-    first_iterations: int = 1000
-    """Most Newton iterations of all attempts to begin a sweep, or to begin it again. Tens to hundreds suffice where
-    some pairs stick; a joint that slips everywhere takes all of them in vain."""
     sweep_iterations: int = 8000
-    """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
+    """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300). Parts of the
+    sweep may take the shares `node_iterations` and `first_iterations`."""
     results_per_save: int = 10
     """Results of the journal (solves, determinants) after which a sweep is saved at the next node and its
     factorisation dropped, so that a resumed sweep is identical. The cost is one more factorisation in about four nodes.
@@ -74,6 +68,19 @@ class LoadingOptions:
     few_pairs: int = 12
     """Most pairs of a joint whose inaccurate state is sought again from the static state: with impacts there are many
     other states."""
+
+    @property
+    def node_iterations(self) -> int:
+        """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
+        return 5 * self.sweep_iterations // 16
+
+    @property
+    def first_iterations(self) -> int:
+        """Most Newton iterations of all attempts to begin a sweep, or to begin it again.
+
+        Tens to hundreds suffice where some pairs stick; a joint that slips everywhere takes all of them in vain.
+        """
+        return self.sweep_iterations // 8
 
 
 LOADING = LoadingOptions()

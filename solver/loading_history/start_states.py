@@ -30,9 +30,8 @@ def follow_branch(
     frequencies: FloatArray,
     sweep: Sweep,
     settings: SolverSettings,
-    keep: Callable[[Packed], None] | None = None,
+    keep: Callable[[Packed | str], None] | None = None,
     resume: Packed | None = None,
-    tell: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies: index and state, one by one.
 
@@ -56,12 +55,11 @@ def follow_branch(
     settings
         Harmonics, samples, tolerances, limit of time.
     keep
-        Called from time to time with the progress of the sweep, also on the way to a state.
+        Called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
+        position and the activity of the sweep, in words.
     resume
         Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
         frequencies not yet passed. The states are equal to the last bit, except `run_time`.
-    tell
-        Called with the position and the activity of the sweep, in words.
 
     Yields
     ------
@@ -70,7 +68,7 @@ def follow_branch(
     """
     order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
-    line.budget.tell = tell or line.budget.tell
+    line.budget.tell = keep or line.budget.tell
     if resume is not None:
         line.load_state(unpack(resume))
 

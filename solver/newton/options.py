@@ -27,18 +27,12 @@ class NewtonOptions:
     forcing: float = 1e-3
     """Relative residual of a Newton direction: an iteration gains up to three digits. With half and twice this value
     the states of the dovetail are equal to 1e-6."""
-    stagnation_products: int = 20
-    """A cycle ends unless its residual is halved over so many products. Without this end 23 cases (12 random scenes,
-    sliders, small joints) are equal; the end saves products where a joint slides as a whole."""
     null_space: float = 1e-5
     """Ratio to the largest singular value: smaller directions are left out of a solution that does not converge.
     Ratio to the largest pivot: a cycle with a smaller one is not recycled."""
     recycled_directions: int = 30
     """Directions kept from solve to solve with a factorisation. Products a solve for 48 pairs: 12.4 with 0, 9.0 with
     30, 8.3 with 60 in an equal time."""
-    sign_products: int = 16
-    """Products of Arnoldi's method between two computations of the eigenvalues. With four in place of 16, 23 cases (12
-    random scenes, sliders, small joints) take equal iterations."""
     settled: float = 0.1
     """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
     certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
@@ -62,8 +56,6 @@ class NewtonOptions:
     """Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
     otherwise, and for sliding masses, to which the march does not apply."""
 
-    # slip space
-
     # march through the period
     march_periods: int = 2
     """Periods of the march: slip removes the influence of the start."""
@@ -71,6 +63,22 @@ class NewtonOptions:
     """Fraction of the penalty: larger differences to the median stiffness of the harmonics are taken into account."""
     resonances: int = 6
     """Most such differences of a harmonic."""
+
+    @property
+    def sign_products(self) -> int:
+        """Products of Arnoldi's method between two computations of the eigenvalues.
+
+        With four in place of 16, 23 cases (12 random scenes, sliders, small joints) take equal iterations.
+        """
+        return self.products // 5
+
+    @property
+    def stagnation_products(self) -> int:
+        """A GMRES cycle ends unless its residual is halved over so many products.
+
+        Without this end the same cases are equal. The end saves products where a joint slides as a whole.
+        """
+        return self.products // 4
 
 
 NEWTON = NewtonOptions()

@@ -110,7 +110,7 @@ def find_instability(
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
         return None
     linear = joint.model.linear[0]
-    small = 4 * int(moving(joint, stuck).sum()) <= STABILITY.all_multipliers
+    small = int(moving(joint, stuck).sum()) <= NEWTON.small_joint_displacements
     if not (every or (small and _opens_and_closes(at))):
         return None
     if small:
@@ -195,9 +195,9 @@ def _samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], sma
     """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
     rates = [np.abs(growing_exponents(linear, moving(joint, pairs)).imag) for pairs in held]
     fastest = max((float(of.max(initial=0.0)) for of in rates), default=0.0) / joint.omega
-    least = STABILITY.small_samples if small else STABILITY.large_samples
+    least = STABILITY.small_samples if small else STABILITY.small_samples // 4
     wanted = 2 ** int(np.ceil(np.log2(max(STABILITY.samples_a_vibration * fastest, 1.0))))
-    return int(np.clip(wanted, least, STABILITY.most_marched_samples))
+    return int(np.clip(wanted, least, 8 * STABILITY.small_samples))
 
 
 def growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:

@@ -121,7 +121,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
-        return now > ACCURACY.asymmetric_force
+        return now > ACCURACY.round_off_vibration
     if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
     return now < WEAR.left_out_fallen * choice.left_out

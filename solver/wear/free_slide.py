@@ -41,7 +41,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues
-    free = np.abs(stiffness) < WEAR.free_stiffness * stiffness[-1]
+    free = np.abs(stiffness) < WEAR.round_off * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
     if np.count_nonzero(free) != 1 or closes > WEAR.free_closing:

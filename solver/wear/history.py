@@ -114,7 +114,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
         # other schemes are stable: only small corners of the wear rate alternate there
-        oscillates=asked.scheme == "explicit" and state.rates.oscillate(WEAR.oscillation_round_off * state.most_rate),
+        oscillates=asked.scheme == "explicit" and state.rates.oscillate(WEAR.round_off * state.most_rate),
         inaccurate_from=state.inaccurate_from,
         inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
         inaccurate_error=worst.largest,

@@ -31,13 +31,9 @@ class WearOptions:
     """Most Newton iterations of a step before it is shortened. Each step adds as many to the budget of a history."""
 
     # Euler steps
-    arnoldi_products: int = 16
-    """Linear solves for the limit of the explicit step."""
     largest_moved_load: float = 10.0
     """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of
     the worn volume is a sufficient warning (27 % with 0.6)."""
-    advised_moved_load: float = 0.1
-    """Change of the normal forces in a recommended step; a usual step of the dovetail root has 0.001 to 0.01."""
 
     # history
     history_iterations: int = 3000
@@ -58,8 +54,6 @@ class WearOptions:
     """Fraction of the largest wear rate of the joint: smaller increments are no oscillation."""
     calming: float = 0.98
     """Ratio of two successive increments below which an oscillation decays."""
-    oscillation_round_off: float = 1e-9
-    """Fraction of `WearState.most_rate`, the rate if all pairs slipped as far as they move: less is no oscillation."""
 
     # steady state
     steady_rate: float = 0.01
@@ -69,8 +63,6 @@ class WearOptions:
     """Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this
     pair. A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n
     pairs are about n times as soft."""
-    bears: float = 1e-9
-    """Fraction of the largest normal force: a pair with less does not bear the joint."""
     steps_to_the_end: int = 20_000
     """Most steps of a history without a steady state; a joint takes 2 to 10 steps a pair."""
     longest_march: float = 1e25
@@ -107,11 +99,14 @@ class WearOptions:
     """Most Newton iterations of the search for the state after a jump."""
 
     # joints that slide as a whole
-    free_stiffness: float = 1e-9
-    """Fraction of the largest eigenvalue of the static stiffness: a direction with less is free. Dovetail: 1e-15 for
-    the free direction, -1.6e-6 for the next one, by spin softening."""
     free_closing: float = 1e-6
     """Largest closing component of a free direction of norm 1, for sliding closes no pair."""
+
+    round_off: float = 1e-9
+    """Round-off as a fraction. Of the largest normal force: a pair with less does not bear the joint. Of
+    `WearState.most_rate`, the rate if all pairs slipped as far as they move: less is no oscillation. Of the largest
+    eigenvalue of the static stiffness: a direction with less is free (dovetail: 1e-15 for the free direction, -1.6e-6
+    for the next one, by spin softening)."""
 
     # output
     kept_steps: int = 800

@@ -27,6 +27,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.structure.joint import Joint
 from solver.wear.options import WEAR
 
@@ -36,8 +37,8 @@ def explicit_step_limit(
 ) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
-    The eigenvalues come from Arnoldi's method with `arnoldi_products` solves. A complex eigenvalue counts where its
-    real part is larger than its imaginary part.
+    The eigenvalues come from Arnoldi's method with at most `NEWTON.sign_products` solves. A complex eigenvalue counts
+    where its real part is larger than its imaginary part.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def explicit_step_limit(
     if not np.all(np.isfinite(start)) or not start.any():
         return float("inf")
     n_wearing = int(np.count_nonzero(rate))
-    values = ritz_values(product, start, min(WEAR.arnoldi_products, n_wearing))[0]
+    values = ritz_values(product, start, min(NEWTON.sign_products, n_wearing))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
     # a value below the round-off of the largest one is zero
     fastest = float(falling.max(initial=0.0))
@@ -135,7 +136,8 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
     fraction = moved_fraction(joint, before, wear_depth)
     if fraction <= WEAR.largest_moved_load:
         return None
-    advised = length * WEAR.advised_moved_load / fraction
+    # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
+    advised = length * WEAR.largest_moved_load / 100.0 / fraction
     return (
         f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
         f" normal forces of the joint: at most {advised:.2g} cycles at once would do"

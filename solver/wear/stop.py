@@ -69,7 +69,7 @@ class InSteadyState:
         """
         joint, at = work.at(state), state.point.evaluation
         normal = at.force_h[:, 0, 0]
-        pressed = normal > WEAR.bears * float(normal.max(initial=0.0))
+        pressed = normal > WEAR.round_off * float(normal.max(initial=0.0))
         if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
             return False
         course = output.taken.course

@@ -55,8 +55,10 @@ def in_short_runs(
     for n_runs in range(1, 1000):
         n_saves = 0
 
-        def keep(progress: Packed) -> None:
+        def keep(progress: Packed | str) -> None:
             nonlocal n_saves
+            if isinstance(progress, str):
+                return
             saved[:], n_saves = [progress], n_saves + 1
             if n_saves == 2:
                 raise KilledError

@@ -144,9 +144,12 @@ def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers() -> None:
     model, frequencies = scene("vibro_impact"), np.array([0.2, 0.255])
     kept: list[tuple[frozenset[int], Packed]] = []
     whole: dict[int, StartState] = {}
-    for index, start in follow_branch(
-        model, 0.0, 0.02, frequencies, "up", AUTO, keep=lambda progress: kept.append((frozenset(whole), progress))
-    ):
+
+    def keep(progress: Packed | str) -> None:
+        if not isinstance(progress, str):
+            kept.append((frozenset(whole), progress))
+
+    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", AUTO, keep=keep):
         whole[index] = start
     assert [whole[index].branch for index in (0, 1)] == [0, 1]
     for done, progress in (kept[0], kept[-1]):

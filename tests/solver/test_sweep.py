@@ -42,8 +42,9 @@ def followed() -> tuple[dict[float, StartState], dict[float, Packed]]:
     found: dict[float, StartState] = {}
     kept: dict[float, Packed] = {}
 
-    def note(progress: Packed) -> None:
-        kept[max(found, default=0.0)] = progress
+    def note(progress: Packed | str) -> None:
+        if not isinstance(progress, str):
+            kept[max(found, default=0.0)] = progress
 
     for index, start in follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTOMATIC, keep=note):
         found[float(frequencies[index])] = start

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from solver.continuation import transient
+from solver.continuation.arc_length import follow_arc
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
@@ -20,11 +21,13 @@ from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
+from solver.stability.hill import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, build_case
 from tests.references import coulomb_orbit, slider_orbit
 from tests.solver.models import converged_state, first_point, scene
 from tests.solver.reconstruction import full_motion
+from tests.solver.test_natural import WALL_OMEGA, wall
 
 FORCE = 0.02
 NATURAL = np.sqrt(1.6e6)
@@ -92,6 +95,30 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
     assert budget.iterations < 500
+
+
+@pytest.mark.parametrize("change", [1e-4, -1e-4])
+def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(change: float) -> None:
+    balance_at, first, size = wall(WALL_OMEGA)
+
+    def grows(point: PathPoint) -> bool:
+        return not is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), JacobianSolver())
+
+    # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
+    start, solver = first(0.03), JacobianSolver()
+    middle = follow_arc(balance_at, start, 0.03, 0.03, solver, 1e-9, Budget(), grows, 1.0).point
+    assert middle is not None
+    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
+    outcome, found = relax_to_periodic(
+        case, joint, np.zeros(1), middle.evaluation, before, middle.history, JacobianSolver(), Budget()
+    )
+    assert outcome is Outcome.CONVERGED
+    assert found is not None
+    landed = replace(found, parameter=0.03 * (1.0 + change))
+    assert not grows(landed)
+    # the two sides of the unstable state end at different stable states
+    assert (size(landed) > size(middle)) == (change < 0.0)
 
 
 @pytest.mark.slow
