@@ -213,7 +213,7 @@ def serve_study(
     with crash_notes(crashes):
         n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
-            if scenes.broadcast is not None:
+            if scenes.model is not None:
                 scenes.broadcast.send()
             job = Job(crashes)
             for rank in range(1, ranks.size):

@@ -46,8 +46,8 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Sa
         if first.ndim == 2:
             # around each value of an axis
             dimensions, values = (("sample",), first[0]) if len(first) == 1 else ((name, "sample"), first)
-        elif any(axis.key == (name,) for axis in study.scene_axes):
-            place = [axis.key for axis in study.scene_axes].index((name,))
+        elif any(axis.name == name for axis in study.scene_axes):
+            place = [axis.name for axis in study.scene_axes].index(name)
             every = np.array([each[name] for each in drawn]).reshape(*shape, -1)
             along = tuple(slice(None) if each == place else 0 for each in range(len(shape)))
             dimensions, values = (name, "sample"), every[along]
@@ -85,4 +85,7 @@ def _describe(study: Study, name: str) -> tuple[str, str]:
         return COORDINATES[name].units, COORDINATES[name].long_name
     if name in _OF_CONTACT:
         return _OF_CONTACT[name]
-    return describe_key(type(study.wear) if name == "threshold" else type(study.scene.parameters), name)
+    if name in study.wear.numbers:
+        # `surfaces_flat` is the factor of the surface "flat"
+        return describe_key(type(study.wear), *name.split("_", 1))
+    return describe_key(type(study.scene.parameters), name)
