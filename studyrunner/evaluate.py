@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error
-from solver.packed_model import unpack_model
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.history_result import build_result
+from studyrunner.mpi.shared_memory import Address, open_shared
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.machine_faults import (
@@ -57,6 +57,9 @@ class ModelCache(Generic[Model]):
         if len(self._models) > MODELS_A_RANK:
             self._models.popitem(last=False)
 
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._models)
+
     def __getitem__(self, number: int) -> Model:
         return self._models[number]
 
@@ -74,7 +77,7 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
         guard_kernel_cache()
         number = task.joint.scene
         if task.model is not None:
-            models.add(number, unpack_model(task.model))
+            models.add(number, _open_model(task.model))
         elif not models.use(number):
             raise RuntimeError(f"no model of scene {number} for {task}")
         of_task, own = replace(task, model=None), models[number]
@@ -87,6 +90,14 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
             yield from integrate(own, of_task, keep)
 
     return evaluate
+
+
+def _open_model(given: ReducedModel | Address) -> ReducedModel:
+    """The model that a task brings. Raises OSError where it is in shared memory that cannot be mapped."""
+    model = open_shared(given) if isinstance(given, Address) else given
+    if not isinstance(model, ReducedModel):
+        raise TypeError(f"{model!r} instead of a model")
+    return model
 
 
 def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartResult]:

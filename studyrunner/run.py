@@ -135,6 +135,8 @@ class _ResultWriter:
 
         completion.store.flush()
         target = self.target
+        facts = self.scenes.facts
+        drawn = sample_coordinates(self.study, facts, self.scenes.scenes)
         gathered = gather(
             self.study,
             self.facts,
@@ -145,7 +147,7 @@ class _ResultWriter:
             target.finished,
             {**self.software, **describe_date(self.date)},
             self.pairs,
-            (*worn_coordinate(self.study, self.scenes.facts), *sample_coordinates(self.study, self.scenes.facts)),
+            (*worn_coordinate(self.study, facts), *drawn),
         )
         for doubt in gathered.doubts:
             if doubt not in self.said:
@@ -213,7 +215,7 @@ def serve_study(
     with crash_notes(crashes):
         n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
-            if scenes.broadcast is not None:
+            if scenes.model is not None:
                 scenes.broadcast.send()
             job = Job(crashes)
             for rank in range(1, ranks.size):

@@ -1,26 +1,26 @@
 """The scenes of a run: built once, and handed to the ranks that compute with them.
 
 A single scene is built by rank 0, and each machine gets the model once. Several scenes are built by all ranks side by
-side, each scene once. Their models are kept in the file of the run; a task brings the model to a rank that does not
-have the model, so that a rank holds few models, whatever their number.
+side, each scene once. Their models are kept in the file of the run and go to the ranks with the tasks (`SceneModels`),
+so that a rank holds few models, whatever their number.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
-from studyrunner.evaluate import ModelCache
 from studyrunner.mpi.broadcast import Broadcast
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
 from studyrunner.mpi.version_check import Machine
 from studyrunner.plan.cost_model import CostKeys, CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.scene.computed import InMemory, keep_model, model_key
+from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
 from studyrunner.scene.scene import (
     KeptScene,
     SceneFacts,
@@ -33,6 +33,7 @@ from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
 from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
+from studyrunner.scene_models import SceneModels
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
@@ -87,7 +88,7 @@ class Scenes:
 
     scenes: which there are. facts: of each. variables: what the study asks of them.
     kept: the model that the result file keeps. notes: what the user should know.
-    broadcast: the model of the only scene; None where there are several.
+    broadcast: the model of the only scene, or `SeveralScenes`.
     store: file of the run, with the models of several scenes.
     """
 
@@ -96,28 +97,26 @@ class Scenes:
     variables: tuple[SceneVariable, ...]
     kept: KeptScene | None
     notes: tuple[str, ...]
-    broadcast: Broadcast[ReducedModel] | None
+    broadcast: Broadcast[ReducedModel | SeveralScenes]
     store: Store
-    _held: dict[int, ModelCache[None]] = field(default_factory=dict)
 
     @property
     def model(self) -> ReducedModel | None:
         """The model of the only scene; None where there are several."""
-        return None if self.broadcast is None else self.broadcast.value
+        handed = self.broadcast.value
+        return None if isinstance(handed, SeveralScenes) else handed
+
+    @cached_property
+    def _models(self) -> SceneModels:
+        return SceneModels(self._read_model, self.broadcast.sharing)
 
     def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
         """The task as a rank gets it: with the model where the rank does not have the model."""
-        if self.broadcast is not None:
-            return task
-        held, number = self._held.setdefault(rank, ModelCache()), task.joint.scene
-        if held.use(number):
-            return task
-        held.add(number, None)
+        return task if self.model is not None else self._models.with_model(rank, task)
+
+    def _read_model(self, number: int) -> ReducedModel:
         study = self.scenes.studies[number]
-        model = self.store.read_computed(model_key(study, harmonics_to_build(study)))
-        if model is None:
-            raise RuntimeError(f"the model of scene {number} has gone")
-        return replace(task, model=model)
+        return read_model(study, harmonics_to_build(study), self.store)
 
 
 def build_scenes(
@@ -149,9 +148,10 @@ def build_scenes(
             say("finding the natural frequencies of the scene")
         variables = (*build_scene_variables(study, model, store), *exact_answers(study))
         facts = replace(describe_scene(model), static_response=static_response(model))
-        broadcast = Broadcast(ranks, machines, model)
+        broadcast: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, model)
         return Scenes(scenes, (facts,), variables, scene_to_keep(study, model), (), broadcast, store)
-    Broadcast(ranks, machines, SeveralScenes()).send()
+    several: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, SeveralScenes())
+    several.send()
     built = _build_all(ranks, scenes, store, say)
     with keys_as_given(study.scene_axes):
         for each in built:
@@ -159,7 +159,7 @@ def build_scenes(
                 raise each.error
     facts_of_all = tuple(each.facts for each in built if each.facts is not None)
     variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-    return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, store)
+    return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, several, store)
 
 
 def _build_all(ranks: Ranks, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> list[SceneBuilt]:

@@ -52,6 +52,7 @@ class Broadcast(Generic[Thing]):
     """Rank 0: an object for all ranks.
 
     value: the object; where other ranks are on this machine, its arrays are in shared memory.
+    sharing: ranks that have mapped this memory, rank 0 with them; empty until the object is sent.
     """
 
     def __init__(self, ranks: Ranks, machines: Mapping[int, Machine], thing: Thing) -> None:
@@ -60,7 +61,8 @@ class Broadcast(Generic[Thing]):
         for rank in sorted(machines):
             groups.setdefault(machines[rank], []).append(rank)
         self._groups = tuple(groups.values())
-        self._shared = _share(thing) if len(self._groups[0]) > 1 else None
+        self.sharing: frozenset[int] = frozenset()
+        self._shared = share(thing) if len(self._groups[0]) > 1 else None
         self.value = thing if self._shared is None else self._shared.value
 
     def send(self) -> None:
@@ -71,7 +73,8 @@ class Broadcast(Generic[Thing]):
             self._ranks.send(_Whole(self.value, tuple(others)), leader)
             for rank in others:
                 self._ranks.send(_From(leader), rank)
-        _tell(self._ranks, self._shared, self.value, neighbours)
+        mapped = _tell(self._ranks, self._shared, self.value, neighbours)
+        self.sharing = frozenset({0, *mapped}) if mapped else frozenset()
 
 
 def take_over(ranks: Ranks) -> Any:  # a type that rank 0 knows
@@ -97,7 +100,7 @@ def take_over(ranks: Ranks) -> Any:  # a type that rank 0 knows
             ranks.flush()
             return thing
     if isinstance(message, _Whole):
-        shared = _share(message.thing) if message.others else None
+        shared = share(message.thing) if message.others else None
         thing = message.thing if shared is None else shared.value
         _tell(ranks, shared, thing, message.others)
         return thing
@@ -106,26 +109,34 @@ def take_over(ranks: Ranks) -> Any:  # a type that rank 0 knows
     return None
 
 
-def _share(thing: Thing) -> SharedObject[Thing] | None:
+def share(thing: Thing) -> SharedObject[Thing] | None:
+    """The object in shared memory; None where the system has none, or not enough."""
     with contextlib.suppress(OSError):
         return SharedObject(thing)
     return None
 
 
-def _tell(ranks: Ranks, shared: SharedObject[Thing] | None, thing: Thing, others: Sequence[int]) -> None:
-    """Tells the other ranks of a machine the address of the object, and waits until they have mapped it."""
+def _tell(ranks: Ranks, shared: SharedObject[Thing] | None, thing: Thing, others: Sequence[int]) -> list[int]:
+    """Tells the other ranks of a machine the address of the object, and waits until they have mapped it.
+
+    Returns the ranks that have.
+    """
+    mapped: list[int] = []
     for rank in others:
         ranks.send(_Whole(thing) if shared is None else shared.address, rank)
     if shared is None:
-        return
+        return mapped
     for rank in others:
         with contextlib.suppress(LostError):
             answer = _next_from(ranks, rank)
             if not isinstance(answer, _Mapped):
                 raise KeyboardInterrupt
-            if not answer.done:
+            if answer.done:
+                mapped.append(rank)
+            else:
                 ranks.send(_Whole(thing), rank)
     shared.close()
+    return mapped
 
 
 def _next_from(ranks: Ranks, rank: int) -> object:

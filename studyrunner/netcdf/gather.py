@@ -23,7 +23,7 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
-from studyrunner.netcdf.sample_coordinates import SampleCoordinate
+from studyrunner.netcdf.sample_coordinates import InputCoordinate
 from studyrunner.netcdf.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
 from studyrunner.scene.scene_set import PairArrays, pair_arrays
@@ -74,7 +74,7 @@ def gather(
     keep_finished: bool = False,
     origin: Mapping[str, str] | None = None,
     pairs: PairArrays | None = None,
-    samples: Sequence[SampleCoordinate] = (),
+    samples: Sequence[InputCoordinate] = (),
 ) -> Gathered:
     """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
 
@@ -180,7 +180,7 @@ def _write_values(
     completion: CompletionIndex,
     keys: Keys,
     pairs: PairArrays,
-    samples: Sequence[SampleCoordinate],
+    samples: Sequence[InputCoordinate],
 ) -> None:
     on_contact = [name for name in _ON_CONTACT if pairs.exists is not None or name != "contact_exists"]
     shape = tuple(len(values) for values in study.dimensions.values())

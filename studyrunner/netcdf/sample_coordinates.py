@@ -1,4 +1,4 @@
-"""What the samples of a study have drawn, as coordinates of the result file."""
+"""What the histories of a study begin with, as coordinates of the result file: drawn inputs, wear depths."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.drawn_contacts import pair_values, worn_depth
+from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
@@ -20,7 +21,7 @@ _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "
 
 
 @dataclass(frozen=True)
-class SampleCoordinate:
+class InputCoordinate:
     """A coordinate of the result file. values: with the dimensions of the entry."""
 
     name: str
@@ -28,11 +29,11 @@ class SampleCoordinate:
     values: NDArray[np.float64]
 
 
-def sample_coordinates(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SampleCoordinate]:
+def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[InputCoordinate]:
     """The drawn values of each input, in the unit of the input.
 
     Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
-    where pairs differ. The values of pairs are left out where the study has several scenes.
+    where pairs differ. facts: of each scene of `find_scenes`.
     """
     if study.scatter is None:
         return
@@ -46,18 +47,36 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Sa
         if first.ndim == 2:
             # around each value of an axis
             dimensions, values = (("sample",), first[0]) if len(first) == 1 else ((name, "sample"), first)
-        elif any(axis.key == (name,) for axis in study.scene_axes):
-            place = [axis.key for axis in study.scene_axes].index((name,))
+        elif any(axis.name == name for axis in study.scene_axes):
+            place = [axis.name for axis in study.scene_axes].index(name)
             every = np.array([each[name] for each in drawn]).reshape(*shape, -1)
             along = tuple(slice(None) if each == place else 0 for each in range(len(shape)))
             dimensions, values = (name, "sample"), every[along]
         yield _coordinate(name, dimensions, values, units, meaning)
-    if len(facts) == 1:
-        for name, values in pair_values(variants[0], facts[0]).items():
-            yield _coordinate(name, ("sample", "contact"), values, *_describe(study, name))
+    if scatters_pairs(study):
+        yield from _of_pairs(study, facts, scenes)
 
 
-def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SampleCoordinate]:
+def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[InputCoordinate]:
+    """Values of the pairs along the axes on which they depend; NaN where a scene does not have a pair."""
+    drawn = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
+    n_contact = max(len(each.area) for each in facts)
+    for name in drawn[0]:
+        values = np.full((len(drawn), n_contact), np.nan)
+        for row, of_part in zip(values, drawn, strict=True):
+            row[: len(of_part[name])] = of_part[name]
+        values = values.reshape(*(len(each) for each in study.axes_of_parts.values()), n_contact)
+        dimensions = ["contact"]
+        for place, axis in reversed(list(enumerate(study.axes_of_parts))):
+            first = values.take([0], axis=place)
+            if axis != "sample" and np.array_equal(np.broadcast_to(first, values.shape), values, equal_nan=True):
+                values = values.take(0, axis=place)
+            else:
+                dimensions.insert(0, axis)
+        yield _coordinate(name, tuple(dimensions), values, *_describe(study, name))
+
+
+def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[InputCoordinate]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is None or len(facts) > 1:
         return
@@ -69,14 +88,14 @@ def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Sampl
     entry = Variable(
         dimensions, "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
     )
-    yield SampleCoordinate("worn_depth", entry, values if counts else values[0])
+    yield InputCoordinate("worn_depth", entry, values if counts else values[0])
 
 
 def _coordinate(
     name: str, dimensions: tuple[str, ...], values: NDArray[np.float64], units: str, meaning: str
-) -> SampleCoordinate:
+) -> InputCoordinate:
     entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment="By [scatter] of the study.")
-    return SampleCoordinate(f"sample_{name}", entry, np.asarray(values, dtype=np.float64))
+    return InputCoordinate(f"sample_{name}", entry, np.asarray(values, dtype=np.float64))
 
 
 def _describe(study: Study, name: str) -> tuple[str, str]:
@@ -85,4 +104,7 @@ def _describe(study: Study, name: str) -> tuple[str, str]:
         return COORDINATES[name].units, COORDINATES[name].long_name
     if name in _OF_CONTACT:
         return _OF_CONTACT[name]
-    return describe_key(type(study.wear) if name == "threshold" else type(study.scene.parameters), name)
+    if name in study.wear.numbers:
+        # `surfaces_flat` is the factor of the surface "flat"
+        return describe_key(type(study.wear), *name.split("_", 1))
+    return describe_key(type(study.scene.parameters), name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
@@ -13,6 +14,10 @@ from studyrunner.plan.cost_model import CostKeys
 from studyrunner.plan.estimate import ITERATIONS_A_STATE, iterations_of_branch
 from studyrunner.plan.sharing import Index, LeftOut, ScaledHistory, march_counts
 from studyrunner.scene.drawn_contacts import ContactChange
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+    from studyrunner.mpi.shared_memory import Address
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """Most general keys of tasks in the cost model."""
@@ -49,7 +54,7 @@ class BranchTask:
         that start from them.
     resume: progress of an earlier run; None to begin with the first frequency.
     key: hash of the branch in the file of the run.
-    model: reduced model of the scene, for a rank that does not have the model.
+    model: reduced model of the scene, or where it is in shared memory, for a rank that does not have the model.
     """
 
     number: int
@@ -62,7 +67,7 @@ class BranchTask:
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    model: Packed | None = field(default=None, compare=False, repr=False)
+    model: ReducedModel | Address | None = field(default=None, compare=False, repr=False)
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -120,7 +125,7 @@ class MarchTask:
     start: start state; None until the branch has reached it.
     resume: progress of an earlier run; None to begin with the start state.
     key: hash of the task in the file of the run.
-    model: reduced model of the scene, for a rank that does not have the model.
+    model: reduced model of the scene, or where it is in shared memory, for a rank that does not have the model.
     """
 
     number: int
@@ -144,7 +149,7 @@ class MarchTask:
     start: Packed | None = field(default=None, compare=False, repr=False)
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    model: Packed | None = field(default=None, compare=False, repr=False)
+    model: ReducedModel | Address | None = field(default=None, compare=False, repr=False)
 
     @property
     def wear_coefficient(self) -> float:

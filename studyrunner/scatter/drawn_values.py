@@ -15,7 +15,7 @@ from studyrunner.scatter.section import Distribution, Kind, Of, Scattered, Scatt
 from studyrunner.user_error import WrongValueError
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
-_NOT_BELOW_ZERO = ("friction_coefficient", "threshold", "wear_coefficient")
+_NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
 
 _NUGGET = 1e-8
 """Share of the variance of a field that is independent from pair to pair.
@@ -85,6 +85,13 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
     return found
 
 
+def largest_draw(scattered: Scattered, own: float, score: float) -> float:
+    """The value of an input so many standard deviations up, or the same share of a uniform one. own: study's value."""
+    distribution = scattered.distribution
+    values = distribution.draw(np.array([score]))
+    return float(Drawn("", values, distribution.kind, scattered.of).apply(own)[0])
+
+
 def _surfaces(pairs: ScatteredPairs) -> tuple[str, ...]:
     return tuple(dict.fromkeys(pairs.surface))
 
@@ -115,6 +122,6 @@ def _check(draw: Drawn, distribution: Distribution, own: NDArray[np.float64]) ->
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
         raise WrongValueError(distribution.model_dump(), remedy, key)
     smallest = min(float(draw.apply(row).min()) for row in own)
-    if (smallest < 0.0 and name in _NOT_BELOW_ZERO) or (smallest <= 0.0 and name in _ABOVE_ZERO):
+    if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
         raise WrongValueError(distribution.model_dump(), remedy, key)

@@ -162,6 +162,10 @@ class ScatterSection(BaseModel):
     def _read_table(cls, table: object) -> object:
         if not isinstance(table, Mapping):
             raise WrongValueError(table, "give a table [scatter] with samples and a distribution for each input")
+        if isinstance(surfaces := table.get("surfaces"), Mapping):
+            # factors of [wear] by surface: named as the dimensions that they have as axes
+            of_surfaces = {f"surfaces_{label}": each for label, each in surfaces.items()}
+            table = {name: each for name, each in table.items() if name != "surfaces"} | of_surfaces
         if "samples" not in table:
             raise WrongValueError(None, "missing: give the number of realisations", "scatter.samples")
         samples = _read_whole("samples", table["samples"], 1, cls.MOST_SAMPLES)

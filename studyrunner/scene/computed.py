@@ -68,6 +68,14 @@ def keep_model(study: Study, n_harmonics: int, model: ReducedModel, computed: Co
     computed.keep_computed(model_key(study, n_harmonics), packed)
 
 
+def read_model(study: Study, n_harmonics: int, computed: Computed) -> ReducedModel:
+    """A model that `keep_model` has kept. Raises RuntimeError where it is no longer there."""
+    packed = computed.read_computed(model_key(study, n_harmonics))
+    if packed is None:
+        raise RuntimeError(f"the model of {study.scene.model} has gone")
+    return unpack_model(packed)
+
+
 def frequencies_once(study: Study, computed: Computed, find: Callable[[], NaturalFrequencies]) -> NaturalFrequencies:
     """Natural frequencies of a bundled scene, computed or from an earlier run."""
     return _once(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +19,41 @@ ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
 
 
 def contact_changes(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
-    """Drawn values of the pairs for each part of a study (`realise`).
+    """What differs from the pairs of the scene, for each part of a study (`realise`).
 
     facts: of each scene. Raises UserError where a sample draws a value that is none.
     """
-    section, variants = study.scatter, study.variants or (study,)
-    scatters = section is not None and any(is_of_pairs(name, each) for name, each in section.inputs.items())
-    if not scatters and study.scene.worn is None:
-        return ((),) * len(scenes.numbers)
-    n_samples = 1 if section is None else section.realisations
     changes: list[ContactChange] = []
-    for place, variant in enumerate(variants):
-        own = scenes.numbers[place * n_samples : (place + 1) * n_samples]
-        drawn: tuple[SceneFacts, dict[str, NDArray[np.float64]]] | None = None
-        for sample, number in enumerate(own):
-            # scenes of samples mostly have the same pairs, and then the same draws
-            if drawn is None or not _draws_alike(drawn[0], facts[number]):
-                drawn = facts[number], pair_values(variant, facts[number])
-            of_sample = {name: each[sample] for name, each in drawn[1].items()}
-            if variant.scene.worn is not None:
-                # wear opens a pair as a gap does, Eq. (7)
-                gap = of_sample.get("gap", facts[number].gap)
-                of_sample["gap"] = gap + worn_depth(variant, facts[number])
-            changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
+    for variant, own, of_sample in drawn_pairs(study, scenes, facts):
+        if variant.scene.worn is not None:
+            # wear opens a pair as a gap does, Eq. (7)
+            of_sample["gap"] = of_sample.get("gap", own.gap) + worn_depth(variant, own)
+        changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
     return tuple(changes)
+
+
+def drawn_pairs(
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
+) -> Iterator[tuple[Study, SceneFacts, dict[str, NDArray[np.float64]]]]:
+    """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
+
+    facts: of each scene. Raises UserError where a sample draws a value that is none.
+    """
+    n_samples = 1 if study.scatter is None else study.scatter.realisations
+    for place, variant in enumerate(study.variants or (study,)):
+        drawn: tuple[SceneFacts, dict[str, NDArray[np.float64]]] | None = None
+        for sample, number in enumerate(scenes.numbers[place * n_samples : (place + 1) * n_samples]):
+            own = facts[number]
+            # scenes of samples mostly have the same pairs, and then the same draws
+            if drawn is None or not _draws_alike(drawn[0], own):
+                drawn = own, pair_values(variant, own) if scatters_pairs(study) else {}
+            yield variant, own, {name: each[sample] for name, each in drawn[1].items()}
+
+
+def scatters_pairs(study: Study) -> bool:
+    """Whether samples draw values of contact pairs."""
+    inputs = {} if study.scatter is None else study.scatter.inputs
+    return any(is_of_pairs(name, each) for name, each in inputs.items())
 
 
 def _draws_alike(one: SceneFacts, other: SceneFacts) -> bool:

@@ -55,11 +55,12 @@ def two_groups(values: SampleValues) -> Groups | None:
     longer than the gap by trend, and the ratio of the gap to the mean of these k spacings is above r with a probability
     of at most (1 + r / k)^-k, the one of a uniform density. The gap is compared with the side on which the probability
     is larger; that any of n gaps passes by chance has a probability below 0.5 %. The gap must be longer than the
-    numerical errors beside it. Of the gaps that pass the longest is taken.
+    numerical errors beside it. Of the gaps that pass the longest is taken. A sample whose error is more than half of the
+    range of all samples may lie on either side of a gap and counts as one without a value.
     """
+    values = _without_vague(values)
     known = values.is_known
     order = np.argsort(values.low[known], kind="stable")
-    sample, error = values.low[known][order], values.error[known][order]
     sample, error = values.low[known][order], values.error[known][order]
     gap, number = np.diff(sample), np.arange(len(sample) - 1)
     chance = np.maximum(
@@ -73,6 +74,19 @@ def two_groups(values: SampleValues) -> Groups | None:
     lower, upper = float(sample[best]), float(sample[best + 1])
     is_upper = values.low > lower
     return Groups(lower, upper, is_upper, is_upper | (values.high < upper))
+
+
+def _without_vague(values: SampleValues) -> SampleValues:
+    known = values.is_known
+    if not known.any():
+        return values
+    vague = known & (values.error > 0.5 * np.ptp(values.low[known]))
+    wide = values.widened
+    return SampleValues(
+        np.where(vague, wide.low, values.low),
+        np.where(vague, wide.high, values.high),
+        np.where(vague, 0.0, values.error),
+    )
 
 
 def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 
 from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
@@ -108,30 +109,30 @@ def check_scatter(study: Study) -> None:
             remedy = f"unknown input, give {nearest_name(name, dict.fromkeys(numbers))}"
             raise UserError(study.source, f"scatter.{name}", None, remedy)
         several = name in _OF_AXES and len(getattr(study.axes, name)) > 1
-        several = several or any(axis.key == (name,) for axis in study.scene_axes)
+        several = several or any(axis.name == name for axis in study.scene_axes)
         if several and scattered.distribution.kind == "value":
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
             raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
     for variant in study.variants or (study,):
         for name, values in draw_inputs(variant).items():
-            if name not in (*_OF_AXES, "threshold"):
+            if name not in (*_OF_AXES, *study.wear.numbers):
                 # other parameters of the scene may not fit to one that is drawn
                 for extreme in (values.min(), values.max()):
                     _with_parameters(variant, {name: float(extreme)})
 
 
 def _numbers_of(study: Study) -> list[str]:
-    """Keys of [scene] and [wear] that are numbers with fractions."""
+    """Inputs of [scene] and [wear] that are numbers with fractions."""
     fields = type(study.scene.parameters).model_fields
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
-    return [*floats, "threshold"] if study.wear.law == "threshold" else floats
+    return [*floats, *study.wear.numbers]
 
 
 def _own_value(study: Study, name: str) -> ArrayLike:
     """The study's own value of an input; 1, for any, where the contact pairs have their own."""
     if name in _OF_AXES:
         return np.array(getattr(study.axes, name))[:, None]
-    value = study.wear.threshold if name == "threshold" else dict(study.scene.parameters).get(name)
+    value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
         return float(value)
     assert study.scatter is not None
@@ -158,7 +159,8 @@ def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
         return
     values = draw_inputs(study)
     axes = [name for name in values if name in _OF_AXES]
-    of_scene = [name for name in values if name not in (*_OF_AXES, "threshold")]
+    of_wear = [name for name in values if name in study.wear.numbers]
+    of_scene = [name for name in values if name not in (*_OF_AXES, *of_wear)]
     for sample in range(study.scatter.realisations):
         update: dict[str, object] = {"scatter": None}
         if axes:
@@ -167,9 +169,10 @@ def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
         if of_scene:
             parameters = _with_parameters(study, {name: float(values[name][sample]) for name in of_scene})
             update["scene"] = study.scene.model_copy(update={"parameters": parameters})
-        if "threshold" in values:
-            update["wear"] = study.wear.model_copy(update={"threshold": float(values["threshold"][sample])})
-        yield study.model_copy(update=update), (sample,)
+        if of_wear:
+            update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
+        part = study.model_copy(update=update)
+        yield with_room_for_wear(part) if of_scene else part, (sample,)
 
 
 def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:

@@ -6,12 +6,24 @@ import math
 
 from studies.scenes import scene_with_room
 from studies.scenes.half_space.room_for_wear import ExpectedWear
+from studyrunner.scatter.drawn_values import largest_draw
 from studyrunner.study.study import Study
+
+_FAR = 3.1
+"""Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.
+
+The largest of the samples themselves would give another scene, and other results, to each number of samples."""
 
 
 def with_room_for_wear(study: Study) -> Study:
-    """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself."""
+    """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself.
+
+    Of a study with samples the scene has room for nearly all of them. Where parameters of the scene scatter, each
+    sample has a scene of its own (`realise`), with room for what this sample wears; the study is then the same.
+    """
     scene = study.scene
+    if study.scatter is not None and study.scatter.inputs.keys() & dict(scene.parameters).keys():
+        return study
     # what a result file holds was built with the parameters that stand beside it
     if not scene.is_bundled or scene.path is not None:
         return study
@@ -22,17 +34,22 @@ def with_room_for_wear(study: Study) -> Study:
 
 
 def expected_wear(study: Study) -> ExpectedWear:
-    """The most that any of its points wears."""
+    """The most that any of its points wears, of samples up to `_FAR`."""
+
+    def largest(name: str, own: float) -> float:
+        scattered = None if study.scatter is None else study.scatter.inputs.get(name)
+        return own if scattered is None else largest_draw(scattered, own, _FAR)
+
     law, until = study.wear_law, study.slow_time.until or {}
-    factor = sum(value for _, value in law.surfaces) if law.surfaces else 1.0
+    factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0
     if law.name == "energy":
         factor *= study.friction_coefficient or 0.0
     if law.table is not None:
         factor *= max(max(row) for row in law.table.factor)
     cycles = math.inf if study.to_the_end else study.cycles_kept[-1]
-    wear = max(study.axes.wear_coefficient) * factor
+    wear = largest("wear_coefficient", max(study.axes.wear_coefficient)) * factor
     return ExpectedWear(
-        amplitude=max(study.axes.excitation_amplitude),
+        amplitude=largest("excitation_amplitude", max(study.axes.excitation_amplitude)),
         per_slip_work=wear * cycles if wear > 0.0 else 0.0,
         volume=until.get("worn_volume", math.inf),
         depth=until.get("wear_depth", math.inf),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -14,6 +15,7 @@ from studyrunner.user_error import WrongValueError
 _NUMBER = TypeAdapter(Number)
 _NOT_NEGATIVE = TypeAdapter(NotNegative)
 _MOST_KNOTS = 1000
+_OF_SURFACE = "surfaces_"
 
 _TAKEN = {"threshold": ("threshold",), "table": ("pressure", "depth", "factor")}
 """Keys of the laws that take any, beside `surfaces`, which all take."""
@@ -81,6 +83,19 @@ class WearSection(Section):
                 remedy = f"give {n_rows} rows, one for each pressure, of {n_columns} numbers, one for each depth"
                 raise WrongValueError(self.factor, remedy, "wear.factor")
         return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers that may scatter, named as dimensions: the threshold, and `surfaces_flat` of a surface flat."""
+        own = {} if self.threshold is None else {"threshold": self.threshold}
+        factors = {f"{_OF_SURFACE}{label}": factor for label, factor in (self.surfaces or {}).items()}
+        return own | {name: factor for name, factor in factors.items() if name.isidentifier()}
+
+    def with_numbers(self, values: Mapping[str, float]) -> WearSection:
+        """With other values of `numbers`."""
+        table = {f"{_OF_SURFACE}{label}": (label, factor) for label, factor in (self.surfaces or {}).items()}
+        surfaces = {label: values.get(name, factor) for name, (label, factor) in table.items()} or None
+        return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": surfaces})
 
     @property
     def wear_law(self) -> WearLaw:

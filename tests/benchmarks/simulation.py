@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from studyrunner.mpi.dispatch import Assignment, Dispatcher
+from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.task_progress import TaskProgress
@@ -90,20 +91,45 @@ class Replay:
         return min(1.0, self.work / (self.n_ranks * self.longest_way))
 
 
+class KnownCosts(CostModel):
+    """Takes the costs of tasks as they are."""
+
+    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:  # noqa: ARG002
+        """Learns nothing."""
+        return Measurement(())
+
+    def correction(self, cost_keys: CostKeys) -> float:  # noqa: ARG002
+        """1."""
+        return 1.0
+
+
 def replay(
     plan: TaskPlan,
     started: Callable[[BranchTask, int], tuple[StartResult, float]],
     march_seconds: Callable[[MarchTask], float],
     n_ranks: int,
     overheads: Overheads,
+    *,
+    known: bool = False,
 ) -> Replay:
     """Runs the tasks of a plan on simulated ranks. The same arguments give the same replay.
 
-    started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s.
+    started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s. known: the costs
+    are known before: branches with the longest way to the end of a history go first, then the longest histories.
     """
     clock = 0.0
     progress = TaskProgress(MemoryIndex(plan))
-    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, progress.costs, lambda: clock)
+    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, KnownCosts() if known else progress.costs, lambda: clock)
+
+    def foreseen(tasks: Iterable[Task]) -> list[Task]:
+        return [replace(task, cost=_longest_way(task)) for task in tasks] if known else list(tasks)
+
+    def _longest_way(task: Task) -> float:
+        if isinstance(task, MarchTask):
+            return march_seconds(task)
+        first = sum(started(task, position)[1] for position in task.order)
+        return first + max((march_seconds(march) for march in plan.marches[task.number]), default=0.0)
+
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, StartResult | MarchResult]] = []
     queues: list[list[tuple[float, Assignment[Task]]]] = [[] for _ in range(n_ranks)]
@@ -146,7 +172,7 @@ def replay(
             if not computing[rank]:
                 begin(rank)
 
-    dispatcher.add(plan.branches)
+    dispatcher.add(foreseen(plan.branches))
     hand_out()
     left: dict[int, int] = {}
     while arrivals:
@@ -160,7 +186,7 @@ def replay(
             computing[rank] = False
             if queues[rank]:
                 begin(rank)
-        dispatcher.add(progress.take(task, result))
+        dispatcher.add(foreseen(progress.take(task, result)))
         dispatcher.watch()
         hand_out()
         last_end = clock

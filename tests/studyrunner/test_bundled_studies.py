@@ -42,6 +42,8 @@ SMALL = {
     ],
     "scatter": [
         "scatter.samples=4",
+        "scene.mesh=1",
+        "axes.frequency=212.45",
         "slow_time.cycles=3000",
         "slow_time.outputs=3",
         "solver.harmonics=3",

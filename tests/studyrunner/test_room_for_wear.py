@@ -15,6 +15,8 @@ from studies import build_scene, read_scene
 from studyrunner import read_study
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene, describe_scene, write_study_scene
+from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.realisation import realise
 from studyrunner.study.room_for_wear import describe_room, expected_wear
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
@@ -103,6 +105,29 @@ def test_it_is_the_most_that_any_point_wears(path: Path, overrides: dict[str, An
     assert (expected.amplitude, expected.volume, expected.depth) == (1.0, math.inf, math.inf)
     # b^3 - a^3 of the segment is proportional to it
     assert half_width(study) == pytest.approx(half_width(read_study(path)) * factor ** (1.0 / 3.0), rel=0.08)
+
+
+def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path: Path) -> None:
+    scatter = {"samples": 8, "wear_coefficient": {"lognormal": {"factor": 1.5}}}
+    study = read_study(path, {"scatter": scatter})
+    assert expected_wear(study).per_slip_work == pytest.approx(1.5**3.1 * 1e-13 * 2000)
+    assert half_width(study) > half_width(read_study(path))
+    assert half_width(read_study(path, {"scatter": {**scatter, "samples": 1024}})) == half_width(study)
+    widths = {half_width(part.study) for part in realise(study)}
+    assert widths == {half_width(study)}
+    # one scene for all
+    assert len(find_scenes(study).studies) == 1
+
+
+def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path: Path) -> None:
+    inputs = {name: {"lognormal": {"factor": 1.5}} for name in ("P", "wear_coefficient")}
+    study = read_study(path, {"scatter": {"samples": 8, **inputs}})
+    for part in realise(study):
+        own = {"scene.P": dict(part.study.scene.parameters)["P"]}
+        alone = read_study(path, {**own, "axes.wear_coefficient": part.study.axes.wear_coefficient[0]})
+        assert half_width(part.study) == half_width(alone)
+    path.with_name("again.toml").write_text(format_study(study))
+    assert format_study(read_study(path.with_name("again.toml"))) == format_study(study)
 
 
 def test_the_remedy_names_width_and_number_of_pairs(path: Path) -> None:

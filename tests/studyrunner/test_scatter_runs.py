@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import norm
 
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import drawn_contacts
 from studyrunner.scene.drawn_contacts import pair_values
-from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene import SceneFacts, build_study_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import draw_inputs
+from studyrunner.statistics.study_statistics import worn_volume_statistics
+from studyrunner.study.realisation import draw_inputs, realise
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
@@ -104,9 +106,13 @@ def test_a_sample_is_the_study_of_its_drawn_values() -> None:
 
 @pytest.mark.slow
 def test_pairs_that_differ_between_samples_have_the_dimension() -> None:
-    """A scattered radius moves the strips."""
+    """A scattered radius moves the strips; gaps are drawn around those of the scene of each sample."""
     given = ("scene.strips=10", "slow_time.cycles=0", "slow_time.outputs=1", "solver.harmonics=1")
-    samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}")
+    gap = "scatter.gap={normal={std=0}, of='each pair'}"
+    samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}", gap)
+    assert samples.sample_gap.dims == ("sample", "contact")
+    gaps = [build_study_scene(each.study).contact.gap for each in realise(read_study("w.nc"))]
+    np.testing.assert_array_equal(samples.sample_gap, gaps)
     assert samples.contact_x.dims == ("sample", "contact")
     assert samples.contact_exists.all()
     assert (samples.contact_area[0] != samples.contact_area[1]).all()
@@ -192,3 +198,70 @@ def test_what_is_wrong_is_said_in_a_sentence(
 ) -> None:
     first = ["scatter.samples=8"] if "scatter=3" not in overrides else []
     assert expected in refused("sdof_slider", ["axes.frequency=160", *first, *overrides], capsys)
+
+
+# --- numbers of [wear] ---
+
+
+def test_factors_of_surfaces_scatter() -> None:
+    factor = "scatter.surfaces.support={lognormal={factor=1.5}}"
+    study = read_study("sdof_slider", [*CHEAP, "wear.surfaces={support=0.5}", "scatter.samples=8", factor])
+    (drawn,) = draw_inputs(study).values()
+    assert [dict(part.study.wear.surfaces or {})["support"] for part in realise(study)] == drawn.tolist()
+    assert np.median(drawn) == pytest.approx(0.5, rel=0.15)
+    assert len(build_tasks(study, 2).branches) == 1, "all samples start from one state"
+    Path("again.toml").write_text(format_study(study), encoding="utf-8")
+    assert format_study(read_study("again.toml")) == format_study(study)
+
+
+@pytest.mark.slow
+def test_a_factor_of_a_surface_is_a_factor_of_the_volume() -> None:
+    asked = "outputs.variables=['default']"
+    asked = "outputs.variables=['worn_volume', 'wear_depth']"
+    scatter = "scatter={samples = 2, surfaces = {support = {uniform = {half_width = 0.4}}}}"
+    samples = compute("sdof_slider", "w.nc", *CHEAP, asked, "wear.surfaces={support=0.5}", scatter)
+    assert samples.sample_surfaces_support.attrs["units"] == "1"
+    for number in (0, 1):
+        own = f"wear.surfaces={{support={float(samples.sample_surfaces_support[number])!r}}}"
+        same_values(samples.isel(sample=number), compute("sdof_slider", "a.nc", *CHEAP, own, asked))
+
+
+# --- closed forms: volume k_w c N times a constant, where nothing depends on wear ---
+
+SLIDING = (
+    *("scene.normal_stiffness=0", "axes.frequency=160", "axes.wear_coefficient=1e-11", "solver.harmonics=3"),
+    *("solver.samples=32", "slow_time.cycles=2000", "slow_time.outputs=2", "outputs.variables=['worn_volume']"),
+)
+
+
+@pytest.mark.slow
+def test_quantiles_of_a_lognormal_wear_coefficient_are_lognormal() -> None:
+    study = ("axes.scheme=adaptive", "scatter.samples=1024", WEAR)
+    samples = compute("sdof_slider", "w.nc", *SLIDING, *study)
+    alone = compute("sdof_slider", "a.nc", *SLIDING, "axes.scheme=adaptive")
+    found = worn_volume_statistics(samples).worn_volume_quantile.isel(cycle=-1).squeeze(drop=True)
+    expected = float(alone.worn_volume[..., -1].item()) * 1.5 ** norm.ppf(found["quantile"])
+    np.testing.assert_allclose(found.sel(bound="lowest"), expected, rtol=0.01)
+    np.testing.assert_allclose(found.sel(bound="highest"), expected, rtol=0.01)
+
+
+@pytest.mark.slow
+def test_indices_of_saltelli_are_those_of_a_product() -> None:
+    """ln k_w and ln c normal: S_1 = (exp(s_1^2) - 1) / (exp(s_1^2 + s_2^2) - 1), S_T1 = S_1 exp(s_2^2)."""
+    surface = "scatter.surfaces={support={lognormal={factor=1.3}}}"
+    study = ("axes.scheme=implicit", "axes.step=2000", "scatter.method=saltelli", "scatter.samples=16", WEAR, surface)
+    samples = compute("sdof_slider", "w.nc", *SLIDING, "wear.surfaces={support=0.5}", *study)
+    assert samples.sizes["sample"] == 16 * 4
+    # so that the indices are those of the product, of which 1024 base samples give the closed form to 0.03
+    product = samples.sample_wear_coefficient * samples.sample_surfaces_support
+    ratio = samples.worn_volume[..., -1] / product
+    assert float(ratio.std() / ratio.mean()) < 1e-9
+    found = worn_volume_statistics(samples).isel(cycle=-1).squeeze(drop=True)
+    variances = {"wear_coefficient": np.log(1.5) ** 2, "surfaces_support": np.log(1.3) ** 2}
+    whole = sum(variances.values())
+    for name, variance in variances.items():
+        first = np.expm1(variance) / np.expm1(whole)
+        for index, exact in (("first_index", first), ("total_index", first * np.exp(whole - variance))):
+            low, high = found[f"{index}_interval"].sel(input=name).values
+            assert low < exact < high
+        assert float(found.total_index.sel(input=name, bound="lowest")) == pytest.approx(exact, abs=0.1)
