@@ -1,4 +1,4 @@
-"""One block, vibrating through its cycles of one mission or of many: its wear, and the reference solution of its wear."""
+"""One block, flown for one mission or for many at once: its wear, and the reference solution of its wear."""
 
 from __future__ import annotations
 

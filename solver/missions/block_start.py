@@ -47,9 +47,7 @@ def begin_block(
     if carried is not None:
         return _continued(block, depth, carried, settings)
     model, frequency = worn(block.model, depth), np.array([block.frequency])
-    branch = follow_branch(
-        model, block.friction_coefficient, block.excitation_amplitude, frequency, sweep, settings
-    )
+    branch = follow_branch(model, block.friction_coefficient, block.excitation_amplitude, frequency, sweep, settings)
     return next(branch)[1]
 
 
@@ -86,7 +84,9 @@ class _Continuation:
         if self.block.frequency != before.omega / (2.0 * np.pi):
             smaller = min(amplitude, before.excitation_amplitude)
             on_the_way = ("sweep", self.block.frequency, smaller)
-            ways = [on_the_way, ("ramp", self.block.frequency, amplitude)] if amplitude > smaller else [*ways, on_the_way]
+            ways = (
+                [on_the_way, ("ramp", self.block.frequency, amplitude)] if amplitude > smaller else [*ways, on_the_way]
+            )
         for kind, frequency, load in ways:
             if self.start.state is not None:
                 self._go(kind == "ramp", frequency, load)
@@ -96,12 +96,16 @@ class _Continuation:
         """Solve the state at the present depth, which a longer or an extrapolated step may have changed."""
         start = self.start
         assert start.state is not None
-        case = build_case(self.model, self.block.friction_coefficient, start.penalty_omega, self.settings, start.resolution)
+        case = build_case(
+            self.model, self.block.friction_coefficient, start.penalty_omega, self.settings, start.resolution
+        )
         joint, state = case.joint(start.state.omega, start.state.excitation_amplitude), start.state
         unworn = np.zeros_like(state.wear_depth)
         balance = Balance.frozen(joint, state.start_history, unworn)
         first = balance.predict(state.displacement_h, state.contact_force_h)
-        line = FrequencySweep(self.model, self.block.friction_coefficient, state.excitation_amplitude, "up", self.settings)
+        line = FrequencySweep(
+            self.model, self.block.friction_coefficient, state.excitation_amplitude, "up", self.settings
+        )
         line.set_deadline(self.deadline)
         found = solve_balance(balance, first, JacobianSolver(), self.settings.tolerance, line.budget)
         self.iterations += line.budget.iterations
@@ -117,7 +121,9 @@ class _Continuation:
         before, omega = start.state, 2.0 * np.pi * frequency
         if (before.excitation_amplitude == amplitude) if ramp else (before.omega == omega):
             return
-        case = build_case(self.model, self.block.friction_coefficient, start.penalty_omega, self.settings, start.resolution)
+        case = build_case(
+            self.model, self.block.friction_coefficient, start.penalty_omega, self.settings, start.resolution
+        )
         joint = case.joint(before.omega, before.excitation_amplitude)
         balance = Balance.frozen(joint, before.start_history, np.zeros_like(before.wear_depth))
         at = balance.evaluate(balance.predict(before.displacement_h, before.contact_force_h))

@@ -60,7 +60,7 @@ class MissionCourse:
     start_rates (n_block, n_contact): wear rates at the starts of the blocks of the first mission, m per cycle.
     start_errors (n_block,): estimated relative errors of these rates.
     inaccurate (n_block,): largest error of a state of each block above rtol, 0 where there is none.
-    held, cut_off: whether and from which number of missions on, as `BlockRun.held` and `BlockRun.cut_off`; NaN if never.
+    held, cut_off: number of missions from which on a block has `BlockRun.held`, `BlockRun.cut_off`; NaN if never.
     iterations: Newton iterations.
     """
 
@@ -139,8 +139,6 @@ def responses_of(first: int, runs: tuple[BlockRun, ...]) -> tuple[Responses, ...
     n = runs[0].missions[-1]
     found = []
     for mission in dict.fromkeys((0, n - 1)):
-        begin, end = (
-            np.array([run.response[run.missions.index(at)] for run in runs]) for at in (mission, mission + 1)
-        )
+        begin, end = (np.array([run.response[run.missions.index(at)] for run in runs]) for at in (mission, mission + 1))
         found.append(Responses(first + mission, begin, end))
     return tuple(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,55 +13,14 @@ from solver.accuracy.history_error import Met
 from solver.accuracy.options import ACCURACY
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionCourse
+from solver.missions.one_block import integrate_one_block, is_one_history
+from solver.missions.result import MissionHistory
 from solver.missions.solutions import ENDS_ALL, MissionSolutions
-from solver.model import ComplexArray, FloatArray
+from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.cut_off import describe_cut_off
 from solver.wear.state import Failure
-
-
-@dataclass(frozen=True)
-class MissionHistory:
-    """A joint over its missions, at `n_output` numbers of flown missions. Values not reached are NaN.
-
-    missions (n_output,): numbers of flown missions.
-    worn_volume (n_output,): m3.
-    worn_volume_error (n_output,): estimated relative error by the steps over missions, the integration of each block
-        and their propagation, harmonics, samples and start states; 0 where nothing has worn.
-    wear_depth, wear_depth_error (n_output, n_contact): m.
-    block_volume (n_output, n_block): m3, worn volume by block; their sum is `worn_volume`.
-    response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
-        block, in the mission that ends at the number, at 0 in the first one.
-    reference_volume (n_output,): m3, worn volume of the reference solution.
-    error_estimate: `worn_volume_error` at the last number that was reached.
-    last_mission: number of missions up to which the history was computed.
-    steps (n_step,): missions flown in each step.
-    missions_to_target: number of missions at which the target was reached, NaN if never or without a target.
-    missions_to_target_error: its estimated error, missions; NaN if it was never reached.
-    newton_iterations: of history and reference solution.
-    run_time: CPU seconds of the computing thread.
-    outcome, message: how the computation ended, and additions.
-    """
-
-    outcome: Outcome
-    missions: FloatArray
-    worn_volume: FloatArray
-    worn_volume_error: FloatArray
-    wear_depth: FloatArray
-    wear_depth_error: FloatArray
-    block_volume: FloatArray
-    response_begin: ComplexArray
-    response_end: ComplexArray
-    reference_volume: FloatArray
-    error_estimate: float
-    last_mission: float
-    steps: FloatArray
-    missions_to_target: float
-    missions_to_target_error: float
-    newton_iterations: int
-    run_time: float
-    message: str = ""
 
 
 def integrate_missions(
@@ -76,14 +35,16 @@ def integrate_missions(
     keep
         Called after each block with the progress.
     resume
-        Progress, as given to `keep`, of an equal mission, which goes on from there. The result is equal to the last bit,
-        except `run_time`.
+        Progress, as given to `keep`, of an equal mission, which goes on from there. The result is equal to the last
+        bit, except `run_time`.
 
     Returns
     -------
     MissionHistory
         The history as far as computed, with its outcome. A history that fails raises no error.
     """
+    if is_one_history(mission):
+        return integrate_one_block(mission, keep, resume)
     solutions = MissionSolutions(mission, keep, None if resume is None else unpack(resume))
     fine = solutions.history()
     reference = None
@@ -131,7 +92,9 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
     target = solutions.missions_to_target(fine)
     if math.isinf(target):
         return history
-    return replace(history, missions_to_target=target, missions_to_target_error=_target_error(solutions, fine, reference))
+    return replace(
+        history, missions_to_target=target, missions_to_target_error=_target_error(solutions, fine, reference)
+    )
 
 
 def _errors(
@@ -205,11 +168,16 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
     rtol, error = mission.settings.rtol, history.error_estimate
     remarks = []
     if not math.isnan(fine.held):
-        remarks.append(f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there")
+        remarks.append(
+            f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
+        )
     if not math.isnan(fine.cut_off):
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
     if error > SENSITIVE_ERROR:
-        volumes = [1e9 * float(values[np.isfinite(history.worn_volume)][-1]) for values in (history.worn_volume, history.reference_volume)]
+        volumes = [
+            1e9 * float(values[np.isfinite(history.worn_volume)][-1])
+            for values in (history.worn_volume, history.reference_volume)
+        ]
         said = f"worn volume {volumes[0]:.3g} mm3, but {volumes[1]:.3g} mm3 in coarser steps"
         return Failure(Outcome.SENSITIVE, "; ".join((said, *remarks)))
     worst = int(np.argmax(fine.inaccurate))

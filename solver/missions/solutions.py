@@ -120,7 +120,7 @@ class MissionSolutions:
         return self.worn(growth_within(before, end, before.mission + fraction * (end.mission - before.mission)))
 
     def worn(self, growth: FloatArray) -> float:
-        """Wear to compare with the target, from the depths worn by each block: a volume, m3, or the largest depth, m."""
+        """Wear to compare with the target, from the depths worn by each block: volume, m3, or largest depth, m."""
         depth = growth.sum(axis=0)
         assert self.mission.until is not None
         if self.mission.until.quantity == "wear_depth":

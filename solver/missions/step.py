@@ -1,8 +1,8 @@
 """One step over many missions: operator splitting, extrapolated to missions that are flown one by one.
 
 A mission maps the depth before to the depth after: its blocks wear one after the other. Many missions n at once are
-approximated by the same blocks, each with n times its cycles. Each block is integrated by its own stable scheme, so that
-the length of the step is limited by its accuracy only. The error against n missions one by one comes from the order of
+approximated by the same blocks, each with n times its cycles. Each block is integrated by its own stable scheme, so
+that the length of the step is limited by its accuracy only. The error against n missions one by one comes from the order of
 the blocks, which do not commute: a step of n missions misses n (n - 1) times a constant, to leading order. For n = 1
 there is no error.
 
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.missions.block_run import BlockCase, BlockRun
+from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionNode, responses_of
 from solver.model import FloatArray
@@ -69,7 +69,9 @@ def missions_read(length: int, half: int = 0) -> tuple[int, ...]:
     return tuple(sorted({0, 1, length - 1, length, *({half - 1, half} if half else ())} - {-1}))
 
 
-def fly(mission: Mission, node: MissionNode, length: int, run: Fly, half: int = 0, first: BlockRun | None = None) -> Flight:
+def fly(
+    mission: Mission, node: MissionNode, length: int, run: Fly, half: int = 0, first: BlockRun | None = None
+) -> Flight:
     """Fly the blocks from the end of a step, each for `length` missions at once; first: the first block, if known."""
     depth, carried, runs = node.growth.sum(axis=0), node.carried, []
     for place in range(len(mission.blocks)):
@@ -85,7 +87,9 @@ def after(node: MissionNode, flight: Flight) -> MissionNode:
     """The node behind a flight that was flown at once."""
     runs = flight.runs
     mission = node.mission + runs[0].missions[-1]
-    return MissionNode(mission, node.growth + flight.growth, None, responses_of(node.mission, runs), carried=runs[-1].last)
+    return MissionNode(
+        mission, node.growth + flight.growth, None, responses_of(node.mission, runs), carried=runs[-1].last
+    )
 
 
 def take_step(mission: Mission, node: MissionNode, parts: tuple[int, ...], run: Fly) -> Step | Failure:
@@ -126,7 +130,9 @@ def _with_likes(node: MissionNode, flight: Flight) -> MissionNode:
     return MissionNode(node.mission, node.growth, node.half, node.responses, likes, node.error, node.carried)
 
 
-def _extrapolated(mission: Mission, nodes: tuple[MissionNode, MissionNode, MissionNode], whole: Flight, step: Step) -> Step:
+def _extrapolated(
+    mission: Mission, nodes: tuple[MissionNode, MissionNode, MissionNode], whole: Flight, step: Step
+) -> Step:
     """The step in two parts (start, middle, end), extrapolated with the step at once."""
     start, middle, end = nodes
     errors = [n * (n - 1) for n in (middle.mission - start.mission, end.mission - middle.mission)]
