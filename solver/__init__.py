@@ -6,6 +6,7 @@ For use in Python, from this package itself:
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
+- `integrate_mission`: wear over missions, each a list of `Block`, a `MissionHistory`;
 - `tuned`: other limits of the solver for hard cases;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
@@ -14,9 +15,9 @@ unilateral contact through a period), `harmonic_balance` (the DLFT balance and i
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
 transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
-slow time). On top: `forced_response`, `nonlinear_modes`, `wear_history`, `tuning`. On the ground: `model`,
-`model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention,
-the misprints of the paper, and measurements.
+slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `wear_history`,
+`mission_history`, `tuning`. On the ground: `model`, `model_from_matrices`, `settings`, `outcome`, `clock`, `packing`.
+`PHYSICS.md` has the equations in one sign convention, the misprints of the paper, and measurements.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.forced_response import FrequencyResponse, frequency_response
+    from solver.mission_history import integrate_mission
+    from solver.missions.blocks import Block
+    from solver.missions.result import MissionHistory
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
     from solver.nonlinear_modes import Backbone, backbone
@@ -37,7 +41,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Backbone",
+    "Block",
     "FrequencyResponse",
+    "MissionHistory",
     "Outcome",
     "ReducedModel",
     "SolverSettings",
@@ -45,6 +51,7 @@ __all__ = [
     "backbone",
     "build_model",
     "frequency_response",
+    "integrate_mission",
     "march_wear",
     "tuned",
 ]
@@ -52,7 +59,9 @@ __all__ = [
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _PLACES = {
     "Backbone": "nonlinear_modes",
+    "Block": "missions.blocks",
     "FrequencyResponse": "forced_response",
+    "MissionHistory": "missions.result",
     "Outcome": "outcome",
     "ReducedModel": "model",
     "SolverSettings": "settings",
@@ -60,6 +69,7 @@ _PLACES = {
     "backbone": "nonlinear_modes",
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
+    "integrate_mission": "mission_history",
     "march_wear": "wear_history",
     "tuned": "tuning",
 }

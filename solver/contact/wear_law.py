@@ -49,6 +49,7 @@ class WearLaw:
       "flat/cylinder", has the sum of both factors. Empty: factor 1 for each pair.
     - proportional: whether the wear rate is proportional to the wear coefficient, `dW/dt = k_w f(W)`. A history then
       depends on `k_w` times cycles only, and nothing wears at `k_w` = 0.
+    - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
     """
 
     name: str = "archard"
@@ -56,6 +57,7 @@ class WearLaw:
     table: WearTable | None = None
     surfaces: tuple[tuple[str, float], ...] = ()
     proportional: bool = True
+    worn: tuple[float, ...] = ()
 
 
 ARCHARD = WearLaw()
@@ -84,6 +86,7 @@ class WearingWork:
     - pressure (n_p,), Pa, depth (n_d,), m: arguments of the table.
     - table (n_p, n_d): f, 1.
     - area (n_contact,): alpha, m2, for the table alone.
+    - worn (n_contact,): depth at the depth 0 of the history, m, for the table alone; 0 where the table is from 0 on.
     - depth_held: whether derivatives leave out the dependence on the depth.
     """
 
@@ -93,6 +96,7 @@ class WearingWork:
     depth: FloatArray | None = None
     table: FloatArray | None = None
     area: FloatArray | None = None
+    worn: FloatArray | float = 0.0
     depth_held: bool = False
 
     @property
@@ -156,8 +160,9 @@ class WearingWork:
         if self.table is None or self.depth is None:
             return gain * work
         by_depth, _ = self._at_pressure(normal_force)
+        total = before + self.worn
         # y - gain X at the growth y = 0 and at the growths that reach the depths of the table
-        grown = np.maximum(self.depth[None, :] - before[:, None], 0.0)
+        grown = np.maximum(self.depth[None, :] - total[:, None], 0.0)
         there = np.where(grown > 0.0, by_depth, self._at_depth(by_depth, before)[0][:, None])
         steep = gain * work
         grown = np.concatenate([np.zeros((before.size, 1)), grown], axis=1)
@@ -206,7 +211,7 @@ class WearingWork:
     def _at_depth(self, by_depth: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values of rows (n_contact, n_d) at the depths of the pairs, m, and their derivatives, 1/m."""
         assert self.depth is not None
-        place, fraction, width = _between(self.depth, depth)
+        place, fraction, width = _between(self.depth, depth + self.worn)
         pairs = np.arange(depth.size)
         low, high = by_depth[pairs, place], by_depth[pairs, np.minimum(place + 1, len(self.depth) - 1)]
         slope = np.divide(high - low, width, out=np.zeros_like(width), where=width > 0.0)
@@ -251,7 +256,7 @@ def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: 
     least = law.threshold * contact.area if law.name == "threshold" else None
     if law.name != "table" or law.table is None:
         return WearingWork(factor, least)
-    table = law.table
+    table, worn = law.table, np.array(law.worn) if law.worn else 0.0
     return WearingWork(
-        factor, least, np.array(table.pressure), np.array(table.depth), np.array(table.factor), contact.area
+        factor, least, np.array(table.pressure), np.array(table.depth), np.array(table.factor), contact.area, worn
     )

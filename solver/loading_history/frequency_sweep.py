@@ -136,6 +136,26 @@ class FrequencySweep:
         self._begun = state["nodes"] is not None
         self.journal.begin(state["own_results"])
 
+    def go_on_from(self, case: Case, point: PathPoint, frequency: float) -> bool:
+        """Begin at a known state; False where the state is rejected.
+
+        Parameters
+        ----------
+        case
+            Harmonics, samples and penalty of the state.
+        point
+            The state. Its parameter is the frequency, rad/s, or for a ramp its amplitude over that of the sweep.
+        frequency
+            The frequency to which the sweep goes, Hz.
+        """
+        ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
+        origin = find_origin(self.model, frequency, self.sweep)
+        self.origin, self._begun = replace(origin, penalty=case.penalty_omega / (2.0 * np.pi)), True
+        direction = 1.0 if (1.0 if ramp else target) >= point.parameter else -1.0
+        self.nodes = NodeSweep(case, self.excitation_amplitude, direction, target if ramp else None)
+        self.nodes.budget.deadline, self.nodes.budget.tell = self.budget.deadline, self.budget.tell
+        return self.nodes.begin(case, point)
+
     def abandon(self) -> None:
         """Forget the results of a search that an error has ended: what follows begins elsewhere."""
         if self.nodes is not None and (self.nodes.here is not None or self.nodes.saved is not None):

@@ -214,7 +214,7 @@ class NodeSweep:
         while not self.budget.exhausted:
             target = here.parameter + self.direction * length
             if self.path.omega is not None:
-                target = min(target, 1.0)
+                target = min(target, 1.0) if self.direction > 0.0 else max(target, 1.0)
             point = self.path.solve(self.state.nodes, target, self.solver, self.budget, tolerance)
             if point is not None:
                 change = self._change(here, point)

@@ -73,10 +73,12 @@ class AdaptiveSteps:
 
     rtol: relative error of the worn volume.
     bounded: whether a step that moves many times the normal forces is refused.
+    end: cycle count beyond which no step goes; inf for steps that go beyond the last count.
     """
 
     rtol: float
     bounded: bool = True
+    end: float = np.inf
 
     def begin(self, work: WearingJoint, state: WearState) -> WearState:
         """As in `Control`."""
@@ -94,7 +96,7 @@ class AdaptiveSteps:
         The shortest step is half of the accuracy to which the end of a branch is located. Where the vibration changes
         much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there.
         """
-        length = state.length
+        length = min(state.length, self.end - state.cycle)
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
         while True:
             tried = bdf2_attempt(work, state, length)

@@ -19,7 +19,7 @@ from solver.newton.solve_balance import solve_balance
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
-from solver.settings import Scheme, ToTheEnd, WearTarget
+from solver.settings import Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps
@@ -45,6 +45,7 @@ class SlowTime:
     law: part of the slip work that wears.
     until: target of the wear; the history ends with the step that reaches the target. None for no target.
     loops: pairs with reported fretting loops.
+    ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
     """
 
     wear_coefficient: float
@@ -55,6 +56,7 @@ class SlowTime:
     law: WearLaw = ARCHARD
     until: WearTarget | None = None
     loops: tuple[int, ...] = ()
+    ends_at_last: bool = False
 
     @property
     def end(self) -> float:
@@ -76,6 +78,21 @@ class Ended:
     state: WearState | None
     failure: Failure
     output: OutputState
+    iterations: int
+
+
+@packable
+@dataclass(frozen=True)
+class Like:
+    """What a reference solution takes from its history.
+
+    resolutions: cycle count from which on a resolution holds, and this resolution.
+    step_limit: largest stable explicit step of the history, cycles.
+    iterations: Newton iterations of the history.
+    """
+
+    resolutions: tuple[tuple[float, Resolution], ...]
+    step_limit: float
     iterations: int
 
 
@@ -135,7 +152,7 @@ class Solutions:
         counts = None if isinstance(asked.cycles, ToTheEnd) else asked.cycles
         control: Control = GivenSteps(asked.scheme, asked.step, asked.end, asked.largest_depth)
         if smooth:
-            control = AdaptiveSteps(settings.rtol)
+            control = AdaptiveSteps(settings.rtol, end=self._last_step_end(asked.end))
         stop = InSteadyState(asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else AtCount(asked.end)
         shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
         integration = Integration(
@@ -161,23 +178,33 @@ class Solutions:
 
     def reference(self, fine: Ended) -> Ended:
         """Integrate the reference solution of a history, for all counts at which both are compared or read."""
-        course = fine.output.course
         assert fine.state is not None
+        like = Like(fine.output.course.resolutions, fine.state.step_limit, fine.iterations)
+        return self.follow(like, self._compared(fine), fine)
+
+    def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
+        """Integrate the reference solution of a history of which the start state may be another one.
+
+        compared (n,): ascending counts at which it is read, the first 0.
+        fine: the history, to be saved with the progress.
+        """
         assert self.start.state is not None
-        work, compared = self._joint(), self._compared(fine)
-        end = float(compared[-1])
-        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in course.resolutions)
+        work, end = self._joint(), float(compared[-1])
+        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         integration = Integration(
-            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False),
+            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False, end=self._last_step_end(end)),
             PlainCheck(resolutions),
             AtCount(end),
             DenseOutput(work.area, compared, smooth=True),
             lambda progress: self._save(integration, work, progress, fine),
             bounded=False,
-            most_iterations=fine.iterations + WEAR.history_iterations,
+            most_iterations=like.iterations + WEAR.history_iterations,
         )
-        limit = fine.state.step_limit
-        return self._run(integration, work, lambda: begin_reference(work, self.start, limit), end)
+        return self._run(integration, work, lambda: begin_reference(work, self.start, like.step_limit), end)
+
+    def _last_step_end(self, last: float) -> float:
+        """Count beyond which no adaptive step goes; last: last count of the integration."""
+        return last if self.asked.ends_at_last else math.inf
 
     def counts(self, fine: Ended) -> FloatArray:
         """Counts (n_output,) at which the history is read."""

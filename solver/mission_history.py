@@ -1,0 +1,122 @@
+"""The wear of one joint over missions: blocks of vibration in order, flown thousands of times, in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
+from solver.forced_response import check_case, check_number, check_numbers, check_word
+from solver.loading_history.sweep_start import Sweep
+from solver.missions.blocks import Begin, Block, Mission
+from solver.missions.history import integrate_missions
+from solver.missions.result import MissionHistory
+from solver.settings import TARGETS, SolverSettings, WearTarget
+from solver.structure.joint import friction_of_pairs
+
+
+def integrate_mission(
+    blocks: Sequence[Block],
+    wear_coefficient: float,
+    missions: ArrayLike,
+    *,
+    settings: SolverSettings | None = None,
+    law: WearLaw = ARCHARD,
+    until: WearTarget | None = None,
+    sweep: Sweep = "up",
+    largest_step: int | None = None,
+) -> MissionHistory:
+    """Mission history of a joint from its unworn state on: blocks of vibration in order, flown many times.
+
+    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once
+    (`solver.missions.step`). A failure is no exception: `outcome` and `message` of the history give the reason.
+
+    Parameters
+    ----------
+    blocks
+        Blocks in the order in which they are flown; of `solver.Block`.
+    wear_coefficient
+        k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
+    missions
+        Ascending whole numbers of flown missions at which the history is reported, or the last number alone. A missing
+        0 is added.
+    settings
+        The defaults of `SolverSettings` if not given.
+    law
+        The wear law; Archard's law if not given.
+    until
+        Wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its number.
+    sweep
+        Way to the state of the first mission, where its first block continues the last one of the mission before.
+    largest_step
+        Most missions that are flown at once; 1: every mission by itself. By default the error decides.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range; numbers of missions are not whole or do not ascend; there is no block; the blocks
+        do not have equal contact pairs; a block continues another one with another model or friction; a model, friction
+        or law does not fit, see `solver.march_wear`.
+    """
+    settings = SolverSettings() if settings is None else settings
+    check_word("sweep", sweep, get_args(Sweep))
+    if not blocks:
+        raise ValueError("blocks: give at least one block")
+    checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
+    for place, block in enumerate(checked):
+        _check_neighbours(checked[place - 1], block, place)
+    counts = check_numbers("missions", missions, least=0.0)
+    if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
+        raise ValueError("missions: give ascending whole numbers, the last of at least 1")
+    if until is not None:
+        check_word("until.quantity", until.quantity, TARGETS[:2])
+        check_number("until.value", until.value, above=0.0)
+    if largest_step is not None and largest_step != round(check_number("largest_step", largest_step, least=1.0)):
+        raise ValueError(f"largest_step: give a whole number instead of {largest_step:g}")
+    wanted = tuple(sorted({0, *(int(count) for count in counts)}))
+    per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
+    return integrate_missions(
+        Mission(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
+    )
+
+
+def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:
+    """The block with its numbers checked; errors name it by its number and its name."""
+    try:
+        check_word("begin", block.begin, get_args(Begin))
+        frequency = check_number("frequency", block.frequency, above=0.0)
+        cycles = check_number("cycles", block.cycles, above=0.0)
+        load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
+        wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
+        if block.begin == "continue":
+            # the way from another amplitude is a ramp of this one
+            check_number("excitation_amplitude", load, above=0.0)
+    except ValueError as error:
+        raise ValueError(f"{_called(place, block)}: {error}") from error
+    return replace(block, frequency=frequency, cycles=cycles, excitation_amplitude=load, friction_coefficient=friction)
+
+
+def _check_neighbours(before: Block, block: Block, place: int) -> None:
+    """Raises ValueError where a block does not have the pairs of the block before, or cannot continue it."""
+    one, other = before.model.contact, block.model.contact
+    same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
+    if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
+        raise ValueError(f"{_called(place, block)}: model: give equal contact pairs to all blocks")
+    if block.begin != "continue":
+        return
+    if before.excitation_amplitude == 0.0:
+        raise ValueError(f"{_called(place, block)}: begin: the block before does not vibrate: begin with a ramp")
+    rubs = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
+    if before.model is not block.model or (rubs[0] != rubs[1]).any():
+        raise ValueError(
+            f"{_called(place, block)}: begin: continue goes with the model and friction of the block before: give"
+            ' "ramp", "up" or "down"'
+        )
+
+
+def _called(place: int, block: Block) -> str:
+    return f"blocks[{place}]" + (f" ({block.name})" if block.name else "")

@@ -1,0 +1,77 @@
+"""What a mission is: blocks of vibration in order, and how often they are flown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from solver.contact.wear_law import ARCHARD, WearLaw
+from solver.loading_history.sweep_start import Sweep
+from solver.model import FloatArray, ReducedModel
+from solver.settings import SolverSettings, WearTarget
+
+Begin = Literal["ramp", "up", "down", "continue"]
+"""How a block begins: from the static state by a ramp of the excitation or by a sweep, or from the last block."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a mission: steady vibration for a number of cycles.
+
+    - model: the joint, e.g. at the speed of the block. All blocks of a mission have equal contact pairs.
+    - frequency: Hz.
+    - excitation_amplitude: N.
+    - friction_coefficient: one number, (n_contact,) for each pair, or None for the model's own.
+    - cycles: of the block in one mission, above 0.
+    - begin: "ramp", "up" and "down": from the static state of the model with the depths worn so far, as `sweep` of
+      `solver.march_wear`. "continue": from the last state of the block before (before the first block: of the last
+      block of the mission before), whose tangential history is kept. Amplitude and frequency then change slowly, one
+      after the other, the frequency at the smaller of both amplitudes.
+    - name: of the block, for messages.
+    """
+
+    model: ReducedModel
+    frequency: float
+    excitation_amplitude: float
+    friction_coefficient: float | FloatArray | None
+    cycles: float
+    begin: Begin = "ramp"
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Blocks in order, flown a number of times.
+
+    - blocks: in their order, at least one.
+    - wear_coefficient: k_w, 1/Pa.
+    - missions (n_output,): ascending numbers of flown missions at which the history is reported, whole, the first 0.
+    - settings: numerical settings.
+    - law: the wear law.
+    - until: target at which the history ends; "frequency_shift" is no target of missions.
+    - first: how the first mission begins where its first block continues.
+    - largest_step: most missions flown in one step; 1 for every mission by itself.
+    """
+
+    blocks: tuple[Block, ...]
+    wear_coefficient: float
+    missions: tuple[int, ...]
+    settings: SolverSettings
+    law: WearLaw = ARCHARD
+    until: WearTarget | None = None
+    first: Sweep = "up"
+    largest_step: int | None = None
+
+    @property
+    def area(self) -> FloatArray:
+        """Area of the pairs (n_contact,), m2."""
+        return self.blocks[0].model.contact.area
+
+    def continued_by(self, place: int) -> bool:
+        """Whether the block behind a block begins from its last state."""
+        return self.blocks[(place + 1) % len(self.blocks)].begin == "continue"
+
+
+def worn(model: ReducedModel, wear_depth: FloatArray) -> ReducedModel:
+    """The model with depths (n_contact,), m, that open its pairs."""
+    return replace(model, contact=replace(model.contact, gap=model.contact.gap + wear_depth))

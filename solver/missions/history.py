@@ -1,0 +1,188 @@
+"""One mission history: integration over the missions, comparison with the reference solution, outcome."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from solver.accuracy.history_error import Met
+from solver.accuracy.options import ACCURACY
+from solver.missions.blocks import Mission
+from solver.missions.course import MissionCourse
+from solver.missions.one_block import integrate_one_block, is_one_history
+from solver.missions.result import MissionHistory
+from solver.missions.solutions import ENDS_ALL, MissionSolutions
+from solver.model import FloatArray
+from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
+from solver.packing import Packed, unpack
+from solver.results.cut_off import describe_cut_off
+from solver.wear.state import Failure
+
+
+def integrate_missions(
+    mission: Mission, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
+) -> MissionHistory:
+    """Mission history of one point of a study.
+
+    Parameters
+    ----------
+    mission
+        Blocks, counts, settings and wear law.
+    keep
+        Called after each block with the progress.
+    resume
+        Progress, as given to `keep`, of an equal mission, which goes on from there. The result is equal to the last
+        bit, except `run_time`.
+
+    Returns
+    -------
+    MissionHistory
+        The history as far as computed, with its outcome. A history that fails raises no error.
+    """
+    if is_one_history(mission):
+        return integrate_one_block(mission, keep, resume)
+    solutions = MissionSolutions(mission, keep, None if resume is None else unpack(resume))
+    fine = solutions.history()
+    reference = None
+    if len(fine.nodes) > 1 and (fine.failure is None or fine.failure.outcome not in ENDS_ALL):
+        reference = solutions.reference()
+        if reference.failure is not None and reference.failure.outcome in ENDS_ALL:
+            fine = replace(fine, failure=reference.failure)
+    history = _assembled(solutions, fine, reference)
+    if history.outcome is not Outcome.CONVERGED:
+        return history
+    failure = _judged(mission, fine, history)
+    return replace(history, outcome=failure.outcome, message=failure.message)
+
+
+def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> MissionHistory:
+    """The result, from both solutions."""
+    mission, counts = solutions.mission, np.array(solutions.mission.missions, np.float64)
+    area, growth = mission.area, fine.growth_at(counts)
+    depth, volumes = growth.sum(axis=1), growth @ area
+    other = np.full_like(depth, np.nan) if reference is None else reference.growth_at(counts).sum(axis=1)
+    relative, of_pairs = _errors(counts, fine, reference, (depth, other), area)
+    begin, end = fine.responses_at(counts)
+    reached = np.flatnonzero(np.isfinite(relative))
+    failure = fine.failure or Failure(Outcome.CONVERGED)
+    values: dict[str, Any] = {"response_begin": begin, "response_end": end}
+    history = MissionHistory(
+        **values,
+        outcome=failure.outcome,
+        message=failure.message,
+        missions=counts,
+        worn_volume=depth @ area,
+        worn_volume_error=relative,
+        wear_depth=depth,
+        wear_depth_error=of_pairs,
+        block_volume=volumes,
+        reference_volume=other @ area,
+        error_estimate=float(relative[reached[-1]]) if reached.size else math.nan,
+        last_mission=float(fine.ends[-1]),
+        steps=np.diff(fine.ends),
+        missions_to_target=math.nan,
+        missions_to_target_error=math.nan,
+        newton_iterations=fine.iterations + (0 if reference is None else reference.iterations),
+        run_time=solutions.spent,
+    )
+    target = solutions.missions_to_target(fine)
+    if math.isinf(target):
+        return history
+    return replace(
+        history, missions_to_target=target, missions_to_target_error=_target_error(solutions, fine, reference)
+    )
+
+
+def _errors(
+    counts: FloatArray,
+    fine: MissionCourse,
+    reference: MissionCourse | None,
+    depths: tuple[FloatArray, FloatArray],
+    area: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Estimated errors of the volume (n_output,), relative, and of the depths (n_output, n_contact), m.
+
+    counts (n_output,): missions.
+    depths: of history and reference solution at the counts, (n_output, n_contact) each, m.
+    """
+    depth, other = depths
+    volume = depth @ area
+    difference = ACCURACY.history_safety * np.abs(depth - other)
+    ends = fine.ends
+    own = fine.growth_at(ends).sum(axis=1)
+    at_ends = np.full_like(own, np.nan) if reference is None else reference.growth_at(ends).sum(axis=1)
+    met = Met(ends, np.abs(own - at_ends) @ area)
+    error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
+    # the error of the start states remains, even where later states agree by chance
+    error = np.fmax(error, fine.growth_at(counts) @ area @ _start_errors(fine, reference, area))
+    local = np.cumsum([node.error for node in fine.nodes])
+    error = np.fmax(error, local[np.clip(np.searchsorted(ends, counts, "left"), 0, len(local) - 1)])
+    relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    unknown = np.isfinite(volume) & ~np.isfinite(difference).all(axis=1) & (volume > 0.0)
+    relative[unknown] = np.inf
+    relative[~np.isfinite(volume)] = np.nan
+    # the rest of the error of the volume is shared by the pairs in proportion to their depth
+    rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    with np.errstate(invalid="ignore"):
+        of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
+    of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
+    return relative, of_pairs
+
+
+def _start_errors(fine: MissionCourse, reference: MissionCourse | None, area: FloatArray) -> FloatArray:
+    """Relative errors (n_block,) of the wear rates at the starts of the blocks in the first mission."""
+    errors = np.nan_to_num(fine.start_errors, nan=0.0, posinf=np.inf)
+    if reference is None:
+        return errors
+    rates = fine.start_rates @ area
+    apart = np.abs(fine.start_rates - reference.start_rates) @ area
+    difference = np.divide(apart, rates, out=np.zeros_like(rates), where=rates > 0.0)
+    return np.asarray(np.fmax(errors, difference))
+
+
+def _target_error(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> float:
+    """Estimated error of the number of missions to the target: the difference to that of the reference solution.
+
+    At least the error of the volume there, taken at the mean rate of the last step.
+    """
+    at = np.array([solutions.missions_to_target(fine)])
+    if reference is None:
+        return math.inf
+    other = solutions.missions_to_target(reference)
+    depths = fine.growth_at(at).sum(axis=1), reference.growth_at(at).sum(axis=1)
+    relative, _ = _errors(at, fine, reference, depths, solutions.mission.area)
+    before, end = fine.nodes[-2:]
+    worn = [solutions.worn(node.growth) for node in (before, end)]
+    per_mission = (worn[1] - worn[0]) / (end.mission - before.mission)
+    assert solutions.mission.until is not None
+    by_volume = float(relative[0]) * solutions.mission.until.value / per_mission
+    return max(by_volume, ACCURACY.history_safety * abs(other - float(at[0])) if math.isfinite(other) else 0.0)
+
+
+def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:
+    """The outcome of a complete history, and its sentence."""
+    rtol, error = mission.settings.rtol, history.error_estimate
+    remarks = []
+    if not math.isnan(fine.held):
+        remarks.append(
+            f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
+        )
+    if not math.isnan(fine.cut_off):
+        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
+    if error > SENSITIVE_ERROR:
+        volumes = [
+            1e9 * float(values[np.isfinite(history.worn_volume)][-1])
+            for values in (history.worn_volume, history.reference_volume)
+        ]
+        said = f"worn volume {volumes[0]:.3g} mm3, but {volumes[1]:.3g} mm3 in coarser steps"
+        return Failure(Outcome.SENSITIVE, "; ".join((said, *remarks)))
+    worst = int(np.argmax(fine.inaccurate))
+    if fine.inaccurate[worst] > 0.0:
+        name = mission.blocks[worst].name or f"block {worst + 1}"
+        said = f"in {name} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
+        return Failure(Outcome.INACCURATE, "; ".join((said, *remarks)))
+    return Failure(Outcome.CONVERGED, "; ".join(remarks))

@@ -1,0 +1,81 @@
+"""A mission of one block whose tangential history is carried on: one wear history over all its cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.loading_history.start_states import follow_branch
+from solver.loading_history.sweep_start import Sweep
+from solver.missions.blocks import Mission
+from solver.missions.result import MissionHistory
+from solver.packing import Packed
+from solver.results.history import WearHistory
+from solver.wear.history import integrate_wear
+from solver.wear.solutions import SlowTime
+
+
+def is_one_history(mission: Mission) -> bool:
+    """Whether a mission history is one wear history."""
+    block = mission.blocks[0]
+    return len(mission.blocks) == 1 and (block.begin == "continue" or mission.missions[-1] == 1)
+
+
+def integrate_one_block(
+    mission: Mission, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
+) -> MissionHistory:
+    """The wear history of the only block, read at its missions; arguments as of `integrate_missions`."""
+    (block,) = mission.blocks
+    sweep: Sweep = mission.first if block.begin == "continue" else block.begin
+    _, start = next(
+        follow_branch(
+            block.model,
+            block.friction_coefficient,
+            block.excitation_amplitude,
+            np.array([block.frequency]),
+            sweep,
+            mission.settings,
+        )
+    )
+    ends = np.array(mission.missions, np.float64)
+    begins = np.clip(ends - 1.0, 0.0, None)
+    read = np.unique(np.concatenate([ends, begins, begins + 1.0]))
+    asked = SlowTime(mission.wear_coefficient, "adaptive", block.cycles * read, law=mission.law, until=mission.until)
+    history = integrate_wear(block.model, block.friction_coefficient, mission.settings, start, asked, keep, resume)
+    rows, of_begins = np.searchsorted(read, ends), np.searchsorted(read, begins)
+    return _as_missions(history, ends, block.cycles, rows, (of_begins, np.searchsorted(read, begins + 1.0)))
+
+
+def _as_missions(
+    history: WearHistory, ends: np.ndarray, cycles: float, rows: np.ndarray, mission_rows: tuple[np.ndarray, np.ndarray]
+) -> MissionHistory:
+    """A wear history in missions. rows: of the missions; mission_rows: of begin and end of the missions before."""
+    target = history.cycles_to_target / cycles
+    volume, error = history.worn_volume[rows], history.worn_volume_error[rows]
+    reached = np.flatnonzero(np.isfinite(error))
+    at_rate = history.wear_rate[rows[reached[-1]]] * cycles if reached.size else np.nan
+    begin, end = (history.response[at][:, None] for at in mission_rows)
+    begin[~np.isfinite(volume)] = end[~np.isfinite(volume)] = np.nan
+    return MissionHistory(
+        outcome=history.outcome,
+        message=history.message,
+        missions=ends,
+        worn_volume=volume,
+        worn_volume_error=error,
+        wear_depth=history.wear_depth[rows],
+        wear_depth_error=history.wear_depth_error[rows],
+        block_volume=volume[:, None],
+        response_begin=begin,
+        response_end=end,
+        reference_volume=history.reference_volume[rows],
+        error_estimate=history.error_estimate,
+        last_mission=history.last_cycle / cycles,
+        steps=np.array([history.last_cycle / cycles]),
+        missions_to_target=target,
+        missions_to_target_error=float(error[reached[-1]] * volume[reached[-1]] / at_rate)
+        if target == target
+        else np.nan,
+        newton_iterations=history.newton_iterations,
+        run_time=history.run_time,
+    )
