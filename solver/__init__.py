@@ -7,6 +7,10 @@ For use in Python, from this package itself:
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
 - `integrate_mission`: wear over missions, each a list of `Block`, a `MissionHistory`;
+- `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
+  multipliers, a `ResponseCurve`;
+- `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, and all Fourier
+  coefficients and time signals of a state as a `PeriodicMotion`;
 - `tuned`: other limits of the solver for hard cases;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
@@ -16,8 +20,9 @@ linear solvers, preconditioners), `stability`, `continuation` (natural and arc l
 transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
 slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `wear_history`,
-`mission_history`, `tuning`. On the ground: `model`, `model_from_matrices`, `settings`, `outcome`, `clock`, `packing`.
-`PHYSICS.md` has the equations in one sign convention, the misprints of the paper, and measurements.
+`mission_history`, `balance_functions`, `whole_response`, `tuning`. On the ground: `model`, `model_from_matrices`,
+`settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention, the misprints of the
+paper, and measurements.
 """
 
 from __future__ import annotations
@@ -26,6 +31,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from solver.balance_functions import HarmonicBalance, balance_of
     from solver.forced_response import FrequencyResponse, frequency_response
     from solver.mission_history import integrate_mission
     from solver.missions.blocks import Block
@@ -35,24 +41,31 @@ if TYPE_CHECKING:
     from solver.nonlinear_modes import Backbone, backbone
     from solver.outcome import Outcome
     from solver.results.history import WearHistory
+    from solver.results.periodic_motion import PeriodicMotion
     from solver.settings import SolverSettings
     from solver.tuning import tuned
     from solver.wear_history import march_wear
+    from solver.whole_response import ResponseCurve, response_curve
 
 __all__ = [
     "Backbone",
     "Block",
     "FrequencyResponse",
+    "HarmonicBalance",
     "MissionHistory",
     "Outcome",
+    "PeriodicMotion",
     "ReducedModel",
+    "ResponseCurve",
     "SolverSettings",
     "WearHistory",
     "backbone",
+    "balance_of",
     "build_model",
     "frequency_response",
     "integrate_mission",
     "march_wear",
+    "response_curve",
     "tuned",
 ]
 
@@ -61,16 +74,21 @@ _PLACES = {
     "Backbone": "nonlinear_modes",
     "Block": "missions.blocks",
     "FrequencyResponse": "forced_response",
+    "HarmonicBalance": "balance_functions",
     "MissionHistory": "missions.result",
     "Outcome": "outcome",
+    "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
+    "ResponseCurve": "whole_response",
     "SolverSettings": "settings",
     "WearHistory": "results.history",
     "backbone": "nonlinear_modes",
+    "balance_of": "balance_functions",
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
     "integrate_mission": "mission_history",
     "march_wear": "wear_history",
+    "response_curve": "whole_response",
     "tuned": "tuning",
 }
 

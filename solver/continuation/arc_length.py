@@ -74,9 +74,7 @@ def follow_arc(
         branch has then lost its stability otherwise than at a fold, and no slow change leads to its later states.
     """
     toward = toward or float(np.sign(target - start.parameter)) or 1.0
-    arc = _Arc(
-        balance_at, start.history, solver, max(float(np.linalg.norm(start.evaluation.predicted_h)), 1e-300), span
-    )
+    arc = Arc(balance_at, start.history, solver, max(float(np.linalg.norm(start.evaluation.predicted_h)), 1e-300), span)
     path = [arc.place(start.parameter, start.evaluation)]
     points = [start]
     direction = np.zeros(path[0].size)
@@ -92,8 +90,7 @@ def follow_arc(
         if tangent is None:
             break
         tangent = tangent * (np.sign(tangent @ direction) or 1.0)
-        reached, tried, length = arc.advance(point, tangent, length, left, tolerance, budget)
-        left -= tried
+        reached, length, left = arc.advance(point, tangent, length, tolerance, budget, left)
         if reached is None:
             break
         if len(points) == 1 and (reached.parameter - point.parameter) * toward < 0.0:
@@ -148,7 +145,7 @@ class _Corrected:
 
 
 @dataclass
-class _Arc:
+class Arc:
     """Arc-length steps in the scaled unknowns (p / size, parameter / span). The tangential history is held."""
 
     balance_at: BalanceAt
@@ -181,6 +178,19 @@ class _Arc:
         # near a fold the square of the step may overflow, although its direction is right
         tangent /= largest
         return np.asarray(tangent / np.linalg.norm(tangent))
+
+    def advance(
+        self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, budget: Budget, left: int
+    ) -> tuple[PathPoint | None, float, int]:
+        """The next point, None where none is found; the length of the step after it; correctors left of `left`."""
+        reached = None
+        while reached is None and length > CONTINUATION.shortest_arc and left > 0:
+            reached = self.step(point, tangent, length, tolerance, budget)
+            left -= 1
+            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
+        if reached is None:
+            reached = self.step_over_corner(point, tangent, tolerance, budget)
+        return reached, length, left
 
     def step(
         self, point: PathPoint, tangent: FloatArray, length: float, tolerance: float, budget: Budget
@@ -226,22 +236,6 @@ class _Arc:
             change = (ahead - tangent[:-1] @ held) / pivot
             unknown = unknown - np.append(held - change * moved, change)
         return _Corrected(False, unknown, CONTINUATION.near_iterations)
-
-    def advance(
-        self, point: PathPoint, tangent: FloatArray, length: float, most: int, tolerance: float, budget: Budget
-    ) -> tuple[PathPoint | None, int, float]:
-        """Next point of the branch, or None, the number of correctors, and the length of the next step.
-
-        The length is halved until the corrector converges, at most `most` times. Then a corner is tried.
-        """
-        reached, tried = None, 0
-        while reached is None and length > CONTINUATION.shortest_arc and tried < most:
-            reached = self.step(point, tangent, length, tolerance, budget)
-            tried += 1
-            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
-        if reached is None:
-            reached = self.step_over_corner(point, tangent, tolerance, budget)
-        return reached, tried, length
 
     def step_over_corner(
         self, point: PathPoint, tangent: FloatArray, tolerance: float, budget: Budget

@@ -111,14 +111,14 @@ def find_instability(
         return None
     linear = joint.model.linear[0]
     small = int(moving(joint, stuck).sum()) <= NEWTON.small_joint_displacements
-    if not (every or (small and _opens_and_closes(at))):
+    if not (every or (small and opens_and_closes(at))):
         return None
     if small:
-        sharper = _sharper(case, joint, at, budget)
-        if sharper is None and not _is_driven(joint):
+        finer = sharper(case, joint, at, budget)
+        if finer is None and not _is_driven(joint):
             return None
-        joint, at = sharper or (joint, at)
-    n_samples = _samples(joint, linear, (stuck, stuck | switching), small)
+        joint, at = finer or (joint, at)
+    n_samples = march_samples(joint, linear, (stuck, stuck | switching), small)
     first = multipliers_of(build_monodromy(joint, linear, at, n_samples), small)
     if _judge(first, 0.0, joint) is None:
         return None
@@ -128,9 +128,9 @@ def find_instability(
     return _judge(second, 2.0 * error, joint)
 
 
-def _sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
+def sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
     """The state with enough harmonics for a joint that opens and closes; None where no such state is found."""
-    if case.resolution.highest >= STABILITY.opening_harmonics or not _opens_and_closes(at):
+    if case.resolution.highest >= STABILITY.opening_harmonics or not opens_and_closes(at):
         return joint, at
     samples = max(case.resolution.samples, samples_for(STABILITY.opening_harmonics))
     sharp = case.at(Resolution(all_orders(STABILITY.opening_harmonics), samples))
@@ -139,7 +139,8 @@ def _sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[
     return None if moved is None else (finer, moved.evaluation)
 
 
-def _opens_and_closes(at: Evaluation) -> bool:
+def opens_and_closes(at: Evaluation) -> bool:
+    """Whether a pair is open in a part of the period."""
     opens = at.status_t == SEPARATED
     return bool((opens.any(axis=1) & ~opens.all(axis=1)).any())
 
@@ -191,7 +192,7 @@ def moving(joint: Joint, held: BoolArray) -> BoolArray:
     return moves
 
 
-def _samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], small: bool) -> int:
+def march_samples(joint: Joint, linear: LinearModel, held: tuple[BoolArray, ...], small: bool) -> int:
     """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
     rates = [np.abs(growing_exponents(linear, moving(joint, pairs)).imag) for pairs in held]
     fastest = max((float(of.max(initial=0.0)) for of in rates), default=0.0) / joint.omega
@@ -228,13 +229,16 @@ def _is_semidefinite(matrix: Matrix) -> bool:
 
 @lru_cache(maxsize=4)
 def _growing(of: Identity, moves: bytes) -> ComplexArray:
-    linear, chosen = cast("LinearModel", of.objects[0]), np.frombuffer(moves, bool)
-    mass, damping, stiffness = (
-        part[np.ix_(chosen, chosen)] for part in (linear.mass, linear.damping, linear.stiffness)
-    )
+    found = exponents(cast("LinearModel", of.objects[0]), np.frombuffer(moves, bool))
+    return found[found.real > 0.0]
+
+
+def exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
+    """Exponents sigma, 1/s, of all motions exp(sigma t) of a linear structure; moves: as in `growing_exponents`."""
+    mass, damping, stiffness = (part[np.ix_(moves, moves)] for part in (linear.mass, linear.damping, linear.stiffness))
     eye, none = np.eye(len(mass)), np.zeros_like(stiffness)
     # (0 1; -K -C) (y; v) = sigma (1 0; 0 M) (y; v): a displacement without mass has an infinite exponent
     left = np.block([[none, eye], [-stiffness, -damping]])
     right = np.block([[eye, none], [none, mass]])
     found = eigvals(left, right)
-    return np.asarray(found[np.isfinite(found) & (found.real > 0.0)], np.complex128)
+    return np.asarray(found[np.isfinite(found)], np.complex128)

@@ -1,0 +1,200 @@
+"""A whole response curve of a joint, over frequency or excitation amplitude: folds, unstable parts, multipliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.accuracy.refinement import refine
+from solver.balance_functions import HarmonicBalance, balance_at_start, functions_of, start_of
+from solver.continuation.options import CONTINUATION
+from solver.continuation.whole_curve import Branch, follow_branch_whole
+from solver.forced_response import check_case, check_number, check_numbers, worn_model
+from solver.harmonic_balance.converged import BalanceAt, PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.response_peak import largest_responses
+from solver.loading_history.sweep_start import Sweep
+from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Budget
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.stability.hill import is_stable
+from solver.stability.multipliers import Multipliers, Stability, find_multipliers
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, Joint
+
+_LEAST_PART = 0.1  # of the first value: how far a curve may turn back
+_FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
+
+
+@dataclass(frozen=True)
+class ResponseCurve:
+    """Periodic states along a curve, `n_points` of them in the order of the curve, unstable ones included.
+
+    - parameter: "frequency" or "excitation_amplitude", which changes along the curve; the other one is constant.
+    - frequency, excitation_amplitude (n_points,): Hz, N.
+    - response (n_points, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
+    - response_peak (n_points, n_response): largest magnitude over a period, m.
+    - response_error (n_points,): estimated relative error by harmonics and samples; inf where unknown, as beside
+      folds; NaN where not asked for.
+    - is_fold (n_points,): points at which the parameter turns.
+    - stability: of each point "stable"; "fold", "period doubling" or "Neimark-Sacker" by the disturbance that grows;
+      "unknown" where no multipliers are computed, see `solver.stability.multipliers`.
+    - multipliers: Floquet multipliers of each point, largest modulus first; the largest ones only of a large joint;
+      none where unknown. Those of a small joint with impacts belong to a state with at least 19 harmonics.
+    - multiplier_error (n_points,): estimated error of the first multiplier by time steps; inf where unknown.
+    - exponents: Hill's (Floquet) exponents of each point, 1/s.
+    - outcome, message: CONVERGED where the curve comes to the last value; BRANCH_LOST where not, and how far.
+    """
+
+    parameter: Literal["frequency", "excitation_amplitude"]
+    frequency: FloatArray
+    excitation_amplitude: FloatArray
+    response: ComplexArray
+    response_peak: FloatArray
+    response_error: FloatArray
+    is_fold: BoolArray
+    stability: tuple[Stability, ...]
+    multipliers: tuple[ComplexArray, ...]
+    multiplier_error: FloatArray
+    outcome: Outcome
+    message: str
+    _balances: tuple[HarmonicBalance, ...] = field(repr=False, compare=False)
+
+    @property
+    def exponents(self) -> tuple[ComplexArray, ...]:
+        """Exponents of each point, 1/s: ln(multiplier) over the period; imaginary parts within half the frequency."""
+        pairs = zip(self.multipliers, self.frequency.tolist(), strict=True)
+        with np.errstate(divide="ignore"):
+            return tuple(np.log(values) * frequency for values, frequency in pairs)
+
+    def balance(self, index: int) -> HarmonicBalance:
+        """Residual, Jacobian, Fourier coefficients and time signals of a point."""
+        return self._balances[index]
+
+
+def response_curve(
+    model: ReducedModel,
+    frequency: ArrayLike,
+    excitation_amplitude: ArrayLike,
+    friction_coefficient: ArrayLike | None,
+    *,
+    settings: SolverSettings | None = None,
+    wear_depth: ArrayLike | None = None,
+    most_points: int = 1000,
+    errors: bool = True,
+) -> ResponseCurve:
+    """The curve of periodic states from one frequency, or one excitation amplitude, to another, through all folds.
+
+    A curve may turn back behind its first value before it comes to the last one, by as much as both are apart.
+    The first state is that of `frequency_response`: swept "up" to the lower or "down" to the upper frequency; for a
+    curve over the amplitude a "ramp". From there arc length follows the curve. Harmonics, samples and the tangential
+    history of the pairs are those of the first state: a slow sweep of a machine, which leaves a history of its own at
+    each frequency, and which jumps at folds, is `frequency_response`.
+
+    Parameters
+    ----------
+    model, friction_coefficient, settings, wear_depth
+        As in `frequency_response`. Best give harmonics in the settings: the first state may need fewer than others.
+    frequency, excitation_amplitude
+        One number for one of them, Hz or N, and two for the other one: first and last value.
+    most_points
+        Largest number of points.
+    errors
+        False leaves out `response_error`, which takes most of the time.
+
+    Raises
+    ------
+    ValueError
+        As in `frequency_response`; not one number and two numbers; two equal numbers.
+    """
+    settings = SolverSettings() if settings is None else settings
+    omegas = 2.0 * np.pi * check_numbers("frequency", frequency, above=0.0)
+    loads = check_numbers("excitation_amplitude", excitation_amplitude, least=0.0)
+    over_frequency = omegas.size == 2
+    if sorted((omegas.size, loads.size)) != [1, 2]:
+        raise ValueError("frequency, excitation_amplitude: give one number for one of them, two for the other one")
+    first, last = (omegas if over_frequency else loads).tolist()
+    if first == last:
+        raise ValueError("frequency, excitation_amplitude: give two different numbers as first and last value")
+    most = int(check_number("most_points", most_points, least=2.0))
+    sweep: Sweep = ("up" if first < last else "down") if over_frequency else "ramp"
+    load, friction = check_case(model, loads[0], friction_coefficient, sweep, settings)
+    worn = worn_model(model, wear_depth)
+    start, case = start_of(worn, friction, load, float(omegas[0]) / (2.0 * np.pi), sweep, settings)
+    balance, at = balance_at_start(case, start, float(omegas[0]), load)
+
+    def balance_at(value: float, history: FloatArray) -> Balance:
+        joint = case.joint(value, load) if over_frequency else case.joint(float(omegas[0]), value)
+        return Balance.frozen(joint, history, balance.wear_depth)
+
+    if at is None or not start.outcome.complete:
+        return _reported(case, Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
+    begin = PathPoint(float(first), at, balance.history)
+    # a branch may turn back behind its start before it comes to the last value
+    back = max(2.0 * first - last, _LEAST_PART * first)
+    span = abs(last - first) / (CONTINUATION.longest_arc * _FEWEST_STEPS)
+    branch = follow_branch_whole(balance_at, begin, last, back, span, settings.tolerance, Budget(), most)
+    return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))
+
+
+def _end(branch: Branch, most: int, over_frequency: bool) -> tuple[Outcome, str]:
+    """Outcome of a curve, and the sentence of one that does not come to its last value."""
+    if branch.arrived:
+        return Outcome.CONVERGED, ""
+    value, unit = branch.points[-1].parameter, "N"
+    if over_frequency:
+        value, unit = value / (2.0 * np.pi), "Hz"
+    if branch.returned:
+        return Outcome.BRANCH_LOST, f"the curve turns back as far as {value:.6g} {unit}: begin farther away"
+    if len(branch.points) >= most:
+        return Outcome.BRANCH_LOST, f"the curve has most_points = {most} points up to {value:.6g} {unit}: give more"
+    return Outcome.BRANCH_LOST, f"the curve was followed up to {value:.6g} {unit}: more harmonics or samples may help"
+
+
+def _error(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> float:
+    """Estimated relative error of the response of a point; inf where no state with other harmonics is found."""
+    found = refine(case, joint.omega, joint.excitation_amplitude, point, budget).estimate.response
+    return found if np.isfinite(found) else np.inf
+
+
+def _reported(
+    case: Case, branch: Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool, end: tuple[Outcome, str]
+) -> ResponseCurve:
+    """The curve of a branch, each point with its error and multipliers."""
+    n_response, n_points = len(case.model.linear[0].response), len(branch.points)
+    response = np.empty((n_points, n_response), np.complex128)
+    peak, error = np.empty((n_points, n_response)), np.empty(n_points)
+    found: list[Multipliers] = []
+    stability: list[Stability] = []
+    balances: list[HarmonicBalance] = []
+    for index, point in enumerate(branch.points):
+        balance, at = balance_at(point.parameter, point.history), point.evaluation
+        joint, budget = balance.joint, Budget()
+        response[index] = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+        peak[index] = largest_responses(joint, at)
+        error[index] = _error(case, joint, point, budget) if errors else np.nan
+        found.append(find_multipliers(case, joint, at, budget))
+        stability.append(found[-1].stability(odd=not is_stable(balance.linearise(at), JacobianSolver())))
+        balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
+    is_fold = np.zeros(n_points, bool)
+    is_fold[list(branch.folds)] = True
+    return ResponseCurve(
+        parameter="frequency" if over_frequency else "excitation_amplitude",
+        frequency=np.array([each.frequency for each in balances]),
+        excitation_amplitude=np.array([each.excitation_amplitude for each in balances]),
+        response=response,
+        response_peak=peak,
+        response_error=error,
+        is_fold=is_fold,
+        stability=tuple(stability),
+        multipliers=tuple(each.values for each in found),
+        multiplier_error=np.array([each.error for each in found]),
+        outcome=end[0],
+        message=end[1],
+        _balances=tuple(balances),
+    )

@@ -1,0 +1,256 @@
+"""Whole response curves, and balances as functions: against finite differences, exact motions and each other."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+
+from solver import (
+    HarmonicBalance,
+    Outcome,
+    ResponseCurve,
+    SolverSettings,
+    balance_of,
+    frequency_response,
+    response_curve,
+)
+from solver.stability.multipliers import Multipliers
+from tests.event_driven import Orbit, close_orbit
+from tests.references import vibro_impact_orbit
+from tests.solver.models import OMEGA, cyclic_model, random_model, scene
+from tests.solver.test_natural import GRAZING, WALL_OMEGA
+
+SETTINGS = SolverSettings(harmonics=19, samples=256)
+WALL = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)  # mass, damping, stiffness, force, wall and gap of the vibro-impact scene
+
+
+@lru_cache
+def wall_curve() -> ResponseCurve:
+    """From the branch with impacts at 0.2 Hz through both folds to the one without impacts at 0.26 Hz."""
+    return response_curve(scene("vibro_impact"), (0.2, 0.26), 0.02, 0.0, settings=SETTINGS, errors=False)
+
+
+@lru_cache
+def slipping() -> HarmonicBalance:
+    """A random structure whose pairs stick, slip and open."""
+    model = random_model(3, ("3d", "one_tangent", "constant_load"))
+    return balance_of(model, OMEGA / (2.0 * np.pi), 150.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
+
+
+def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
+    balance = slipping()
+    assert set(np.unique(balance.motion().status_t)) >= {1, 2}
+    exact = balance.jacobian(balance.state)
+    random = np.random.default_rng(0)
+    size = 1e-5 * np.abs(balance.state).mean()
+    for _ in range(5):
+        step = size * random.normal(size=balance.size)
+        ahead, back = (balance.residual(balance.state + sign * step) for sign in (1.0, -1.0))
+        assert np.linalg.norm(0.5 * (ahead - back) - exact @ step) < 1e-4 * np.linalg.norm(exact @ step)
+
+
+def test_any_root_finder_comes_to_the_state() -> None:
+    balance = slipping()
+    assert balance.outcome is Outcome.CONVERGED
+    assert balance.motion().residual < 1e-8
+    away = balance.state * (1.0 + 1e-3 * np.random.default_rng(1).normal(size=balance.size))
+    found = root(balance.residual, away, jac=balance.jacobian)
+    assert found.success
+    np.testing.assert_allclose(found.x, balance.state, atol=1e-6 * np.abs(balance.state).max())
+
+
+@pytest.mark.parametrize("kind", ["random", "travelling wave"])
+def test_all_coefficients_obey_the_equation_of_motion(kind: str) -> None:
+    if kind == "random":
+        balance, model = slipping(), random_model(3, ("3d", "one_tangent", "constant_load"))
+    else:
+        model = cyclic_model(3, ("3d", "3d"), 7, 5)
+        balance = balance_of(model, OMEGA / (2.0 * np.pi), 40.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
+    motion, dofs = balance.motion(), model.contact.dofs
+    for place, order in enumerate(motion.orders.tolist()):
+        linear, folded = model.harmonic_structure(order)
+        mass, damping, stiffness, harmonic = (
+            np.conj(part) if folded else part
+            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic)
+        )
+        if order == 0:
+            stiffness = stiffness.real
+        rate = 2j * np.pi * order * motion.frequency
+        load = {0: linear.load_static, 1: motion.excitation_amplitude * harmonic}.get(order, 0.0 * linear.load_static)
+        force = np.zeros(len(mass), complex)
+        force[dofs[dofs >= 0]] = motion.contact_force[:, :, place][dofs >= 0]
+        moved = (rate**2 * mass + rate * damping + stiffness) @ motion.displacement[:, place]
+        assert np.linalg.norm(moved + force - load) < 1e-6 * np.linalg.norm(moved - load + abs(force)), order
+        np.testing.assert_allclose(
+            motion.relative_displacement[:, :, place][dofs >= 0], motion.displacement[dofs[dofs >= 0], place]
+        )
+    phase = 2.0 * np.pi * motion.frequency * np.multiply.outer(motion.orders, motion.time)
+    np.testing.assert_allclose(
+        motion.displacement_t,
+        (motion.displacement @ np.exp(1j * phase)).real,
+        atol=1e-12 * abs(motion.displacement).max(),
+    )
+    assert abs(motion.contact_force_t[:, 1:]).max() > 0.0
+    assert (motion.contact_force_t[:, 0] >= 0.0).all()
+
+
+def exact_orbit(curve: ResponseCurve, index: int) -> Orbit:
+    """The exact motion next to a point of the curve."""
+    motion = curve.balance(index).motion()
+    omega = 2.0 * np.pi * motion.frequency
+    system = vibro_impact_orbit(*WALL, omega, sweep="down").system
+    y = np.array([motion.displacement_t[1, 0], motion.velocity_t[1, 0]])
+    found = close_orbit(system, "closed" if y[0] > WALL[-1] else "open", y)
+    assert found is not None
+    return found
+
+
+def multipliers_of(orbit: Orbit) -> np.ndarray:
+    """Multipliers of an exact motion, by differences of its period map."""
+    y, name, system = orbit.segments[0].start, orbit.segments[0].phase, orbit.system
+    columns = []
+    for place in range(2):
+        step = 1e-7 * np.eye(y.size)[place]
+        ends = [system.advance(system.phase_at(name, y + s), y + s, system.period)[1] for s in (step, -step)]
+        columns.append((ends[0] - ends[1])[:2] / 2e-7)
+    found = np.linalg.eigvals(np.array(columns).T)
+    return found[np.lexsort((-found.imag, -abs(found)))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("unstable", [False, True])
+def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(unstable: bool) -> None:
+    curve = wall_curve()
+    upper, lower = np.flatnonzero(curve.is_fold)
+    index = (upper + lower) // 2 if unstable else 0
+    orbit = exact_orbit(curve, index)
+    assert abs(curve.response[index, 0]) == pytest.approx(abs(orbit.harmonic(0)), rel=5e-3)
+    np.testing.assert_allclose(curve.multipliers[index], multipliers_of(orbit), atol=0.03)
+    assert curve.stability[index] == ("fold" if unstable else "stable")
+    np.testing.assert_allclose(
+        np.exp(curve.exponents[index] / curve.frequency[index]), curve.multipliers[index], rtol=1e-12
+    )
+
+
+@pytest.mark.slow
+def test_a_multiplier_passes_one_at_the_fold() -> None:
+    curve = wall_curve()
+    assert curve.outcome is Outcome.CONVERGED
+    assert curve.frequency[-1] == pytest.approx(0.26, rel=1e-12)
+    upper, lower = np.flatnonzero(curve.is_fold)
+    assert curve.frequency[upper] == pytest.approx(0.2479, rel=2e-3)
+    assert curve.multipliers[upper][0].real == pytest.approx(1.0, abs=0.02)
+    assert set(curve.stability[: upper - 1]) == {"stable"}
+    assert set(curve.stability[upper + 2 : lower]) == {"fold"}
+    assert set(curve.stability[lower + 1 :]) == {"stable"}
+    # the mass without wall moves by the gap: |1 - w^2 + 0.05 i w| = 0.2
+    exact = np.sqrt(max(np.roots([1.0, 0.0025 - 2.0, 1.0 - 0.04]).real)) / (2.0 * np.pi)
+    assert curve.frequency[lower] == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall() -> None:
+    at, settings = WALL_OMEGA / (2.0 * np.pi), SolverSettings(harmonics=5, samples=64)
+    found = response_curve(scene("vibro_impact"), at, (0.03, 0.06), 0.0, settings=settings, errors=False)
+    assert found.outcome is Outcome.CONVERGED
+    assert found.excitation_amplitude[-1] == 0.06
+    first, second = np.flatnonzero(found.is_fold)
+    assert found.excitation_amplitude[first] == pytest.approx(GRAZING, rel=2e-3)
+    assert found.excitation_amplitude[second] < 0.02
+    # beside the fold five harmonics may be too few to tell
+    assert set(found.stability[: first - 3]) == {"stable"}
+    assert set(found.stability[first + 1 : second]) == {"fold"}
+
+
+@pytest.mark.slow
+def test_both_parameters_lead_to_the_same_states() -> None:
+    slider, settings = scene("sdof_slider", damping=2.0), SolverSettings(harmonics=5, samples=64)
+    by_frequency = response_curve(slider, (145.0, 150.0), 10.0, 0.5, settings=settings)
+    by_amplitude = response_curve(slider, 150.0, (8.0, 10.0), 0.5, settings=settings, errors=False)
+    swept = frequency_response(slider, 150.0, 10.0, 0.5, settings=settings)
+    for curve in (by_frequency, by_amplitude):
+        assert curve.outcome is Outcome.CONVERGED
+        assert curve.response[-1] == pytest.approx(swept.response[0], rel=1e-6)
+        assert set(curve.stability) == {"stable"}
+    assert (by_frequency.response_error < 0.02).all()
+    assert np.isnan(by_amplitude.response_error).all()
+
+
+@pytest.mark.slow
+def test_on_unstable_branches_as_well() -> None:
+    """Over the amplitude the unstable branch passes the one over the frequency at 0.02 N."""
+    model, settings = scene("vibro_impact"), SolverSettings(harmonics=7, samples=128)
+    frequency = response_curve(model, (0.215, 0.26), 0.02, 0.0, settings=settings, errors=False)
+    amplitude = response_curve(model, 0.24, (0.02, 0.14), 0.0, settings=settings, errors=False)
+    seen = [crossings(frequency, frequency.frequency, 0.24), crossings(amplitude, amplitude.excitation_amplitude, 0.02)]
+    # both begin or end at the branch without impacts
+    np.testing.assert_allclose(sorted(seen[0]), sorted(seen[1]), rtol=1e-3)
+    assert len(seen[0]) == 3
+
+
+def crossings(curve: ResponseCurve, parameter: np.ndarray, value: float) -> list[float]:
+    """Responses at which a curve passes a value of its parameter, by cubic interpolation."""
+    passed = np.flatnonzero((parameter[:-1] - value) * (parameter[1:] - value) <= 0.0)
+    found = []
+    for at in passed.tolist():
+        near = slice(max(at - 1, 0), at + 3)
+        found.append(float(np.polyfit(parameter[near] - value, abs(curve.response[near, 0]), 3 if at else 2)[-1]))
+    return found
+
+
+@pytest.mark.slow
+def test_a_joint_that_bounces_doubles_its_period() -> None:
+    curve = response_curve(scene("vibro_impact"), (0.146, 0.148), 0.02, 0.0, settings=SETTINGS, errors=False)
+    assert curve.stability == ()
+    assert curve.outcome is Outcome.PERIOD_DOUBLED
+    curve = response_curve(scene("vibro_impact"), (0.156, 0.146), 0.02, 0.0, settings=SETTINGS, errors=False)
+    assert curve.stability[0] == "stable"
+    assert curve.stability[-1] == "period doubling"
+    assert curve.multipliers[-1][0].real < -1.0
+
+
+def test_multipliers_name_the_kind_of_stability() -> None:
+    for values, odd, kind in (
+        ([0.9], False, "stable"),
+        ([0.9], True, "fold"),
+        ([1.2], False, "fold"),
+        ([-1.2], False, "period doubling"),
+        ([1j, 0.2], False, "stable"),
+        ([1.1j, -1.1j], False, "Neimark-Sacker"),
+        ([], False, "unknown"),
+    ):
+        assert Multipliers(np.array(values, complex), 0.0).stability(odd) == kind
+    assert Multipliers(np.array([1.2 + 0j]), 0.3).stability(False) == "stable"
+
+
+def test_curves_and_balances_without_a_state_say_why() -> None:
+    model = scene("vibro_impact")
+    curve = response_curve(model, (0.2, 0.26), 0.02, 0.0, settings=SETTINGS, errors=False, most_points=4)
+    assert curve.outcome is Outcome.BRANCH_LOST
+    assert "most_points = 4" in curve.message
+    doubled = balance_of(model, 0.146, 0.02, 0.0, settings=SETTINGS)
+    assert doubled.outcome is Outcome.PERIOD_DOUBLED
+    assert np.isnan(doubled.state).all()
+    assert doubled.message
+    assert np.isfinite(doubled.residual(np.zeros(doubled.size))).all()
+
+
+def test_wrong_arguments_are_named() -> None:
+    model, settings = scene("vibro_impact"), SolverSettings(harmonics=3)
+    for frequency, amplitude, said in (
+        (0.2, 0.02, "one number for one of them, two for the other one"),
+        ((0.2, 0.3), (0.02, 0.03), "one number for one of them, two for the other one"),
+        ((0.2, 0.25, 0.3), 0.02, "one number for one of them, two for the other one"),
+        ((0.2, 0.2), 0.02, "two different numbers"),
+        ((0.2, -0.2), 0.02, "frequency: give values above 0"),
+        (0.2, (0.02, np.nan), "excitation_amplitude: give finite numbers"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            response_curve(model, frequency, amplitude, 0.0, settings=settings)
+    balance = balance_of(model, 0.15, 0.001, 0.0, settings=settings)
+    for wrong in (balance.state[:-1], np.full(balance.size, np.nan), balance.state.reshape(1, -1)):
+        with pytest.raises(ValueError, match="z: give 7 finite numbers"):
+            balance.residual(wrong)
