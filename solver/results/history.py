@@ -82,6 +82,8 @@ class WearHistory:
     open_fraction (n_output, n_contact): fraction of the period.
     response (n_output, n_response): complex first harmonic, m.
     response_peak (n_output, n_response): m.
+    excitation_frequency (n_output,): frequency of the excitation, Hz; one value where the frequency follows nothing.
+    excitation_frequency_error (n_output,): its estimated absolute error, Hz; 0 for a given frequency.
     last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
     loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
         `solver.results.loops.contact_loops`.
@@ -127,6 +129,7 @@ class WearHistory:
     open_fraction: FloatArray
     response: ComplexArray
     response_peak: FloatArray
+    excitation_frequency: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray
     jump_cycle: float
@@ -145,6 +148,7 @@ class WearHistory:
     stable: BoolArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
+    excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     last_cycle: float = math.nan
     cycles_to_target: float = math.nan
     branch: int = 0

@@ -53,6 +53,7 @@ class StateReport:
     loop_force: FloatArray
     certificate: Certificate
     resolution: Resolution
+    excitation_frequency: float = float("nan")
     resonance: float = float("nan")
 
 
@@ -88,6 +89,7 @@ def report_state(
         loop_force=loop_force,
         certificate=certificate,
         resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
+        excitation_frequency=joint.omega / (2.0 * np.pi),
         resonance=resonance_frequency(joint, evaluation) if with_resonance else float("nan"),
     )
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.history_error import Met, history_error
+from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
@@ -64,7 +65,8 @@ def integrate_wear(
     reference = None
     # without a step the errors of the start state suffice
     stepped = len(fine.output.course.ends) > 1
-    if stepped and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
+    compared = stepped or asked.follow is not None
+    if compared and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
         reference = solutions.reference(fine)
         if reference.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
             fine = replace(fine, failure=reference.failure)
@@ -92,6 +94,10 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     last, target, worst = course.ends[-1], fine.output.reached, state.worst
     values: dict[str, Any] = {name: own[name] for name in own if name not in ("local", "depth_rate")}
     values |= {"response_error": error.response, "wear_rate_error": error.wear_rate}
+    frequency_error = np.zeros(counts.size)
+    if asked.follow is not None:
+        frequency_error = ACCURACY.history_safety * np.abs(own["excitation_frequency"] - other["excitation_frequency"])
+        frequency_error[np.isfinite(volume) & np.isnan(frequency_error)] = math.inf
     iterations = fine.iterations + (0 if reference is None else reference.iterations)
     return WearHistory(
         **values,
@@ -101,6 +107,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         worn_volume=volume,
         worn_volume_error=error.worn_volume,
         wear_depth_error=error.wear_depth,
+        excitation_frequency_error=frequency_error,
         reference_volume=other["wear_depth"] @ area,
         error_estimate=float(error.worn_volume[reached[-1]]) if reached.size else math.nan,
         newton_iterations=start.newton_iterations + iterations,
@@ -147,6 +154,7 @@ def _without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> W
         worn_volume=nothing,
         worn_volume_error=nothing,
         wear_depth_error=own["wear_depth"],
+        excitation_frequency_error=nothing,
         reference_volume=nothing,
         error_estimate=math.nan,
         jump_cycle=math.nan,

@@ -19,7 +19,7 @@ from solver.newton.solve_balance import solve_balance
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
-from solver.settings import Scheme, ToTheEnd, WearTarget
+from solver.settings import FollowedFrequency, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps
@@ -45,6 +45,7 @@ class SlowTime:
     law: part of the slip work that wears.
     until: target of the wear; the history ends with the step that reaches the target. None for no target.
     loops: pairs with reported fretting loops.
+    follow: what the frequency of the excitation follows; None for the frequency of the start state.
     """
 
     wear_coefficient: float
@@ -55,6 +56,7 @@ class SlowTime:
     law: WearLaw = ARCHARD
     until: WearTarget | None = None
     loops: tuple[int, ...] = ()
+    follow: FollowedFrequency | None = None
 
     @property
     def end(self) -> float:
@@ -209,7 +211,8 @@ class Solutions:
     def _joint(self) -> WearingJoint:
         """The joint, with the rest of the time limit."""
         assert self.start.state is not None
-        work = WearingJoint.of(self.case, self.start.state, self.asked.wear_coefficient, self.asked.law)
+        asked = self.asked
+        work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.follow)
         work.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
