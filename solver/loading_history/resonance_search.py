@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -93,9 +94,7 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
     edges = [2.0 ** (cell / per_octave) for cell in range(first + 1, last + 1)]
     ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]
     # a frequency on an edge belongs to the part above
-    parts = [
-        (low, high if high == follow.high else float(np.nextafter(high, 0.0))) for low, high in zip(ends, ends[1:])
-    ]
+    parts = [(low, high if high == follow.high else float(np.nextafter(high, 0.0))) for low, high in pairwise(ends)]
     return ((high, low) for low, high in reversed(parts)) if down else iter(parts)
 
 
@@ -119,10 +118,9 @@ def _between(
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:
         if abs(found - fold) <= LOADING.free_step * fold:
-            way, turned = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
-            raise _NoneFoundError(
-                f'the sweep {way} jumps over the {follow.of} at {fold / (2.0 * math.pi):.6g} Hz: give sweep = "{turned}"'
-            )
+            way, other = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
+            at = f"{fold / (2.0 * math.pi):.6g} Hz"
+            raise _NoneFoundError(f'the sweep {way} jumps over the {follow.of} at {at}: give sweep = "{other}"')
     return found
 
 
