@@ -40,11 +40,13 @@ class LaggingState:
 
     balance: harmonic balance at the frequency. at: its evaluation.
     error: sine of the lag above the given one.
+    turn: change of the lag with the frequency, s/rad, from the last step of Newton's method; NaN without a step.
     """
 
     balance: Balance
     at: Evaluation
     error: float
+    turn: float = math.nan
 
     @property
     def omega(self) -> float:
@@ -97,17 +99,20 @@ def solve_at_lag(
     solver, tolerance, budget, most
         As in `solve_balance`.
     """
-    shape, turn, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
+    shape, unit, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
 
     def error(product: complex) -> float:
-        return -(turn * product).imag / max(abs(product), 1e-300)
+        return -(unit * product).imag / max(abs(product), 1e-300)
 
     def evaluate(unknown: FloatArray) -> LaggingState:
         here = replace(balance, joint=case.joint(float(unknown[-1]), amplitude))
         at = here.evaluate(unknown[:-1].reshape(shape))
         return LaggingState(here, at, error(excitation_product(here.joint, at.displacement_h)))
 
+    turn = math.nan
+
     def direction(state: LaggingState) -> FloatArray:
+        nonlocal turn
         budget.check_time()
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
         tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state)
@@ -115,15 +120,16 @@ def solve_at_lag(
         own, with_frequency = (_product_change(tangent, step) for step in steps)
         product = excitation_product(state.balance.joint, state.at.displacement_h)
         # the equation times |F^H x|, whose derivative is linear in the motion
-        slope = (turn * (with_frequency + by_frequency.product)).imag
-        change = -(turn * (product + own)).imag / slope if slope != 0.0 else math.inf
+        slope = (unit * (with_frequency + by_frequency.product)).imag
+        change = -(unit * (product + own)).imag / slope if slope != 0.0 else math.inf
+        turn = -slope / max(abs(product), 1e-300)
         step = np.append((steps[0] + change * steps[1]).ravel(), change)
         largest = CONTINUATION.largest_frequency_change * state.omega
         return np.asarray(step * min(1.0, largest / max(abs(change), 1e-300)))
 
     end = solve_newton(evaluate, direction, np.append(start.ravel(), balance.joint.omega), tolerance, most)
     budget.iterations += end.iterations
-    return end.evaluation if end.converged else None
+    return replace(end.evaluation, turn=turn) if end.converged else None
 
 
 @dataclass(frozen=True)

@@ -118,9 +118,9 @@ def _between(
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:
         if abs(found - fold) <= LOADING.free_step * fold:
-            way, other = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
-            at = f"{fold / (2.0 * math.pi):.6g} Hz"
-            raise _NoneFoundError(f'the sweep {way} jumps over the {follow.of} at {at}: give sweep = "{other}"')
+            way, back = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
+            over = f"{follow.of} at {fold / (2.0 * math.pi):.6g} Hz"
+            raise _NoneFoundError(f'the sweep {way} jumps over the {over}: give sweep = "{back}"')
     return found
 
 

@@ -129,7 +129,6 @@ class WearHistory:
     open_fraction: FloatArray
     response: ComplexArray
     response_peak: FloatArray
-    excitation_frequency: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray
     jump_cycle: float
@@ -148,7 +147,6 @@ class WearHistory:
     stable: BoolArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
-    excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     last_cycle: float = math.nan
     cycles_to_target: float = math.nan
     branch: int = 0
@@ -158,6 +156,8 @@ class WearHistory:
     final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
+    excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))
+    excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     inaccurate_from: float = math.inf
     inaccurate_in: str = ""

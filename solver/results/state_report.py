@@ -40,6 +40,7 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 class StateReport:
     """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
+    excitation_frequency_error: by the harmonics and samples of the state.
     resonance: `resonance_frequency`, rad/s; NaN where it was not asked for.
     """
 
@@ -54,6 +55,7 @@ class StateReport:
     certificate: Certificate
     resolution: Resolution
     excitation_frequency: float = float("nan")
+    excitation_frequency_error: float = 0.0
     resonance: float = float("nan")
 
 

@@ -18,6 +18,7 @@ from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.branch_loss import is_stable_when_held
+from solver.wear.followed import frequency_error
 from solver.wear.free_slide import creeps, free_slide
 from solver.wear.options import WEAR
 from solver.wear.state import Choice, Failure, WearState
@@ -75,7 +76,9 @@ class FullCheck:
         )
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
-        return Checked(state, report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance))
+        report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
+        error = frequency_error(work.follow, state, estimate.response, work.case.settings.rtol)
+        return Checked(state, replace(report, excitation_frequency_error=error))
 
 
 @dataclass(frozen=True)

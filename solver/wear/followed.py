@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from solver.continuation.phase_lag import LaggingState, rise_of_response, solve_at_lag
+from solver.continuation.phase_lag import rise_of_response, solve_at_lag
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -29,7 +29,7 @@ def end_at_resonance(
     case: Case,
     balance: Balance,
     start: FloatArray,
-    lag: float,
+    state: WearState,
     follow: FollowedFrequency,
     solver: JacobianSolver,
     budget: Budget,
@@ -41,26 +41,32 @@ def end_at_resonance(
     ----------
     case, balance, start
         As in `solve_at_lag`.
-    lag
-        Phase lag of the state before, rad.
+    state
+        The state before.
     follow
         What the frequency follows.
     solver, budget, most
         As in `solve_balance`.
     """
-    below, above, accuracy = 0.0, math.pi, min(WEAR.peak_rise * case.settings.rtol, WEAR.largest_peak_rise)
+    below, above, accuracy = 0.0, math.pi, _accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
+    lag, half_width = state.lag, state.half_width
     for _ in range(WEAR.peak_solves):
         found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
         if found is None:
             return None
-        rise = 0.0 if follow.of == "resonance" else _rise_with_lag(case, found, solver)
-        if not math.isfinite(rise):
+        rise, turn = 0.0, found.turn
+        if follow.of == "peak" or (half_width == 0.0 and math.isnan(turn)):
+            rise, turn = rise_of_response(case, found, solver)
+        if follow.of == "peak" and not turn > 0.0:
+            # where the lag falls with the frequency there is no resonance
             return None
+        half_width = half_width if math.isnan(turn) else abs(1.0 / turn) if turn != 0.0 else math.inf
+        rise = rise * half_width if follow.of == "peak" else 0.0
         below, above = (lag, above) if rise > 0.0 else (below, lag)
         if abs(rise) <= accuracy or above - below <= accuracy:
             point = PathPoint(0.0, found.at, final_history(found.balance, found.at))
-            return Reached(point, found.omega, lag)
+            return Reached(point, found.omega, lag, half_width)
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         step = float(np.clip(-rise / min(slope, -WEAR.least_peak_slope), -WEAR.largest_lag_step, WEAR.largest_lag_step))
@@ -70,11 +76,23 @@ def end_at_resonance(
     return None
 
 
-def _rise_with_lag(case: Case, found: LaggingState, solver: JacobianSolver) -> float:
-    """Rise of the logarithm of the amplitude of the first response with the phase lag, 1/rad."""
-    rise, turn = rise_of_response(case, found, solver)
-    # where the lag falls with the frequency there is no resonance
-    return rise / turn if turn > 0.0 else math.nan
+def frequency_error(follow: FollowedFrequency | None, state: WearState, response_error: float, rtol: float) -> float:
+    """Error of the frequency of a state, Hz, by the relative error of its response; 0 for a given frequency.
+
+    The phase of the vibration is wrong by as much as the amplitude, and so is the phase lag. The amplitude is flat at
+    its maximum: every amplitude that is less than the largest one by its error may be the largest one.
+    """
+    if follow is None:
+        return 0.0
+    lag = response_error
+    if follow.of == "peak":
+        lag = math.sqrt(2.0 * response_error) + _accepted_rise(rtol)
+    return state.half_width * lag / (2.0 * math.pi)
+
+
+def _accepted_rise(rtol: float) -> float:
+    """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
+    return min(WEAR.peak_rise * rtol, WEAR.largest_peak_rise)
 
 
 def lost_resonance(follow: FollowedFrequency, state: WearState) -> Failure:

@@ -94,10 +94,10 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     last, target, worst = course.ends[-1], fine.output.reached, state.worst
     values: dict[str, Any] = {name: own[name] for name in own if name not in ("local", "depth_rate")}
     values |= {"response_error": error.response, "wear_rate_error": error.wear_rate}
-    frequency_error = np.zeros(counts.size)
     if asked.follow is not None:
-        frequency_error = ACCURACY.history_safety * np.abs(own["excitation_frequency"] - other["excitation_frequency"])
-        frequency_error[np.isfinite(volume) & np.isnan(frequency_error)] = math.inf
+        apart = ACCURACY.history_safety * np.abs(own["excitation_frequency"] - other["excitation_frequency"])
+        whole = np.maximum(own["excitation_frequency_error"], apart)
+        values["excitation_frequency_error"] = np.where(np.isfinite(volume) & np.isnan(whole), math.inf, whole)
     iterations = fine.iterations + (0 if reference is None else reference.iterations)
     return WearHistory(
         **values,
@@ -107,7 +107,6 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         worn_volume=volume,
         worn_volume_error=error.worn_volume,
         wear_depth_error=error.wear_depth,
-        excitation_frequency_error=frequency_error,
         reference_volume=other["wear_depth"] @ area,
         error_estimate=float(error.worn_volume[reached[-1]]) if reached.size else math.nan,
         newton_iterations=start.newton_iterations + iterations,
@@ -154,7 +153,6 @@ def _without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> W
         worn_volume=nothing,
         worn_volume_error=nothing,
         wear_depth_error=own["wear_depth"],
-        excitation_frequency_error=nothing,
         reference_volume=nothing,
         error_estimate=math.nan,
         jump_cycle=math.nan,

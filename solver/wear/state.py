@@ -43,6 +43,8 @@ class WearState:
     cycle: cycle count.
     omega: angular frequency of the excitation, rad/s.
     lag: phase lag of the vibration where the frequency is followed, rad (`solver.continuation.phase_lag`).
+    half_width: change of the frequency over the change of the phase lag, rad/s: half the width of the resonance that
+        the frequency follows; 0 for a given frequency.
     point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
     resolution: harmonics and samples of the periodic state.
     choice: last choice of the resolution.
@@ -76,6 +78,7 @@ class WearState:
     first_length: float = 0.0
     judged_h: FloatArray | None = None
     lag: float = 0.5 * math.pi
+    half_width: float = 0.0
     hold: Hold | None = None
     held_from: float = float("nan")
     jump_cycle: float = float("nan")
@@ -99,11 +102,16 @@ class WearState:
 
 @dataclass(frozen=True)
 class Reached:
-    """End of a step: periodic state, frequency, rad/s, and phase lag, rad."""
+    """End of a step.
+
+    point: periodic state.
+    omega, lag, half_width: as in `WearState`.
+    """
 
     point: PathPoint
     omega: float
     lag: float
+    half_width: float
 
 
 @packable

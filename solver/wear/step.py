@@ -63,7 +63,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
         return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
     ahead = last.parameter * length
     point = PathPoint(0.0, last.evaluation, final_history(balance_at(last.parameter, base.history), last.evaluation))
-    taken = _euler(work, state, Reached(point, state.omega, state.lag), ahead)
+    taken = _euler(work, state, Reached(point, state.omega, state.lag, state.half_width), ahead)
     return replace(taken, length=length, arrived=arrived, end_known_to=shortest * length)
 
 

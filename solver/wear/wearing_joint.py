@@ -165,13 +165,12 @@ class WearingJoint:
         settings, most = self.case.settings, WEAR.step_iterations
         start, balance = self.predicted(state, balance, length)
         if self.follow is not None:
-            return end_at_resonance(self.case, balance, start, state.lag, self.follow, self.solver, self.budget)
+            return end_at_resonance(self.case, balance, start, state, self.follow, self.solver, self.budget)
         found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)
         if not found.converged:
             return None
-        return Reached(
-            PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation)), state.omega, state.lag
-        )
+        point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))
+        return Reached(point, state.omega, state.lag, state.half_width)
 
     def tuned(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""
@@ -180,7 +179,7 @@ class WearingJoint:
         at = state.point.evaluation
         balance = Balance.frozen(self.at(state), at.history, at.wear_depth)
         found = end_at_resonance(
-            self.case, balance, at.predicted_h, state.lag, self.follow, self.solver, self.budget, NEWTON.iterations
+            self.case, balance, at.predicted_h, state, self.follow, self.solver, self.budget, NEWTON.iterations
         )
         if found is None:
             return lost_resonance(self.follow, state)

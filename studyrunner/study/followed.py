@@ -6,11 +6,11 @@ The axis `frequency` then has one value, the middle of the range: a point has no
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from solver.settings import FOLLOWED, Followed, FollowedFrequency
+from solver.settings import FOLLOWED, FollowedFrequency
 from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.values import Number, Section, read
 from studyrunner.user_error import UserError, WrongValueError
@@ -68,4 +68,4 @@ def take_followed(sections: dict[str, Any], source: str) -> FollowedFrequency | 
     except WrongValueError as error:
         raise UserError(source, "loading.between", error.value, error.remedy) from None
     sections["axes"] = {**axes, "frequency": 0.5 * low + 0.5 * high}
-    return FollowedFrequency(cast("Followed", words[0]), low, high)
+    return FollowedFrequency(words[0], low, high)

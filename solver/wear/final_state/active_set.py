@@ -93,7 +93,11 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
         held = Balance.frozen(joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
         grazes = PathPoint(0.0, grazing, final_history(held, grazing))
-        state = replace(work.accepted(state, Reached(grazes, state.omega, state.lag), 0.0), change=None, previous=None)
+        state = replace(
+            work.accepted(state, Reached(grazes, state.omega, state.lag, state.half_width), 0.0),
+            change=None,
+            previous=None,
+        )
     raise NoActiveSetError("pairs begin to slip without end")
 
 

@@ -173,7 +173,6 @@ def _assembled(work: WearingJoint, start: StartState, asked: SlowTime, found: _F
         worn_volume=volume,
         worn_volume_error=errors,
         wear_depth_error=depths,
-        excitation_frequency_error=np.where(np.isfinite(volume), 0.0, np.nan),
         reference_volume=np.where(np.isfinite(errors), volume + errors * volume, np.nan),
         error_estimate=relative,
         newton_iterations=0,
