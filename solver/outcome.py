@@ -34,6 +34,7 @@ class Outcome(IntEnum):
     NO_FINAL_STATE = 17
     CONTACT_CUT_OFF = 18
     UNSETTLED = 19
+    RESONANCE_LOST = 20
 
     @property
     def complete(self) -> bool:
@@ -82,6 +83,8 @@ _SENTENCES = {
     Outcome.UNSETTLED: "The vibration does not settle: left to itself for some hundred periods it comes to none that"
     " repeats, as where the joint slips or opens all over. More static load, friction or damping, or less excitation,"
     " would give it grip.",
+    Outcome.RESONANCE_LOST: "No resonance was found, or none any more, in the range in which the excitation follows the"
+    " resonance: message says where. The values before hold.",
     Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"
     " with a larger one.",
     Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",

@@ -13,6 +13,10 @@ Scheme = Literal["explicit", "implicit", "adaptive"]
 """Scheme of the steps on the slow time scale."""
 
 
+Followed = Literal["resonance", "peak"]
+FOLLOWED: tuple[Followed, ...] = get_args(Followed)
+"""What the frequency of an excitation may follow."""
+
 Quantity = Literal["wear_depth", "worn_volume", "frequency_shift"]
 TARGETS: tuple[Quantity, ...] = get_args(Quantity)
 """Quantities of a target."""
@@ -43,6 +47,21 @@ class ToTheEnd:
 
     n_outputs: int
     final_share: float = 1e-4
+
+
+@dataclass(frozen=True)
+class FollowedFrequency:
+    """Excitation whose frequency follows the structure while the joint wears.
+
+    - of: "resonance" for phase resonance, the vibration in quadrature with the excitation: the product `F^H x` of the
+      first harmonics of excitation and displacements has no real part, so that the excitation does most work. "peak"
+      for the largest amplitude of the first response, in its first harmonic.
+    - low, high: range of the frequency, Hz.
+    """
+
+    of: Followed
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)

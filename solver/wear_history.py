@@ -14,7 +14,16 @@ from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
-from solver.settings import TARGETS, Scheme, SolverSettings, ToTheEnd, WearTarget
+from solver.settings import (
+    FOLLOWED,
+    TARGETS,
+    Followed,
+    FollowedFrequency,
+    Scheme,
+    SolverSettings,
+    ToTheEnd,
+    WearTarget,
+)
 from solver.structure.joint import friction_of_pairs
 from solver.wear.final_state.find import find_final_state
 from solver.wear.history import integrate_wear
@@ -23,7 +32,7 @@ from solver.wear.solutions import SlowTime
 
 def march_wear(
     model: ReducedModel,
-    frequency: float,
+    frequency: float | Followed,
     excitation_amplitude: float,
     friction_coefficient: ArrayLike | None,
     wear_coefficient: float,
@@ -38,6 +47,7 @@ def march_wear(
     outputs: int = 101,
     final_share: float = 1e-4,
     wear_depth: ArrayLike | None = None,
+    between: tuple[float, float] | None = None,
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state or from given depths on.
 
@@ -48,7 +58,8 @@ def march_wear(
     model
         The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency
-        Frequency of the excitation, Hz.
+        Frequency of the excitation, Hz; or "resonance" or "peak", which the excitation follows while the joint wears,
+        see `between`.
     excitation_amplitude
         Amplitude, N. It multiplies the unit harmonic load of the model.
     friction_coefficient
@@ -78,6 +89,13 @@ def march_wear(
     wear_depth
         (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of the
         history count from there. Unworn if not given.
+    between
+        Range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance that the
+        sweep meets in the range, and `excitation_frequency` of the history is the frequency at each count. "resonance"
+        is phase resonance: in the first harmonic, the vibration is in quadrature with the excitation, `F^H x` has no
+        real part. "peak" is the largest amplitude of the first response in its first harmonic, over the frequency at
+        constant wear depth. Under strong damping both differ: for one degree of freedom with the damping ratio zeta the
+        peak lies lower by a factor sqrt(1 - 2 zeta^2).
 
     Raises
     ------
@@ -89,7 +107,7 @@ def march_wear(
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
-    at = check_number("frequency", frequency, above=0.0)
+    at, follow = _check_frequency(frequency, between, sweep, scheme)
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     to_the_end = np.ndim(cycles) == 0 and cycles == math.inf
     counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
@@ -117,8 +135,28 @@ def march_wear(
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
-    _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings))
+    _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings, follow=follow))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
-    asked = SlowTime(per_pressure, "adaptive" if scheme == "final" else scheme, read_at, length, law=law, until=until)
+    stepping: Scheme = "adaptive" if scheme == "final" else scheme
+    asked = SlowTime(per_pressure, stepping, read_at, length, law=law, until=until, follow=follow)
     solve = find_final_state if scheme == "final" else integrate_wear
     return solve(model, friction, settings, start, asked)
+
+
+def _check_frequency(
+    frequency: float | Followed, between: tuple[float, float] | None, sweep: Sweep, scheme: str
+) -> tuple[float, FollowedFrequency | None]:
+    """The given frequency, Hz, or NaN and what the frequency follows. Raises ValueError."""
+    if not isinstance(frequency, str):
+        if between is not None:
+            raise ValueError('between: leave it out, or give "resonance" or "peak" as the frequency')
+        return check_number("frequency", frequency, above=0.0), None
+    check_word("frequency", frequency, FOLLOWED)
+    ends = check_numbers("between", math.nan if between is None else between, above=0.0)
+    if ends.size != 2 or not ends[0] < ends[1]:
+        raise ValueError("between: give the lowest and the highest frequency in Hz, as (205, 215)")
+    if sweep == "ramp":
+        raise ValueError('sweep: give "up" or "down": a ramp holds the frequency that is sought')
+    if scheme == "final":
+        raise ValueError('scheme: the scheme "final" holds the frequency: give "adaptive" with cycles = inf')
+    return math.nan, FollowedFrequency(frequency, float(ends[0]), float(ends[1]))

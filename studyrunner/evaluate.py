@@ -116,6 +116,7 @@ def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartR
         task.settings,
         keep=keep,
         resume=task.resume,
+        follow=task.follow,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:
@@ -192,6 +193,7 @@ def _solve(model: ReducedModel, task: MarchTask, keep: Keep | None = None) -> We
         law=task.law,
         until=task.until,
         loops=task.loops,
+        follow=task.follow,
     )
     solve = find_final_state if final and isinstance(counts, ToTheEnd) else integrate_wear
     history = solve(model, task.joint.friction_coefficient, task.settings, start, asked, keep, task.resume)

@@ -77,6 +77,18 @@ ASKED = {
         "largest magnitude of the response over a period",
         comment="All harmonics, and the static displacement, together.",
     ),
+    "excitation_frequency": Variable(
+        ("cycle",),
+        "Hz",
+        "frequency of the excitation",
+        comment='With axes.frequency = "resonance" or "peak" that of each count; else the value of the axis.',
+    ),
+    "excitation_frequency_error": Variable(
+        ("cycle",),
+        "Hz",
+        "estimated error of the frequency of the excitation",
+        comment="By the difference to a coarser history, whose frequency is its own; 0 for a given frequency.",
+    ),
     "slip_range": Variable(
         ("cycle", "contact"),
         "m",
@@ -168,7 +180,14 @@ OF_SAMPLES = (
 )
 """Those of a study with [scatter] that names none: what statistics and pictures need, as there are many points."""
 
-USUAL = tuple(name for name in ASKED if not name.startswith(("wear_depth_max", "wear_depth_last")))
+FOLLOWED_FREQUENCY = ("excitation_frequency", "excitation_frequency_error")
+"""Further ones of a study that names none and whose frequency follows the resonance."""
+
+USUAL = tuple(
+    name
+    for name in ASKED
+    if not name.startswith(("wear_depth_max", "wear_depth_last")) and name not in FOLLOWED_FREQUENCY
+)
 """Those of other studies that name none."""
 
 SCENE: dict[str, dict[str, Variable]] = {
@@ -340,7 +359,13 @@ KEPT = {
 """Those that every result holds."""
 
 COORDINATES = {
-    "frequency": Variable((), "Hz", "excitation frequency"),
+    "frequency": Variable(
+        (),
+        "Hz",
+        "excitation frequency",
+        comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
+        " excitation_frequency holds the frequency at each count.",
+    ),
     "wear_coefficient": Variable(
         (),
         "1/Pa",

@@ -82,6 +82,16 @@ class ContinuationOptions:
     fold_search_length: float = 0.01
     """Natural length of the frequency in the search behind a fold, over the frequency."""
 
+    # states at a given phase lag
+    frequency_difference: float = 1e-7
+    """Difference of two frequencies over the frequency, for derivatives. With ten times the value and with a tenth the
+    steps of Newton's method agree to 1e-5 (`tests/solver/test_phase_lag.py`)."""
+    largest_frequency_change: float = 0.02
+    """Largest change of the frequency in an iteration, over the frequency."""
+    derivative_solves: int = 4
+    """Most corrections of a derivative of the motion, each of which gains the digits of a Newton direction."""
+    derivative_error: float = 1e-6
+    """Relative residual of a derivative of the motion."""
     @property
     def linear_change(self) -> float:
         """Largest change over a step between two states in which no pair slips or opens.

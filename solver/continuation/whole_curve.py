@@ -65,7 +65,7 @@ def follow_branch_whole(
     folds: list[int] = []
     direction = np.zeros(start.evaluation.predicted_h.size + 1)
     direction[-1] = toward
-    length, before = CONTINUATION.first_arc, None
+    length, before = CONTINUATION.longest_arc / 10.0, None
     while len(points) < most and not budget.exhausted:
         point = points[-1]
         tangent = arc.tangent(point.parameter, point.evaluation, budget)

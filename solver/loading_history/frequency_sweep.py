@@ -189,11 +189,8 @@ class FrequencySweep:
         if frequency != self.frequency:
             self.frequency = frequency
             self.journal.begin()
-        nodes, target = self._sweep_to(origin, omega), 1.0 if ramp else omega
-        if not self._begun:
-            self._begun = True
-            self._begin(nodes, origin)
-        self._advance_to(nodes, target)
+        nodes, target = self._begun_sweep(origin, self._sweep_to(origin, omega)), 1.0 if ramp else omega
+        self.advance_nodes(nodes, target)
         try:
             reached, coarse = nodes.state_at(target, self.budget)
             case = nodes.case
@@ -202,7 +199,7 @@ class FrequencySweep:
                 case, point = self._first(omega, self.budget)
                 reached = None if point is None else Step(point)
             if reached is None:
-                lost = Found(self._why_lost(nodes))
+                lost = Found(self.why_lost(nodes))
                 lost.message = self._where_lost(nodes)
                 return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
@@ -214,6 +211,20 @@ class FrequencySweep:
         fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
         return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
+
+    def sweep_in_cell(self, frequency: float) -> NodeSweep:
+        """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
+        origin = find_origin(self.model, frequency, self.sweep)
+        if self.nodes is None or self.origin is None or origin.cell != self.origin.cell:
+            return self._begun_sweep(origin, self._sweep_to(origin, 2.0 * np.pi * frequency))
+        return self._begun_sweep(origin, self.nodes)
+
+    def _begun_sweep(self, origin: Origin, nodes: NodeSweep) -> NodeSweep:
+        """A sweep at its first node or beyond."""
+        if not self._begun:
+            self._begun = True
+            self._begin(nodes, origin)
+        return nodes
 
     def _judge(
         self, refined: Refined, omega: float, found: Found, coarse_case: Case, coarse: PathPoint | None
@@ -255,7 +266,7 @@ class FrequencySweep:
             nodes.state = replace(nodes.state, searched=searched)
         return point is not None and nodes.begin(case, PathPoint(place, point.evaluation, point.history))
 
-    def _advance_to(self, nodes: NodeSweep, target: float) -> None:
+    def advance_nodes(self, nodes: NodeSweep, target: float) -> None:
         """Advance the sweep to the target; where the sweep is lost before, begin it again a little further on."""
         while True:
             try:
@@ -275,7 +286,8 @@ class FrequencySweep:
             if not self._begin_at(nodes, behind):
                 nodes.state = replace(nodes.state, lost_at=behind)
 
-    def _why_lost(self, nodes: NodeSweep) -> Outcome:
+    def why_lost(self, nodes: NodeSweep) -> Outcome:
+        """The reason why a sweep has no state."""
         never = np.isnan(nodes.state.lost_at)
         return nodes.state.failure if never or nodes.state.failure in _REASONS else Outcome.BRANCH_LOST
 

@@ -14,13 +14,14 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
+from solver.loading_history.resonance_search import advance_to_resonance
 from solver.loading_history.sweep_start import Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.settings import SolverSettings
+from solver.settings import FollowedFrequency, SolverSettings
 
 
 def follow_branch(
@@ -32,6 +33,7 @@ def follow_branch(
     settings: SolverSettings,
     keep: Callable[[Packed | str], None] | None = None,
     resume: Packed | None = None,
+    follow: FollowedFrequency | None = None,
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies: index and state, one by one.
 
@@ -60,6 +62,9 @@ def follow_branch(
     resume
         Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
         frequencies not yet passed. The states are equal to the last bit, except `run_time`.
+    follow
+        What is sought in place of given frequencies: the first resonance that the sweep meets. `frequencies` has then
+        one entry, which is not used; the sweep is "up" or "down".
 
     Yields
     ------
@@ -82,7 +87,8 @@ def follow_branch(
         line.set_deadline(started + settings.time_limit)
         message = ""
         try:
-            found = line.advance(float(frequencies[index]))
+            at = float(frequencies[index])
+            found = line.advance(at) if follow is None else advance_to_resonance(line, follow)
         except OutOfTimeError:
             found = Found(Outcome.TIME_LIMIT)
             line.abandon()

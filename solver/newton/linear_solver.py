@@ -50,12 +50,14 @@ class JacobianSolver:
         step[rest] = (right - tangent.apply_roughly(step))[rest]
         return step
 
-    def solve_two(self, tangent: Linearisation, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def solve_two(
+        self, tangent: Linearisation, first: FloatArray, second: FloatArray, rtol: float = NEWTON.forcing
+    ) -> tuple[FloatArray, FloatArray]:
         """Steps (n_rel, m) for two right-hand sides; a small system is factorised once."""
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
         if not rows.size or not is_dense_cheapest(rows.size * first.shape[1], rows.size):
-            return self.solve(tangent, first), self.solve(tangent, second)
+            return self.solve(tangent, first, rtol), self.solve(tangent, second, rtol)
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
         solved = _solve_dense(tangent.dense(pairs), both)
         steps = []

@@ -82,6 +82,8 @@ class WearHistory:
     - open_fraction (n_output, n_contact): fraction of the period.
     - response (n_output, n_response): complex first harmonic, m.
     - response_peak (n_output, n_response): m.
+    - excitation_frequency (n_output,): frequency of the excitation, Hz; one value where the frequency follows nothing.
+    - excitation_frequency_error (n_output,): its estimated absolute error, Hz; 0 for a given frequency.
     - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
       `solver.results.loops.contact_loops`.
@@ -154,6 +156,8 @@ class WearHistory:
     final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
+    excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))
+    excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     inaccurate_from: float = math.inf
     inaccurate_in: str = ""

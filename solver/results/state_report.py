@@ -40,6 +40,7 @@ def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
 class StateReport:
     """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
+    excitation_frequency_error: by the harmonics and samples of the state.
     resonance: `resonance_frequency`, rad/s; NaN where it was not asked for.
     """
 
@@ -53,6 +54,8 @@ class StateReport:
     loop_force: FloatArray
     certificate: Certificate
     resolution: Resolution
+    excitation_frequency: float = float("nan")
+    excitation_frequency_error: float = 0.0
     resonance: float = float("nan")
 
 
@@ -88,6 +91,7 @@ def report_state(
         loop_force=loop_force,
         certificate=certificate,
         resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
+        excitation_frequency=joint.omega / (2.0 * np.pi),
         resonance=resonance_frequency(joint, evaluation) if with_resonance else float("nan"),
     )
 

@@ -23,12 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.accuracy.error_estimate import euler_error
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
-from solver.newton.solve_balance import solve_balance
-from solver.wear.options import WEAR
-from solver.wear.state import WearState
+from solver.wear.state import Reached, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -36,11 +33,11 @@ from solver.wear.wearing_joint import WearingJoint
 class Attempt:
     """A BDF2 step that was solved.
 
-    point: end of the step.
+    end: end of the step.
     error (n_contact,): local error of the depth with its sign, m.
     """
 
-    point: PathPoint
+    end: Reached
     error: FloatArray
 
 
@@ -54,16 +51,14 @@ def bdf2_attempt(work: WearingJoint, state: WearState, length: float) -> Attempt
         base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
         factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
     balance = Balance(joint, state.point.history, base, work.gain(factor * length), work.wearing)
-    start = work.predicted(state, balance, length)
-    tolerance, most = work.case.settings.tolerance, WEAR.step_iterations
-    result = solve_balance(balance, start, work.solver, tolerance, work.budget, most)
-    if not result.converged:
+    end = work.solved(state, balance, length)
+    if end is None:
         return None
-    new = result.evaluation
+    new = end.point.evaluation
     if state.previous is None:
         error = euler_error(length, work.rate(new) - rate)
     else:
         explicit = depth + (1.0 + ratio) * length * rate - ratio**2 * grown
         own, other = (1.0 + ratio) ** 2 / (6.0 * ratio * (1.0 + 2.0 * ratio)), (1.0 + 1.0 / ratio) / 6.0
         error = own / (own + other) * (new.wear_depth - explicit)
-    return Attempt(PathPoint(0.0, new, final_history(balance, new)), error)
+    return Attempt(end, error)

@@ -18,6 +18,7 @@ from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.branch_loss import is_stable_when_held
+from solver.wear.followed import frequency_error
 from solver.wear.free_slide import creeps, free_slide
 from solver.wear.options import WEAR
 from solver.wear.state import Choice, Failure, WearState
@@ -46,15 +47,15 @@ class FullCheck:
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
         """The state with its report, or the reason of a rejection. Raises OutOfTimeError, LinAlgError."""
         anew = chosen_for_another(work, state)
-        if anew:
-            state = choose_anew(work, state)
-        checked = self._report(work, state)
+        chosen: WearState | Failure = choose_anew(work, state) if anew else state
+        checked = chosen if isinstance(chosen, Failure) else self._report(work, chosen)
         if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
             # more harmonics or samples may suffice
-            state, anew = choose_anew(work, state), True
-            checked = self._report(work, state)
+            chosen = choose_anew(work, state)
+            checked = chosen if isinstance(chosen, Failure) else self._report(work, chosen)
         if isinstance(checked, Failure):
             return checked
+        state = checked.state
         state = _note_accuracy(state)
         joint, at = work.at(state), state.point.evaluation
         if state.hold is not None and creeps(joint, state.hold, at):
@@ -75,7 +76,9 @@ class FullCheck:
         )
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
-        return Checked(state, report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance))
+        report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
+        error = frequency_error(work.follow, state, estimate.response, work.case.settings.rtol)
+        return Checked(state, replace(report, excitation_frequency_error=error))
 
 
 @dataclass(frozen=True)
@@ -95,14 +98,20 @@ class PlainCheck:
 
 
 def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:
-    """The state solved with other harmonics and samples; None where it is not found."""
+    """The state solved with other harmonics and samples; None where it is not found.
+
+    A frequency that is followed is that of these harmonics.
+    """
     if resolution == state.resolution:
         return state
     work.at(state)
     old, case = work.case, work.case.at(resolution)
-    joint = case.joint(work.omega, work.excitation_amplitude)
+    joint = case.joint(state.omega, work.excitation_amplitude)
     point = move_point(old, case, joint, state.point, work.budget)
-    return None if point is None else replace(state, point=point, resolution=resolution, change=None)
+    if point is None:
+        return None
+    tuned = work.tuned(replace(state, point=point, resolution=resolution, change=None))
+    return None if isinstance(tuned, Failure) else tuned
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
@@ -135,16 +144,16 @@ def _vibrates_otherwise(state: WearState) -> bool:
     return float(np.linalg.norm(now - before)) > ACCURACY.vibration_recheck * float(np.linalg.norm(before))
 
 
-def choose_anew(work: WearingJoint, state: WearState) -> WearState:
-    """The state with harmonics and samples chosen anew."""
+def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
+    """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
     work.at(state)
     refined = refine(
-        work.case, work.omega, work.excitation_amplitude, state.point, work.budget, usual_work=work.usual_work
+        work.case, state.omega, work.excitation_amplitude, state.point, work.budget, usual_work=work.usual_work
     )
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
     change = state.change if resolution == state.resolution else None
-    return replace(state, point=refined.point, resolution=resolution, choice=choice, change=change)
+    return work.tuned(replace(state, point=refined.point, resolution=resolution, choice=choice, change=change))
 
 
 def _note_accuracy(state: WearState) -> WearState:

@@ -103,13 +103,13 @@ class AdaptiveSteps:
             shorter = WEAR.smallest_step_ratio
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
-                ratio = size / self._allowed(work, state, tried.point.evaluation.wear_depth, length)
+                ratio = size / self._allowed(work, state, tried.end.point.evaluation.wear_depth, length)
                 wanted = WEAR.step_safety / np.sqrt(max(ratio, 1e-12))
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
-                calm = vibration_change(state.point.evaluation, tried.point.evaluation) < CONTINUATION.smooth_change
+                calm = vibration_change(state.point.evaluation, tried.end.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
                     ahead = length * float(np.clip(wanted, WEAR.refused_step_ratio, WEAR.largest_step_ratio))
-                    return Step(work.accepted(state, tried.point, length).planned(ahead), size, length)
+                    return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
                 shorter = float(np.clip(wanted, WEAR.smallest_step_ratio, WEAR.refused_step_ratio))
             if length <= shortest:
                 one_step = bounded_euler_step if self.bounded else euler_step

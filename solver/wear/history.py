@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.history_error import Met, history_error
+from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
@@ -64,7 +65,8 @@ def integrate_wear(
     reference = None
     # without a step the errors of the start state suffice
     stepped = len(fine.output.course.ends) > 1
-    if stepped and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
+    compared = stepped or asked.follow is not None
+    if compared and fine.failure.outcome not in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
         reference = solutions.reference(fine)
         if reference.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
             fine = replace(fine, failure=reference.failure)
@@ -92,6 +94,10 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     last, target, worst = course.ends[-1], fine.output.reached, state.worst
     values: dict[str, Any] = {name: own[name] for name in own if name not in ("local", "depth_rate")}
     values |= {"response_error": error.response, "wear_rate_error": error.wear_rate}
+    if asked.follow is not None:
+        apart = ACCURACY.history_safety * np.abs(own["excitation_frequency"] - other["excitation_frequency"])
+        whole = np.maximum(own["excitation_frequency_error"], apart)
+        values["excitation_frequency_error"] = np.where(np.isfinite(volume) & np.isnan(whole), math.inf, whole)
     iterations = fine.iterations + (0 if reference is None else reference.iterations)
     return WearHistory(
         **values,

@@ -14,6 +14,7 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import in_rows, packable
 from solver.wear.check import Checked
 from solver.wear.control import Control
+from solver.wear.followed import lost_resonance, out_of_range
 from solver.wear.jump import land
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
@@ -79,7 +80,8 @@ class Integration:
 
     def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
         """Check and store the first state."""
-        checked = self.check(work, state)
+        tuned = work.tuned(state)
+        checked = tuned if isinstance(tuned, Failure) else self.check(work, tuned)
         if isinstance(checked, Failure):
             return checked
         self.output.add(state.cycle, checked.report, work.rate(checked.state.point.evaluation), 0.0)
@@ -117,10 +119,14 @@ class Integration:
                 return reached
             step = Step(reached, 0.0, step.length, arrived=False, end_known_to=step.end_known_to)
         landed = land(work, step, bounded=self.bounded)
+        if work.follow is not None:
+            landed = lost_resonance(work.follow, step.state) if isinstance(landed, Failure) else work.tuned(landed)
         return landed if isinstance(landed, Failure) else self._kept(work, landed, 0.0)
 
     def _kept(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
         """Check a state and store it in the output."""
+        if (left := out_of_range(work.follow, state)) is not None:
+            return left
         checked = self.check(work, state)
         if isinstance(checked, Failure):
             return checked

@@ -25,6 +25,8 @@ INTERPOLATED = (
     "open_fraction",
     "response",
     "response_peak",
+    "excitation_frequency",
+    "excitation_frequency_error",
     "loop_displacement",
     "loop_force",
 )
@@ -318,5 +320,6 @@ def no_output(n_outputs: int, n_contact: int, n_response: int, n_loops: int) -> 
     )
     found |= {"response": of_responses.astype(complex), "response_peak": of_responses}
     found |= dict.fromkeys(("loop_displacement", "loop_force"), loops)
-    found |= dict.fromkeys((*CERTIFIED, "wear_rate", "local"), np.full(n_outputs, np.nan))
+    frequencies = "excitation_frequency", "excitation_frequency_error"
+    found |= dict.fromkeys((*CERTIFIED, *frequencies, "wear_rate", "local"), np.full(n_outputs, np.nan))
     return found | {"harmonics_used": whole, "samples_used": whole, "stable": np.zeros(n_outputs, np.bool_)}

@@ -19,7 +19,7 @@ from solver.newton.solve_balance import solve_balance
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
-from solver.settings import Resolution, Scheme, ToTheEnd, WearTarget
+from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps
@@ -46,6 +46,7 @@ class SlowTime:
     until: target of the wear; the history ends with the step that reaches the target. None for no target.
     loops: pairs with reported fretting loops.
     ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
+    follow: what the frequency of the excitation follows; None for the frequency of the start state.
     """
 
     wear_coefficient: float
@@ -57,6 +58,7 @@ class SlowTime:
     until: WearTarget | None = None
     loops: tuple[int, ...] = ()
     ends_at_last: bool = False
+    follow: FollowedFrequency | None = None
 
     @property
     def end(self) -> float:
@@ -236,7 +238,8 @@ class Solutions:
     def _joint(self) -> WearingJoint:
         """The joint, with the rest of the time limit."""
         assert self.start.state is not None
-        work = WearingJoint.of(self.case, self.start.state, self.asked.wear_coefficient, self.asked.law)
+        asked = self.asked
+        work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.follow)
         work.budget.deadline = self.began + self.case.settings.time_limit
         return work
 

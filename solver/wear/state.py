@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
@@ -40,14 +41,18 @@ class WearState:
     The next step depends on this state only. A factorisation that is kept between two solves only saves time.
 
     cycle: cycle count.
+    omega: angular frequency of the excitation, rad/s.
+    lag: phase lag of the vibration where the frequency is followed, rad (`solver.continuation.phase_lag`).
+    half_width: change of the frequency over the change of the phase lag, rad/s: half the width of the resonance that
+        the frequency follows; 0 for a given frequency.
     point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
     resolution: harmonics and samples of the periodic state.
     choice: last choice of the resolution.
     rates: wear rates so far.
     most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle; rates far below are round-off.
     step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
-    change: length of the last step, cycles, and change of the predicted force in this step (n_rel, 2H+1), N, for the
-        extrapolation to the next state; None after a jump and after a change of the harmonics.
+    change: length of the last step, cycles, and changes of predicted force (n_rel, 2H+1), N, and frequency, rad/s, in
+        this step, for the extrapolation to the next state; None after a jump and after a change of the harmonics.
     previous: length of the last step, cycles, and depth at its start (n_contact,), m, for BDF2; None after a jump.
     length: length of the next step, cycles, planned by the control.
     first_length: length of the first step, cycles.
@@ -60,17 +65,20 @@ class WearState:
     """
 
     cycle: float
+    omega: float
     point: PathPoint
     resolution: Resolution
     choice: Choice
     rates: WearRates
     most_rate: float = 0.0
     step_limit: float = float("nan")
-    change: tuple[float, FloatArray] | None = None
+    change: tuple[float, FloatArray, float] | None = None
     previous: tuple[float, FloatArray] | None = None
     length: float = 0.0
     first_length: float = 0.0
     judged_h: FloatArray | None = None
+    lag: float = 0.5 * math.pi
+    half_width: float = 0.0
     hold: Hold | None = None
     held_from: float = float("nan")
     jump_cycle: float = float("nan")
@@ -90,6 +98,20 @@ class WearState:
     def planned(self, length: float) -> WearState:
         """The state with another length of the next step, cycles."""
         return replace(self, length=length)
+
+
+@dataclass(frozen=True)
+class Reached:
+    """End of a step.
+
+    point: periodic state.
+    omega, lag, half_width: as in `WearState`.
+    """
+
+    point: PathPoint
+    omega: float
+    lag: float
+    half_width: float
 
 
 @packable

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from solver.accuracy.error_estimate import euler_error
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
-from solver.newton.solve_balance import solve_balance
+from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history
 from solver.outcome import Outcome
 from solver.settings import Scheme
 from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.euler import euler_balance
 from solver.wear.options import WEAR
-from solver.wear.state import Failure, WearState
+from solver.wear.state import Failure, Reached, WearState
 from solver.wear.step_limit import too_long
 from solver.wear.wearing_joint import WearingJoint
 
@@ -47,15 +46,13 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     base = PathPoint(0.0, state.point.evaluation, state.point.history)
     balance_at = euler_balance(joint, scheme, base.evaluation, length, work.wear_coefficient, work.wearing)
     whole = balance_at(1.0, base.history)
-    start = work.predicted(state, whole, length)
-    if start is not base.evaluation.predicted_h:
-        found = solve_balance(whole, start, work.solver, tolerance, work.budget, WEAR.step_iterations)
-        if found.converged:
-            point = PathPoint(0.0, found.evaluation, final_history(whole, found.evaluation))
-            return _euler(work, state, point, length)
+    if (state.change is not None or work.follow is not None) and (end := work.solved(state, whole, length)) is not None:
+        return _euler(work, state, end, length)
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
     shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
+    if work.follow is not None:
+        return _shortened(work, state, length, balance_at, shortest)
     last, arrived = follow_naturally(
         balance_at, base, 1.0, work.solver, tolerance, work.budget, keep_history=True, shortest=shortest
     )
@@ -66,13 +63,24 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
         return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
     ahead = last.parameter * length
     point = PathPoint(0.0, last.evaluation, final_history(balance_at(last.parameter, base.history), last.evaluation))
-    taken = _euler(work, state, point, ahead)
+    taken = _euler(work, state, Reached(point, state.omega, state.lag, state.half_width), ahead)
     return replace(taken, length=length, arrived=arrived, end_known_to=shortest * length)
 
 
-def _euler(work: WearingJoint, state: WearState, point: PathPoint, length: float) -> Step:
-    """The result of an Euler step that ends at a state."""
-    after = work.accepted(state, point, length)
+def _shortened(work: WearingJoint, state: WearState, length: float, balance_at: BalanceAt, shortest: float) -> Step:
+    """A step at the frequency that is followed, halved until its end is found; shortest: as a fraction of the step."""
+    fraction = 0.5
+    while fraction >= shortest and not work.budget.exhausted:
+        end = work.solved(state, balance_at(fraction, state.point.history), fraction * length)
+        if end is not None:
+            return _euler(work, state, end, fraction * length)
+        fraction *= 0.5
+    return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
+
+
+def _euler(work: WearingJoint, state: WearState, end: Reached, length: float) -> Step:
+    """The result of an Euler step."""
+    after = work.accepted(state, end, length)
     change = abs(float(after.rates.value[-1] - state.rates.value[-1]))
     return Step(after, euler_error(length, change), length)
 

@@ -14,12 +14,15 @@ from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.options import NEWTON
+from solver.newton.solve_balance import Budget, solve_balance
 from solver.results.history import PeriodicState
-from solver.settings import Resolution
+from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
+from solver.wear.followed import end_at_resonance, lost_resonance
+from solver.wear.options import WEAR
 from solver.wear.rates import WearRates
-from solver.wear.state import Choice, WearState
+from solver.wear.state import Choice, Failure, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
 
 
@@ -28,11 +31,12 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings, with the resolution and the hold of the last state that was used.
-    omega: angular frequency, rad/s.
+    omega: angular frequency of the unworn state, rad/s.
     excitation_amplitude: N.
     wear_coefficient: 1/Pa.
     wearing: part of the slip work that wears.
     budget: counts the iterations and limits the time.
+    follow: what the frequency follows; None for a constant frequency.
     solver: keeps a factorisation from one solve to the next.
     usual_work: N m, lower bound of the slip work to which errors are relative in the choice of harmonics.
     """
@@ -42,34 +46,44 @@ class WearingJoint:
     excitation_amplitude: float
     wear_coefficient: float
     wearing: WearingWork
+    follow: FollowedFrequency | None = None
     budget: Budget = field(default_factory=Budget)
     solver: JacobianSolver = field(default_factory=JacobianSolver)
     usual_work: float = 0.0
     _joint: Joint | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, case: Case, state: PeriodicState, wear_coefficient: float, law: WearLaw = ARCHARD) -> WearingJoint:
+    def of(
+        cls,
+        case: Case,
+        state: PeriodicState,
+        wear_coefficient: float,
+        law: WearLaw = ARCHARD,
+        follow: FollowedFrequency | None = None,
+    ) -> WearingJoint:
         """The joint of a case at the frequency and load of its unworn state."""
         wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
-        return cls(case, state.omega, state.excitation_amplitude, wear_coefficient, wearing)
+        return cls(case, state.omega, state.excitation_amplitude, wear_coefficient, wearing, follow)
 
     @property
     def area(self) -> FloatArray:
         """Area of the pairs (n_contact,), m2."""
         return self.case.model.contact.area
 
-    def joint(self, resolution: Resolution, hold: Hold | None) -> Joint:
-        """The joint with these harmonics and samples; a change of them drops the factorisation."""
+    def joint(self, resolution: Resolution, hold: Hold | None, omega: float) -> Joint:
+        """The joint with these harmonics and samples, whose change drops the factorisation, at a frequency, rad/s."""
         if self._joint is None or resolution != self.case.resolution or hold is not self.case.hold:
             case = self.case if hold is self.case.hold else self.case.held(hold)
             self.case = case.at(resolution)
-            self._joint = self.case.joint(self.omega, self.excitation_amplitude)
+            self._joint = self.case.joint(omega, self.excitation_amplitude)
             self.drop_factor()
+        elif omega != self._joint.omega:
+            self._joint = self.case.joint(omega, self.excitation_amplitude)
         return self._joint
 
     def at(self, state: WearState) -> Joint:
         """The joint of a state."""
-        return self.joint(state.resolution, state.hold)
+        return self.joint(state.resolution, state.hold, state.omega)
 
     def drop_factor(self) -> None:
         """Drop the kept factorisation, so that the next solve depends on the state alone."""
@@ -106,7 +120,7 @@ class WearingJoint:
         accurate: whether these errors are below rtol.
         step_limit: largest stable explicit step, cycles; NaN if unknown.
         """
-        joint = self.joint(resolution, None)
+        joint = self.joint(resolution, None, start.omega)
         balance = Balance.frozen(joint, start.start_history, start.wear_depth)
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
         n_rates = self.area.size + 1
@@ -114,13 +128,21 @@ class WearingJoint:
         point = PathPoint(0.0, at, final_history(balance, at))
         rates = WearRates.none(n_rates)
         # the stability of a start state has been checked
-        begun = WearState(0.0, point, resolution, choice, rates, step_limit=step_limit, judged_h=at.predicted_h)
+        begun = WearState(
+            0.0, start.omega, point, resolution, choice, rates, step_limit=step_limit, judged_h=at.predicted_h
+        )
         return self.noted(begun)
 
-    def accepted(self, state: WearState, point: PathPoint, length: float) -> WearState:
-        """The state after a step of `length` cycles that ends at `point`."""
-        change = length, point.evaluation.predicted_h - state.point.evaluation.predicted_h
-        after = replace(state, cycle=state.cycle + length, point=point, change=change, previous=(length, state.depth))
+    def accepted(self, state: WearState, end: Reached, length: float) -> WearState:
+        """The state after a step of `length` cycles."""
+        moved = end.point.evaluation.predicted_h - state.point.evaluation.predicted_h
+        after = replace(
+            state,
+            cycle=state.cycle + length,
+            **vars(end),
+            change=(length, moved, end.omega - state.omega),
+            previous=(length, state.depth),
+        )
         return self.noted(after)
 
     def noted(self, state: WearState) -> WearState:
@@ -138,12 +160,43 @@ class WearingJoint:
             state = replace(state, step_limit=limit)
         return state
 
-    def predicted(self, state: WearState, balance: Balance, length: float) -> FloatArray:
-        """First predicted force of a solve (n_rel, m), N: extrapolated from the last step, or that of the state."""
+    def solved(self, state: WearState, balance: Balance, length: float) -> Reached | None:
+        """End of a step of `length` cycles with this balance; None where it is not found."""
+        settings, most = self.case.settings, WEAR.step_iterations
+        start, balance = self.predicted(state, balance, length)
+        if self.follow is not None:
+            return end_at_resonance(self.case, balance, start, state, self.follow, self.solver, self.budget)
+        found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)
+        if not found.converged:
+            return None
+        point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))
+        return Reached(point, state.omega, state.lag, state.half_width)
+
+    def tuned(self, state: WearState) -> WearState | Failure:
+        """The state at the frequency that is followed, with its depths and its tangential history."""
+        if self.follow is None:
+            return state
+        at = state.point.evaluation
+        balance = Balance.frozen(self.at(state), at.history, at.wear_depth)
+        found = end_at_resonance(
+            self.case, balance, at.predicted_h, state, self.follow, self.solver, self.budget, NEWTON.iterations
+        )
+        if found is None:
+            return lost_resonance(self.follow, state)
+        return replace(state, **vars(found))
+
+    def predicted(self, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
+        """First predicted force of a solve (n_rel, m), N, and the balance at the first frequency.
+
+        Both are extrapolated from the last step, or those of the state.
+        """
         now = state.point.evaluation.predicted_h
         if state.change is None:
-            return now
-        before, change = state.change
-        ahead = now + (length / before) * change
-        nearer = balance.evaluate(ahead).scaled_residual() <= balance.evaluate(now).scaled_residual()
-        return ahead if nearer else now
+            return now, balance
+        before, change, faster = state.change
+        ahead, there = now + (length / before) * change, balance
+        if self.follow is not None:
+            omega = state.omega + (length / before) * faster
+            there = replace(balance, joint=self.case.joint(omega, self.excitation_amplitude))
+        nearer = there.evaluate(ahead).scaled_residual() <= balance.evaluate(now).scaled_residual()
+        return (ahead, there) if nearer else (now, balance)

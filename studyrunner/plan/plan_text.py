@@ -53,6 +53,7 @@ def format_plan(
         ("scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"),
         *([("scenes", scenes)] if scenes else []),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
+        *([("frequency", _followed(study))] if study.follow is not None else []),
         ("cycles", _cycles(study)),
         ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
         ("solver", _solver(study, facts)),
@@ -64,6 +65,12 @@ def format_plan(
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
+
+
+def _followed(study: Study) -> str:
+    assert study.follow is not None
+    what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
+    return what if study.cycles_kept[-1] == 0.0 else f"{what} and followed while the joint wears"
 
 
 def _cycles(study: Study) -> str:

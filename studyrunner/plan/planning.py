@@ -158,6 +158,7 @@ class _Planner:
                 settings=case.settings,
                 frequencies=tuple(at),
                 cost=seconds_an_iteration(n_unknowns) * iterations_of_branch(case.sweep, len(at)),
+                follow=self._study.follow,
             )
         )
         self._marches.append(
@@ -227,6 +228,7 @@ class _Planner:
                 cost=seconds_an_iteration(n_unknowns) * iterations_of_march(scheme, cycles, histories[0].step),
                 n_unknowns=n_unknowns,
                 until=study.until,
+                follow=study.follow,
                 to_the_end=end,
             )
 

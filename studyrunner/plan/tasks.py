@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
-from solver.settings import SolverSettings, ToTheEnd, WearTarget
+from solver.settings import FollowedFrequency, SolverSettings, ToTheEnd, WearTarget
 from studyrunner.plan.cost_model import CostKeys
 from studyrunner.plan.estimate import ITERATIONS_A_STATE, iterations_of_branch
 from studyrunner.plan.sharing import Index, LeftOut, ScaledHistory, march_counts
@@ -50,6 +50,7 @@ class BranchTask:
     excitation_amplitude: N.
     frequencies: Hz, ascending.
     cost: estimated time, s.
+    follow: what the frequency follows in place of `frequencies`, whose only value is then the middle of the range.
     known: indices of the frequencies whose results are not needed, as an earlier run has left them or all histories
         that start from them.
     resume: progress of an earlier run; None to begin with the first frequency.
@@ -64,6 +65,7 @@ class BranchTask:
     settings: SolverSettings
     frequencies: tuple[float, ...]
     cost: float
+    follow: FollowedFrequency | None = None
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
@@ -118,6 +120,7 @@ class MarchTask:
         the first point.
     cycles: cycle counts of the output of every history.
     until: wear at which the history ends before the last count.
+    follow: what the frequency follows; None for the frequency of the start state.
     to_the_end: integration until nothing wears any more. Then `cycles` numbers the outputs.
     variables: names of the variables in a result. loops: pairs whose fretting loops are among them.
     cost: estimated time, s.
@@ -144,6 +147,7 @@ class MarchTask:
     cost: float
     n_unknowns: int
     moves: bool = True
+    follow: FollowedFrequency | None = None
     until: WearTarget | None = None
     to_the_end: ToTheEnd | None = None
     start: Packed | None = field(default=None, compare=False, repr=False)

@@ -108,6 +108,9 @@ def check_scatter(study: Study) -> None:
         if name not in numbers:
             remedy = f"unknown input, give {nearest_name(name, dict.fromkeys(numbers))}"
             raise UserError(study.source, f"scatter.{name}", None, remedy)
+        if name == "frequency" and study.follow is not None:
+            remedy = f'leave it out: with axes.frequency = "{study.follow.of}" each sample finds its own frequency'
+            raise UserError(study.source, "scatter.frequency", None, remedy)
         several = name in _OF_AXES and len(getattr(study.axes, name)) > 1
         several = several or any(axis.name == name for axis in study.scene_axes)
         if several and scattered.distribution.kind == "value":

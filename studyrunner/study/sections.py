@@ -97,7 +97,9 @@ class StudySection(Section):
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
-    frequency: Axis[Positive] = Field(description="Hz; a number, a list or {start, stop, num}")
+    frequency: Axis[Positive] = Field(
+        description='Hz; a number, a list or {start, stop, num}; or "resonance" or "peak", see [loading]'
+    )
     wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa")
     excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
     step: Axis[Positive] = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")

@@ -10,8 +10,9 @@ from pathlib import Path
 from pydantic import Field, model_validator
 
 from solver.contact.wear_law import WearLaw
-from solver.settings import TARGETS, Automatic, WearTarget
+from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
 from studyrunner.scatter.section import ScatterSection
+from studyrunner.study.followed import LoadingSection
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import (
     AUTO,
@@ -29,7 +30,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import COORDINATES, OF_SAMPLES, USUAL
+from studyrunner.variables import COORDINATES, FOLLOWED_FREQUENCY, OF_SAMPLES, USUAL
 
 _MOST_POINTS = 1_000_000
 
@@ -37,6 +38,7 @@ _MOST_POINTS = 1_000_000
 class Study(Section):
     """A whole study.
 
+    - follow: what the frequency of the excitation follows; None where it is given.
     - source: file of the study, as the user named it.
     - folder: folder of this file.
     - archived: attributes of a result file; None for a study file.
@@ -54,6 +56,8 @@ class Study(Section):
     solver: SolverSection = SolverSection()
     outputs: OutputsSection = OutputsSection()
     scatter: ScatterSection | None = None
+    loading: LoadingSection | None = None
+    follow: FollowedFrequency | None = Field(None, exclude=True)
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     archived: Archived | None = Field(None, exclude=True)
@@ -73,7 +77,8 @@ class Study(Section):
         if not isinstance(names, list) or names.count(DEFAULT) != 1:
             return table
         usual = OF_SAMPLES if table.get("scatter") is not None else USUAL
-        cheap = [*usual, *(name for name in scene.offers if name == "mesh")]
+        followed = FOLLOWED_FREQUENCY if table.get("follow") is not None else ()
+        cheap = [*usual, *followed, *(name for name in scene.offers if name == "mesh")]
         filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
         return {**table, "outputs": {**outputs, "variables": filled}}
 
@@ -136,6 +141,24 @@ class Study(Section):
             raise WrongValueError(self.slow_time.until, remedy, "slow_time.until")
         if self.to_the_end and "exact" in self.outputs.variables:
             remedy = "leave it out: it is of given cycle counts, and slow_time.cycles = inf has none"
+            raise WrongValueError("exact", remedy, "outputs.variables")
+        return self
+
+    @model_validator(mode="after")
+    def _check_followed(self) -> Study:
+        if self.follow is None:
+            return self
+        word = self.follow.of
+        if "ramp" in self.axes.sweep:
+            remedy = f'give "up" or "down": a ramp holds the frequency, and axes.frequency = "{word}" seeks it'
+            raise WrongValueError("ramp", remedy, "axes.sweep")
+        if "final" in self.axes.scheme:
+            remedy = (
+                f'give "adaptive": the scheme "final" holds the frequency, and axes.frequency = "{word}" follows it'
+            )
+            raise WrongValueError("final", remedy, "axes.scheme")
+        if "exact" in self.outputs.variables:
+            remedy = f'leave it out: it is of given frequencies, and axes.frequency = "{word}" has none'
             raise WrongValueError("exact", remedy, "outputs.variables")
         return self
 

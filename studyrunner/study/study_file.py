@@ -14,6 +14,7 @@ import numpy as np
 
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
+from studyrunner.study.followed import take_followed
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_axes import (
@@ -41,7 +42,9 @@ Table = dict[str, object]
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _SECTIONS = tuple(
-    name for name in Study.model_fields if name not in ("source", "folder", "archived", "scene_axes", "variants")
+    name
+    for name in Study.model_fields
+    if name not in ("follow", "source", "folder", "archived", "scene_axes", "variants")
 )
 
 
@@ -121,11 +124,11 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     # only what was kept on request takes the place of what a bundled scene builds
     kept = archived if _section(table, "outputs").get("scene") is True else None
     sections["scene"] = check_scene(_section(table, "scene"), source, path, archived, kept)
+    follow = take_followed(sections, source)
     moved = _move_solver_axes(sections)
+    given = {"source": source, "folder": path.parent, "archived": archived, "follow": follow}
     try:
-        study = check_table(
-            Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, ""
-        )
+        study = check_table(Study, {**sections, **given}, source, "")
         study = with_room_for_wear(study)
         check_scatter(study)
         return study
@@ -167,6 +170,8 @@ def format_study(study: Study) -> str:
     chosen = _chosen_by_scenes(study)
     kept = {key: value for key, value in scene["parameters"].items() if key not in chosen}
     sections["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
+    if study.follow is not None:
+        sections["axes"]["frequency"] = study.follow.of
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue

@@ -15,6 +15,7 @@ from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.edge_wear import EdgeWear
+from studyrunner.summary.followed_frequency import FollowedFrequencies
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
@@ -61,6 +62,7 @@ class CertificateTable:
         self._volumes = WornVolumes(study)
         self._small = SmallWear(study, facts)
         self._edge = EdgeWear(study, facts)
+        self._frequencies = FollowedFrequencies(study)
         self._outcomes = OutcomeTable(study)
         self._doubts = Doubts(study, facts)
         self._n_complete = 0
@@ -73,7 +75,8 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
-        for collected in (self._volumes, self._small, self._edge, self._outcomes, self._doubts):
+        collections = (self._volumes, self._small, self._edge, self._frequencies, self._outcomes, self._doubts)
+        for collected in collections:
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -100,6 +103,7 @@ class CertificateTable:
         """
         rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
         rows.extend(self._edge.rows())
+        rows.extend(self._frequencies.rows())
         rows.extend(self._outcomes.rows())
         rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the end"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())

@@ -25,6 +25,7 @@ def report(depth: Sequence[float], value: float, resolution: Resolution = RESOLU
     """All numbers of a state but its depths are `value`."""
     pairs = np.full(2, value)
     return StateReport(
+        excitation_frequency=160.0,
         wear_depth=np.array(depth, float),
         mean_pressure=pairs,
         slip_range=pairs,

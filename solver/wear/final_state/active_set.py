@@ -28,7 +28,7 @@ from solver.newton.solve_balance import solve_balance
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
 from solver.wear.options import WEAR
-from solver.wear.state import WearState
+from solver.wear.state import Reached, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -93,7 +93,11 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
         held = Balance.frozen(joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
         grazes = PathPoint(0.0, grazing, final_history(held, grazing))
-        state = replace(work.accepted(state, grazes, 0.0), change=None, previous=None)
+        state = replace(
+            work.accepted(state, Reached(grazes, state.omega, state.lag, state.half_width), 0.0),
+            change=None,
+            previous=None,
+        )
     raise NoActiveSetError("pairs begin to slip without end")
 
 

@@ -1,0 +1,210 @@
+"""A periodic state whose vibration lags behind its excitation by a given phase: the frequency is an unknown.
+
+With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
+from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The unknowns
+are the predicted force p and the frequency omega, the equations are the harmonic balance `R(p, omega) = 0`, in an
+implicit step with the wear depth that grows with the motion, and
+
+    sin(arg(F^H x) + lag) = 0.
+
+Newton's method eliminates p: the solver of the Jacobian dR/dp gives the step of p for the residual and for the
+frequency, and one equation remains. The wear depth is eliminated in the Jacobian, so that its change with the frequency
+is part of the step.
+
+The largest amplitude has a lag of its own. For a linear oscillator of one degree of freedom with the damping ratio
+zeta its frequency is omega_0 sqrt(1 - 2 zeta^2), while the one of phase resonance is omega_0.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.continuation.options import CONTINUATION
+from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
+from solver.model import ComplexArray, FloatArray
+from solver.newton.iteration import solve_newton
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
+from solver.newton.solve_balance import Budget
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, Joint
+
+
+@dataclass(frozen=True)
+class LaggingState:
+    """Evaluation of the equations.
+
+    balance: harmonic balance at the frequency. at: its evaluation.
+    error: sine of the lag above the given one.
+    turn: change of the lag with the frequency, s/rad, from the last step of Newton's method; NaN without a step.
+    """
+
+    balance: Balance
+    at: Evaluation
+    error: float
+    turn: float = math.nan
+
+    @property
+    def omega(self) -> float:
+        """Frequency, rad/s."""
+        return self.balance.joint.omega
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """As in Evaluation."""
+        return self.at.scale
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Norm of the residual, dimensionless."""
+        return math.hypot(self.at.scaled_residual(scale), self.error)
+
+
+def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
+    """`F^H x`, N m, of excitation and displacements in the first harmonic, from the motion (n_contact, 3, 2H+1), m."""
+    structure = joint.structure
+    return complex(structure.drive @ _first(joint, displacement_h) + structure.drive_offset)
+
+
+def phase_lag(joint: Joint, at: Evaluation) -> float:
+    """Lag of the vibration behind the excitation, rad, from -pi/2 to 3 pi/2."""
+    return (-cmath.phase(excitation_product(joint, at.displacement_h)) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
+
+
+def solve_at_lag(
+    case: Case,
+    balance: Balance,
+    start: FloatArray,
+    lag: float,
+    solver: JacobianSolver,
+    tolerance: float,
+    budget: Budget,
+    most: int | None = None,
+) -> LaggingState | None:
+    """The state with a given lag; None where Newton's method fails.
+
+    Parameters
+    ----------
+    case : Case
+        The case of the joint of the balance.
+    balance : Balance
+        The problem at the first frequency, with fixed or with growing wear depths.
+    start : array (n_rel, 2H+1)
+        First predicted force, N.
+    lag : float
+        rad, between 0 and pi.
+    solver, tolerance, budget, most
+        As in `solve_balance`.
+    """
+    shape, unit, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
+
+    def error(product: complex) -> float:
+        return -(unit * product).imag / max(abs(product), 1e-300)
+
+    def evaluate(unknown: FloatArray) -> LaggingState:
+        here = replace(balance, joint=case.joint(float(unknown[-1]), amplitude))
+        at = here.evaluate(unknown[:-1].reshape(shape))
+        return LaggingState(here, at, error(excitation_product(here.joint, at.displacement_h)))
+
+    turn = math.nan
+
+    def direction(state: LaggingState) -> FloatArray:
+        nonlocal turn
+        budget.check_time()
+        rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
+        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state)
+        steps = solver.solve_two(tangent, -state.at.residual, -by_frequency.residual, rtol)
+        own, with_frequency = (_product_change(tangent, step) for step in steps)
+        product = excitation_product(state.balance.joint, state.at.displacement_h)
+        # the equation times |F^H x|, whose derivative is linear in the motion
+        slope = (unit * (with_frequency + by_frequency.product)).imag
+        change = -(unit * (product + own)).imag / slope if slope != 0.0 else math.inf
+        turn = -slope / max(abs(product), 1e-300)
+        step = np.append((steps[0] + change * steps[1]).ravel(), change)
+        largest = CONTINUATION.largest_frequency_change * state.omega
+        return np.asarray(step * min(1.0, largest / max(abs(change), 1e-300)))
+
+    end = solve_newton(evaluate, direction, np.append(start.ravel(), balance.joint.omega), tolerance, most)
+    budget.iterations += end.iterations
+    return replace(end.evaluation, turn=turn) if end.converged else None
+
+
+@dataclass(frozen=True)
+class FrequencyDerivative:
+    """Derivatives with respect to the frequency at a fixed predicted force.
+
+    residual (n_rel, 2H+1): N s/rad. product: of `F^H x`, N m s/rad.
+    ahead: joint at the frequency of the difference. length: difference of the frequencies, rad/s.
+    """
+
+    residual: FloatArray
+    product: complex
+    ahead: Joint
+    length: float
+
+
+def frequency_derivative(case: Case, state: LaggingState) -> FrequencyDerivative:
+    """Derivatives at a state, by differences; the motion of masses on rigid ground depends on the frequency, too."""
+    joint, at = state.balance.joint, state.at
+    length = CONTINUATION.frequency_difference * joint.omega
+    ahead = case.joint(joint.omega + length, joint.excitation_amplitude)
+    moved = at.displacement_h
+    if joint.penalty.inertial.any():
+        other = replace(state.balance, joint=ahead).evaluate(at.predicted_h)
+        moved, residual = other.displacement_h, other.residual
+    else:
+        structure = ahead.structure
+        residual = structure.apply(joint.to_relative(moved)) + joint.to_relative(at.force_h) - structure.force_h()
+    product = excitation_product(ahead, moved) - excitation_product(joint, at.displacement_h)
+    return FrequencyDerivative((residual - at.residual) / length, product / length, ahead, length)
+
+
+def _first(joint: Joint, motion_h: FloatArray) -> ComplexArray:
+    return to_complex(joint.to_relative(motion_h))[:, 0]
+
+
+def _product_change(tangent: Linearisation, step: FloatArray) -> complex:
+    """Change of `F^H x`, N m, for a step (n_rel, 2H+1) of the predicted force, N."""
+    joint = tangent.joint
+    return complex(joint.structure.drive @ _first(joint, tangent.transmit(step)[0]))
+
+
+def _accurately(tangent: Linearisation, right: FloatArray, solver: JacobianSolver) -> FloatArray:
+    """Step (n_rel, m) with Jacobian times step = right (n_rel, m): more accurate than a Newton direction."""
+    step, left = np.zeros_like(right), right
+    for _ in range(CONTINUATION.derivative_solves):
+        step = step + solver.solve(tangent, left)
+        left = right - tangent.apply(step)
+        if np.linalg.norm(left) <= CONTINUATION.derivative_error * np.linalg.norm(right):
+            break
+    return step
+
+
+def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) -> tuple[float, float]:
+    """Changes along the frequency at fixed wear depth and tangential history, both s/rad.
+
+    Returns
+    -------
+    rise : float
+        Of the logarithm of the amplitude of the first response, in the first harmonic.
+    turn : float
+        Of the lag.
+    """
+    held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
+    state = replace(state, balance=held)
+    by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
+    step = _accurately(tangent, -by_frequency.residual, solver)
+    moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
+    if joint.penalty.inertial.any():
+        ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)
+        moved = moved + ahead.displacement_h - state.at.displacement_h
+    values = [
+        (to_complex(at.structure.response_h(at.to_relative(motion)))[0, 0], excitation_product(at, motion))
+        for at, motion in ((joint, state.at.displacement_h), (by_frequency.ahead, moved))
+    ]
+    (response, product), (response_ahead, product_ahead) = values
+    rise = math.log(abs(response_ahead) / abs(response)) / by_frequency.length
+    return rise, -cmath.phase(product_ahead / product) / by_frequency.length

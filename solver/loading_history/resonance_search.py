@@ -1,0 +1,131 @@
+"""The resonance that a sweep over a range of frequencies meets first: where a history with followed frequency begins.
+
+The sweep is the loading history of the point, up or down, with nodes of its own (`sweep`). Between two nodes the
+resonance is where the phase lag passes pi/2, or where the amplitude of the first response stops to rise. A resonance
+that the sweep jumps over, from a fold to a branch beyond, is none of its states.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from solver.continuation.phase_lag import LaggingState, phase_lag, rise_of_response
+from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.frequency_sweep import Found, FrequencySweep
+from solver.loading_history.options import LOADING
+from solver.loading_history.sweep import NodeSweep
+from solver.newton.linear_solver import JacobianSolver
+from solver.newton.solve_balance import Budget
+from solver.outcome import Outcome
+from solver.settings import FollowedFrequency
+
+
+def advance_to_resonance(line: FrequencySweep, follow: FollowedFrequency) -> Found:
+    """State at the first resonance that a sweep meets in a range, or the reason why there is none.
+
+    line: sweep "up" or "down", at its beginning or as saved on its way.
+    """
+    try:
+        frequency = find_resonance(line, follow)
+    except _NoneFoundError as error:
+        found = Found(error.outcome)
+        found.message = str(error)
+        return found
+    return line.advance(frequency)
+
+
+class _NoneFoundError(Exception):
+    """The sweep meets no resonance."""
+
+    def __init__(self, message: str, outcome: Outcome = Outcome.RESONANCE_LOST) -> None:
+        super().__init__(message)
+        self.outcome = outcome
+
+
+def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
+    """Frequency of the first resonance that a sweep meets in a range, Hz. Raises _NoneFoundError."""
+    before = None
+    for near, far in _segments(follow, line.sweep == "down"):
+        # the state at a frequency belongs to the sweep of its quarter octave
+        nodes = line.sweep_in_cell(0.5 * (near + far))
+        budget = Budget(deadline=line.budget.deadline)
+
+        def excess(omega: float, nodes: NodeSweep = nodes, budget: Budget = budget) -> float:
+            """Positive before the resonance on the way of the sweep, negative behind."""
+            budget.iterations, budget.limit = 0, LOADING.node_iterations
+            step, _ = nodes.state_at(omega, budget)
+            if step is None:
+                raise _lost(line, nodes, omega)
+            return nodes.direction * _rise(nodes, step.point, follow)
+
+        place, end = (2.0 * math.pi * frequency for frequency in (near, far))
+        if nodes.here is not None and (nodes.here.parameter - place) * nodes.direction > 0.0:
+            # saved on the way
+            place = nodes.here.parameter
+        line.advance_nodes(nodes, place)
+        here = excess(place)
+        if before is not None and before > 0.0 >= here:
+            return near
+        while place != end:
+            line.advance_nodes(nodes, float(np.nextafter(place, nodes.direction * math.inf)))
+            if nodes.ahead is None:
+                raise _lost(line, nodes, place)
+            target = min(nodes.ahead.point.parameter, end, key=lambda at: (at - place) * nodes.direction)
+            there = excess(target)
+            if here > 0.0 >= there:
+                return _between(excess, place, target, nodes, follow) / (2.0 * math.pi)
+            place, here = target, there
+        before = here
+    raise _NoneFoundError(
+        f"the sweep {line.sweep} meets no {follow.of} between {follow.low:g} and {follow.high:g} Hz: give another range"
+    )
+
+
+def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
+    """Parts of a range, Hz, in each of which one sweep passes all frequencies, in the order of the sweep."""
+    per_octave = LOADING.cells_per_octave
+    first, last = (math.floor(per_octave * math.log2(end)) for end in (follow.low, follow.high))
+    edges = [2.0 ** (cell / per_octave) for cell in range(first + 1, last + 1)]
+    ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]
+    # a frequency on an edge belongs to the part above
+    parts = [(low, high if high == follow.high else float(np.nextafter(high, 0.0))) for low, high in pairwise(ends)]
+    return ((high, low) for low, high in reversed(parts)) if down else iter(parts)
+
+
+def _rise(nodes: NodeSweep, point: PathPoint, follow: FollowedFrequency) -> float:
+    """Positive below the resonance, negative above, dimensionless."""
+    joint, at = nodes.path.joint_at(point.parameter), point.evaluation
+    if follow.of == "resonance":
+        return math.cos(phase_lag(joint, at))
+    state = LaggingState(Balance.frozen(joint, at.history, at.wear_depth), at, 0.0)
+    return joint.omega * rise_of_response(nodes.case, state, JacobianSolver())[0]
+
+
+def _between(
+    excess: Callable[[float], float], one: float, other: float, nodes: NodeSweep, follow: FollowedFrequency
+) -> float:
+    """Frequency, rad/s, at which the excess passes zero between two nodes. Raises _NoneFoundError."""
+    if excess(one) <= 0.0:
+        # zero but for round-off
+        return one
+    found = float(brentq(excess, one, other, xtol=LOADING.resonance_accuracy * one, rtol=1e-12))
+    assert nodes.ahead is not None
+    for fold in nodes.ahead.folds:
+        if abs(found - fold) <= LOADING.free_step * fold:
+            way, back = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
+            over = f"{follow.of} at {fold / (2.0 * math.pi):.6g} Hz"
+            raise _NoneFoundError(f'the sweep {way} jumps over the {over}: give sweep = "{back}"')
+    return found
+
+
+def _lost(line: FrequencySweep, nodes: NodeSweep, omega: float) -> _NoneFoundError:
+    return _NoneFoundError(
+        f"the sweep {line.sweep} ends at {omega / (2.0 * math.pi):.6g} Hz and has met no resonance until there",
+        line.why_lost(nodes),
+    )
