@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -44,16 +47,18 @@ def follow_mode(
     """
     way = _Way(model, friction_coefficient, number, direction, settings)
     for index in way.order(amplitudes):
-        way.budget.deadline = computing_time() + settings.time_limit
+        began = computing_time()
+        way.budget.deadline = began + settings.time_limit
         try:
-            yield index, way.point(float(amplitudes[index]))
+            point = way.point(float(amplitudes[index]))
         except OutOfTimeError:
-            yield index, ModePoint(Outcome.TIME_LIMIT)
+            point = ModePoint(Outcome.TIME_LIMIT)
         except np.linalg.LinAlgError:
-            yield index, ModePoint(Outcome.SINGULAR)
+            point = ModePoint(Outcome.SINGULAR)
         except Exception as error:
             # an error spoils one point only
-            yield index, ModePoint(Outcome.EXCEPTION, describe_error(error))
+            point = ModePoint(Outcome.EXCEPTION, describe_error(error))
+        yield index, replace(point, newton_iterations=way.iterations, run_time=computing_time() - began)
 
 
 def top_of(amplitude: float) -> float:
@@ -78,6 +83,21 @@ class _Way:
         self._rest: Rest | tuple[Outcome, str] | None = None
         self._up: AmplitudeSweep | None = None
         self._down: tuple[float, AmplitudeSweep] | None = None
+        self._spent: Counter[str] = Counter()
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the way to the last point and of this point, those of other points left out."""
+        return self._spent.total()
+
+    @contextmanager
+    def _counted(self, part: str) -> Iterator[None]:
+        """Counts the iterations of a part of the way."""
+        before = self.budget.iterations
+        try:
+            yield
+        finally:
+            self._spent[part] += self.budget.iterations - before
 
     def order(self, amplitudes: FloatArray) -> list[int]:
         """Indices of the amplitudes in the order in which the sweeps pass them."""
@@ -88,31 +108,50 @@ class _Way:
 
     def point(self, amplitude: float) -> ModePoint:
         """The point at the next amplitude."""
+        self._spent["point"] = 0
         if self._rest is None:
-            self._rest = find_rest(*self._asked, self.budget)
+            with self._counted("rest"):
+                self._rest = find_rest(*self._asked, self.budget)
         if isinstance(self._rest, tuple):
             return ModePoint(*self._rest)
         if self._direction == "up" and not self._rest.glued:
             said = 'the joint has no such mode while its pairs stick: give direction = "down", from large amplitudes'
             return ModePoint(Outcome.START_FAILED, said)
         if self._direction == "up" and amplitude < first_amplitude(self._rest):
-            nodes = first_node(self._rest, amplitude, self.budget)
-            return self._failed() if nodes is None else judge_point(nodes.problem, nodes.here, None, self.budget)
-        sweep = self._raised() if self._direction == "up" else self._lowered(top_of(amplitude))
+            with self._counted("point"):
+                nodes = first_node(self._rest, amplitude, self.budget)
+                return self._failed() if nodes is None else judge_point(nodes.problem, nodes.here, None, self.budget)
+        sweep = self._sweep_to(amplitude)
         if sweep is None:
             return self._failed()
-        sweep.advance_to(amplitude)
-        return solve_point(sweep, amplitude, self.budget)
+        with self._counted("point"):
+            return solve_point(sweep, amplitude, self.budget)
+
+    def _sweep_to(self, amplitude: float) -> AmplitudeSweep | None:
+        """The sweep at the node before an amplitude; None where it does not begin."""
+        if self._direction == "up":
+            return self._raised_to(amplitude)
+        top = top_of(amplitude)
+        if self._down is None or self._down[0] != top:
+            self._spent["lowered"] = 0
+        sweep = self._lowered(top)
+        if sweep is not None:
+            with self._counted("lowered"):
+                sweep.advance_to(amplitude)
+        return sweep
 
     def _failed(self) -> ModePoint:
         return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
-    def _raised(self) -> AmplitudeSweep | None:
-        """The sweep with rising amplitude; None where it does not begin."""
+    def _raised_to(self, amplitude: float) -> AmplitudeSweep | None:
+        """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
         assert isinstance(self._rest, Rest)
-        if self._up is None:
-            nodes = first_node(self._rest, first_amplitude(self._rest), self.budget)
-            self._up = None if nodes is None else AmplitudeSweep(nodes, 1.0, self.budget)
+        with self._counted("raised"):
+            if self._up is None:
+                nodes = first_node(self._rest, first_amplitude(self._rest), self.budget)
+                self._up = None if nodes is None else AmplitudeSweep(nodes, 1.0, self.budget)
+            if self._up is not None:
+                self._up.advance_to(amplitude)
         return self._up
 
     def _lowered(self, top: float) -> AmplitudeSweep | None:
@@ -125,11 +164,12 @@ class _Way:
         if self._down is None or self._down[0] != top:
             nodes: Nodes | None = None
             if not self._rest.glued:
-                nodes = sliding_node(self._rest, top, self.budget)
-            elif (raised := self._raised()) is not None:
-                raised.advance_to(top)
+                with self._counted("lowered"):
+                    nodes = sliding_node(self._rest, top, self.budget)
+            elif (raised := self._raised_to(top)) is not None:
                 nodes = Nodes(raised.nodes.problem, (raised.ahead or raised.nodes.here,))
             if nodes is None:
                 return None
-            self._down = top, AmplitudeSweep(nodes, -1.0, self.budget)
+            with self._counted("lowered"):
+                self._down = top, AmplitudeSweep(nodes, -1.0, self.budget)
         return self._down[1]
