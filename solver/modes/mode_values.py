@@ -1,58 +1,16 @@
-"""What is reported of a point of a nonlinear mode: plain numbers and arrays."""
+"""The values of a point of a nonlinear mode, from its state."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
-from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
+from solver.model import BoolArray, ReducedModel
 from solver.modes.mode_point import ModePoint
-from solver.outcome import Outcome
-from solver.packing import packable
+from solver.results.mode_values import ModeValues, without_state
 from solver.structure.fourier import to_complex
-
-OF_A_POINT = (
-    "frequency",
-    "damping_ratio",
-    "frequency_error",
-    "damping_error",
-    "response",
-    "shape",
-    "slip_fraction",
-    "open_fraction",
-    "harmonics_used",
-    "samples_used",
-)
-"""Values of a point that `solver.Backbone` has for each amplitude."""
-
-
-@packable
-@dataclass(frozen=True)
-class ModeValues:
-    """A point of a nonlinear mode. Its values are NaN where no state was found.
-
-    - outcome, message, newton_iterations, run_time: as in `ModePoint`.
-    - all others: as in `solver.Backbone`, at one amplitude.
-    """
-
-    outcome: Outcome
-    message: str
-    frequency: float
-    damping_ratio: float
-    frequency_error: float
-    damping_error: float
-    response: ComplexArray
-    shape: ComplexArray
-    slip_fraction: FloatArray
-    open_fraction: FloatArray
-    harmonics_used: int
-    samples_used: int
-    newton_iterations: int
-    run_time: float
 
 
 def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
@@ -61,9 +19,9 @@ def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
     effort = (point.newton_iterations, point.run_time)
     state, problem = point.state, point.problem
     if state is None or problem is None or point.errors is None:
-        linear, nothing = model.linear[0], np.full(model.contact.n_contact, np.nan)
-        vectors = (np.full(len(linear.response), np.nan, complex), np.full(len(linear.mass), np.nan, complex))
-        return ModeValues(*ended, np.nan, np.nan, np.nan, np.nan, *vectors, nothing, nothing, 0, 0, *effort)
+        linear = model.linear[0]
+        sizes = (len(linear.response), len(linear.mass), model.contact.n_contact)
+        return without_state(*ended, sizes, *effort)
     joint, at, resolution = problem.joint_of(state), state.point.evaluation, problem.case.resolution
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
     return ModeValues(

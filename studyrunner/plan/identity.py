@@ -37,7 +37,8 @@ class Identities:
         if branch.number not in self._lines:
             # A time limit decides whether there is a result, not the values of the result.
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
-            line = (branch.excitation_amplitude, branch.sweep, settings)
+            mode = () if branch.mode is None else ("mode", branch.mode)
+            line = (branch.excitation_amplitude, branch.sweep, settings, *mode)
             joint = branch.joint
             scene = (self._digests[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
             key = _digest("line", scene, line)

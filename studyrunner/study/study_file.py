@@ -14,6 +14,7 @@ import numpy as np
 
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
+from studyrunner.study.mode_tables import asks_for_modes, check_mode_tables, with_idle_keys, without_idle_keys
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_axes import (
@@ -33,6 +34,7 @@ from studyrunner.study.study import Study, check_axes
 from studyrunner.study.study_of_result import Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.study.wear_section import WearSection
+from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -115,6 +117,7 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     worn = _section(table, "scene").get("worn")
     if worn is not None:
         sections["scene"] = {**_section(table, "scene"), "worn": read_worn(worn, source, path.parent)}
+    check_mode_tables(sections, source)
     scene_axes = _take_scene_axes(sections, source)
     if scene_axes:
         return _with_variants(sections, scene_axes, source, path, archived)
@@ -124,7 +127,10 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     moved = _move_solver_axes(sections)
     try:
         study = check_table(
-            Study, {**sections, "source": source, "folder": path.parent, "archived": archived}, source, ""
+            Study,
+            {**with_idle_keys(sections), "source": source, "folder": path.parent, "archived": archived},
+            source,
+            "",
         )
         study = with_room_for_wear(study)
         check_scatter(study)
@@ -137,7 +143,8 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
 
 def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
     """Axes of the study that are keys of [scene] or [wear]."""
-    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"))
+    name = "cycle" if asks_for_modes(sections) else WORN_AXIS
+    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"), name)
     if all(name in AxesSection.model_fields for name in _section(sections, "axes")):
         return of_worn
     with scene_errors(source, None):
@@ -179,7 +186,7 @@ def format_study(study: Study) -> str:
         if sections["axes"][key] is not None:
             del sections["solver"][key]
     lines = []
-    for name, section in sections.items():
+    for name, section in without_idle_keys(sections).items():
         if section is None:
             continue
         lines.append(f"[{name}]")
