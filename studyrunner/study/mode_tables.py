@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 
 _NO_AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme")
@@ -42,10 +43,13 @@ def check_mode_tables(sections: Mapping[str, Any], source: str) -> None:
     if "ramp" in (sweeps if isinstance(sweeps, list | tuple) else [sweeps]):
         remedy = 'give "up" or "down": the modal amplitude is raised or lowered'
         raise UserError(source, "axes.sweep", "ramp", remedy)
-    worn = _table(_table(sections, "scene"), "worn")
-    if worn and not worn.get("cycle"):
+
+
+def check_worn_counts(study: Study) -> None:
+    """Raises UserError where the modes of a worn joint have no cycle count, their coordinate in the result."""
+    if study.has_modes and study.scene.worn is not None and all(axis.name != "cycle" for axis in study.scene_axes):
         remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
-        raise UserError(source, "scene.worn.cycle", None, remedy)
+        raise UserError(study.source, "scene.worn.cycle", None, remedy)
 
 
 def with_idle_keys(sections: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,13 @@ import numpy as np
 
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
-from studyrunner.study.mode_tables import asks_for_modes, check_mode_tables, with_idle_keys, without_idle_keys
+from studyrunner.study.mode_tables import (
+    asks_for_modes,
+    check_mode_tables,
+    check_worn_counts,
+    with_idle_keys,
+    without_idle_keys,
+)
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_axes import (
@@ -86,7 +92,9 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
     else:
         for text in [overrides] if isinstance(overrides, str) else overrides:
             _override(table, text)
-    return check_study(table, argument, path, archived)
+    found = check_study(table, argument, path, archived)
+    check_worn_counts(found)
+    return found
 
 
 def bundled_studies() -> tuple[str, ...]:
