@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.forced_response import FrequencyResponse, frequency_response
+    from solver.modal_response import ModalResponse, modal_response
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
     from solver.nonlinear_modes import Backbone, backbone
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Backbone",
     "FrequencyResponse",
+    "ModalResponse",
     "Outcome",
     "ReducedModel",
     "SolverSettings",
@@ -46,6 +48,7 @@ __all__ = [
     "build_model",
     "frequency_response",
     "march_wear",
+    "modal_response",
     "tuned",
 ]
 
@@ -53,6 +56,7 @@ __all__ = [
 _PLACES = {
     "Backbone": "nonlinear_modes",
     "FrequencyResponse": "forced_response",
+    "ModalResponse": "modal_response",
     "Outcome": "outcome",
     "ReducedModel": "model",
     "SolverSettings": "settings",
@@ -61,6 +65,7 @@ _PLACES = {
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
     "march_wear": "wear_history",
+    "modal_response": "modal_response",
     "tuned": "tuning",
 }
 

@@ -37,7 +37,8 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
         entry = {**study.variables, **LOOPS, **COUNTS}[name]
         fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
-    return np.dtype(fields)
+    # single values come first, see `_arrays_of`
+    return np.dtype(sorted(fields, key=lambda each: bool(each[2])))
 
 
 def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:

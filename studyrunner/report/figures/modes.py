@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 
 from studyrunner.report.drawing import Drawing, Missing, add_legend, mark_failed, new_panels
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.units import show_power
+from studyrunner.report.reading.units import show_number, show_power
 from studyrunner.system.progress import count
 
 _MOST_LINES = 6
@@ -42,11 +43,14 @@ def _draw(result: Result, course: Course, name: str) -> Drawing:
     panel: Axes = panels[0, 0]
     values = np.array([factor * course.read(result, name, point) for point in choice.points])
     _draw_lines(result, panel, course, choice, name)
-    course.set_axis(panel)
+    panel.set_xlabel(course.label)
     panel.set_ylabel(label)
-    if name == "damping_ratio" and (values[np.isfinite(values)] > 0.0).any():
+    panel.set_xscale("log")
+    _format_ticks(panel.xaxis, course.values)
+    # negative damping, e.g. of the air, has no logarithm
+    if name == "damping_ratio" and np.nanmin(values, initial=np.inf) > 0.0:
         panel.set_yscale("log")
-        panel.yaxis.set_major_formatter(show_power)
+        _format_ticks(panel.yaxis, values)
     n_failed = mark_failed(panel, course.values, np.isnan(values))
     add_legend(figure)
     errors = f"{name}_error"
@@ -57,6 +61,14 @@ def _draw(result: Result, course: Course, name: str) -> Drawing:
         choice.sentence,
     )
     return Drawing(name, title, caption, figure)
+
+
+def _format_ticks(axis: Axis, values: np.ndarray) -> None:
+    """Ticks of a logarithmic axis; in a range of a decade those between powers of ten have numbers as well."""
+    known = values[np.isfinite(values)]
+    several = known.size and known.max() > 20.0 * known.min()
+    axis.set_major_formatter(show_power)
+    axis.set_minor_formatter("" if several else lambda value, _: show_number(value, 1))
 
 
 def _draw_lines(result: Result, panel: Axes, course: Course, choice: Choice, name: str) -> None:
