@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from solver.mission_history import integrate_mission
     from solver.missions.blocks import Block
     from solver.missions.result import MissionHistory
+    from solver.modal_response import ModalResponse, modal_response
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
     from solver.nonlinear_modes import Backbone, backbone
@@ -53,6 +54,7 @@ __all__ = [
     "FrequencyResponse",
     "HarmonicBalance",
     "MissionHistory",
+    "ModalResponse",
     "Outcome",
     "PeriodicMotion",
     "ReducedModel",
@@ -76,6 +78,8 @@ _PLACES = {
     "FrequencyResponse": "forced_response",
     "HarmonicBalance": "balance_functions",
     "MissionHistory": "missions.result",
+    "ModalResponse": "modal_response",
+    "ModalResponse": "modal_response",
     "Outcome": "outcome",
     "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
@@ -88,6 +92,7 @@ _PLACES = {
     "frequency_response": "forced_response",
     "integrate_mission": "mission_history",
     "march_wear": "wear_history",
+    "modal_response": "modal_response",
     "response_curve": "whole_response",
     "tuned": "tuning",
 }

@@ -8,16 +8,13 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.accuracy.options import ACCURACY
-from solver.contact.coulomb import SEPARATED, SLIP
 from solver.forced_response import check_friction, check_numbers, check_settings, check_word, worn_model
-from solver.harmonic_balance.dlft import Evaluation
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.modes.mode_point import ModePoint
+from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.modes.mode_values import values_of
 from solver.modes.points import Direction, follow_mode
 from solver.outcome import Outcome
+from solver.results.mode_values import OF_A_POINT
 from solver.settings import SolverSettings
-from solver.structure.fourier import to_complex
 
 
 @dataclass(frozen=True)
@@ -109,49 +106,11 @@ def backbone(
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(follow_mode(worn, friction, ascending, int(mode), direction, settings))
     points = [found[index] for index in place.tolist()]
-    columns = [_reported(model, point) for point in points]
-    gathered = {name: np.array([each[name] for each in columns]) for name in columns[0]}
+    columns = [values_of(model, point) for point in points]
+    gathered = {name: np.array([getattr(each, name) for each in columns]) for name in OF_A_POINT}
     return Backbone(
         amplitude=wanted,
-        outcome=tuple(point.outcome for point in points),
-        message=tuple(point.message for point in points),
+        outcome=tuple(each.outcome for each in columns),
+        message=tuple(each.message for each in columns),
         **gathered,
     )
-
-
-def _slips(at: Evaluation) -> BoolArray:
-    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
-    moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
-    least = ACCURACY.round_off_change * np.abs(at.state_t).max(axis=(1, 2))
-    return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))
-
-
-def _reported(model: ReducedModel, point: ModePoint) -> dict[str, ComplexArray | FloatArray | float | int]:
-    """Values of a point by the names of `Backbone`."""
-    state, problem, n_contact = point.state, point.problem, model.contact.n_contact
-    if state is None or problem is None or point.errors is None:
-        linear = model.linear[0]
-        nothing = np.full(n_contact, np.nan)
-        return {
-            **dict.fromkeys(("frequency", "damping_ratio", "frequency_error", "damping_error"), np.nan),
-            "response": np.full(len(linear.response), np.nan, complex),
-            "shape": np.full(len(linear.mass), np.nan, complex),
-            "slip_fraction": nothing,
-            "open_fraction": nothing,
-            "harmonics_used": 0,
-            "samples_used": 0,
-        }
-    joint, at = problem.joint_of(state), state.point.evaluation
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-    return {
-        "frequency": state.omega / (2.0 * np.pi),
-        "damping_ratio": state.damping_ratio,
-        "frequency_error": float(point.errors[0]) / (2.0 * np.pi),
-        "damping_error": float(point.errors[1]),
-        "response": response,
-        "shape": state.shape,
-        "slip_fraction": _slips(at).mean(axis=1),
-        "open_fraction": (at.status_t == SEPARATED).mean(axis=1),
-        "harmonics_used": problem.case.resolution.highest,
-        "samples_used": problem.case.resolution.samples,
-    }

@@ -51,6 +51,11 @@ class Outcome(IntEnum):
         """Sentence for the user about what has happened. The remedy depends on settings that are not known here."""
         return _SENTENCES[self]
 
+    @property
+    def sentence_of_mode(self) -> str:
+        """The same of a point of a nonlinear mode."""
+        return _OF_MODES.get(self, _SENTENCES[self])
+
 
 COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to the end."""
@@ -92,6 +97,17 @@ _SENTENCES = {
     Outcome.NOT_COMPUTED: "The run ended before this point was computed: the same command goes on from here.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
     " or a support.",
+}
+
+
+_OF_MODES = {
+    Outcome.CONVERGED: "The point was computed to the end. How well it is known say natural_frequency_error and"
+    " damping_ratio_error.",
+    Outcome.START_FAILED: "The mode was not found where its amplitudes begin; see the variable message.",
+    Outcome.BRANCH_LOST: "The mode could not be followed to this amplitude: it may turn back there, as folds of the"
+    " amplitude are not passed, meet another mode, or end where the whole joint slides.",
+    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of natural frequency or damping"
+    " ratio is above rtol: natural_frequency_error and damping_ratio_error say by how much.",
 }
 
 

@@ -15,8 +15,10 @@ from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState, WearHistory
+from solver.results.mode_values import ModeValues, without_state
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.history_result import build_result
+from studyrunner.mode_result import build_mode_result
 from studyrunner.mpi.shared_memory import Address, open_shared
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -85,7 +87,9 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
             drawn: dict[str, Any] = {name: np.array(values) for name, values in task.joint.contact}
             own = replace(own, contact=replace(own.contact, **drawn))
         if isinstance(of_task, BranchTask):
-            yield from follow(own, of_task, keep)
+            yield from (follow if of_task.mode is None else follow_amplitudes)(own, of_task, keep)
+        elif isinstance(of_task.start, Packed) and isinstance(point := unpack(of_task.start), ModeValues):
+            yield build_mode_result(of_task, point)
         else:
             yield from integrate(own, of_task, keep)
 
@@ -126,6 +130,25 @@ def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartR
         yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
 
+def follow_amplitudes(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
+    """Points of a nonlinear mode, but those that are known, in the order of the sweep."""
+    del keep
+    from solver.modes.mode_values import values_of
+    from solver.modes.points import follow_mode
+
+    # no point depends on those that are known
+    wanted = sorted(task.order_left)
+    amplitudes = np.array([task.frequencies[position] for position in wanted])
+    direction = cast("Literal['up', 'down']", task.sweep)
+    for place, point in follow_mode(
+        model, task.joint.friction_coefficient, amplitudes, task.mode or 1, direction, task.settings
+    ):
+        values = values_of(model, point)
+        _raise_fault(values)
+        n_unknowns = 0 if point.state is None else point.state.point.evaluation.predicted_h.size
+        yield StartResult(wanted[place], pack(values), moves=False, n_unknowns=n_unknowns)
+
+
 def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception) -> Iterator[StartResult | MarchResult]:
     """What a task still owes after its first results, where it broke off with an error that it should not have.
 
@@ -138,9 +161,13 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
             yield failed_result(task, place, Outcome.NOT_COMPUTED if lost else Outcome.EXCEPTION, message)
         return
     nan = math.nan
-    start = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    broken: StartState | ModeValues
+    if task.mode is None:
+        broken = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+    else:
+        broken = without_state(Outcome.EXCEPTION, message)
     for position in task.order_left[n_given:]:
-        yield StartResult(position, pack(start), moves=False, n_unknowns=0, lost=message if lost else "")
+        yield StartResult(position, pack(broken), moves=False, n_unknowns=0, lost=message if lost else "")
 
 
 def integrate(model: ReducedModel, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
@@ -201,7 +228,7 @@ def _solve(model: ReducedModel, task: MarchTask, keep: Keep | None = None) -> We
     return history
 
 
-def _raise_fault(ended: StartState | WearHistory) -> None:
+def _raise_fault(ended: StartState | ModeValues | WearHistory) -> None:
     """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
     if ended.outcome is Outcome.EXCEPTION and tells_of_machine(ended.message):
         raise MachineFaultError(ended.message)

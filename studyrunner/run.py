@@ -362,7 +362,7 @@ def run_tasks(
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = tasks.take(task, result)
-        if isinstance(task, BranchTask) and tasks.n_starts_left == 0:
+        if isinstance(task, BranchTask) and task.mode is None and tasks.n_starts_left == 0:
             progress.say("marching through the remaining wear histories")
         return new
 
@@ -394,7 +394,10 @@ def run_tasks(
         completion.store.tick()
         progress.tick(lambda: tasks.look(running()))
 
-    if tasks.branches:
+    if tasks.branches and tasks.branches[0].mode is not None:
+        n_points = count(tasks.n_starts_left, "point")
+        progress.say(f"following {count(len(tasks.branches), 'nonlinear mode')} through {n_points}")
+    elif tasks.branches:
         n_branches = count(len(tasks.branches), "branch", "branches")
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")

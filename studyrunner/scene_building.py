@@ -144,7 +144,7 @@ def build_scenes(
     if len(scenes.studies) == 1:
         with keys_as_given(study.scene_axes):
             model = build_study_scene(study, say, store)
-        if "natural_frequency" in study.outputs.variables:
+        if "natural_frequency" in study.scene_variables:
             say("finding the natural frequencies of the scene")
         variables = (*build_scene_variables(study, model, store), *exact_answers(study))
         facts = replace(describe_scene(model), static_response=static_response(model))

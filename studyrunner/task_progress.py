@@ -167,9 +167,13 @@ class TaskProgress:
         """A running task in words."""
         if isinstance(task, BranchTask):
             place = task.order_left[task.n_results - n_left]
+            if task.mode is not None:
+                return f"mode {task.mode} {task.sweep} to {task.frequencies[place]:.3g} m sqrt(kg)"
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             what = f"{how} to {task.frequencies[place]:.6g} Hz"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
+        if not task.scheme:
+            return "a point of a mode"
         return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
 
 

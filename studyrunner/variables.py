@@ -387,6 +387,12 @@ COORDINATES = {
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
+    "modal_amplitude": Variable(
+        (),
+        "m kg^0.5",
+        "modal amplitude",
+        comment="sqrt(x^H M x) with the first harmonic x of all displacements and the mass matrix M.",
+    ),
     "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
     "contact": Variable((), "1", "index of the contact pair"),

@@ -92,6 +92,7 @@ class ContinuationOptions:
     """Most corrections of a derivative of the motion, each of which gains the digits of a Newton direction."""
     derivative_error: float = 1e-6
     """Relative residual of a derivative of the motion."""
+
     @property
     def linear_change(self) -> float:
         """Largest change over a step between two states in which no pair slips or opens.

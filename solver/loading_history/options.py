@@ -73,6 +73,7 @@ class LoadingOptions:
     resonance_accuracy: float = 1e-8
     """Accuracy of the frequency of a resonance on the way of a sweep, over the frequency. The start of a history is
     solved to the tolerance of a state."""
+
     @property
     def node_iterations(self) -> int:
         """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""

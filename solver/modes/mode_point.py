@@ -33,6 +33,8 @@ class ModePoint:
     - outcome, message: how the computation of the point ended. A point without state has no further values.
     - problem: joint with the harmonics of the state. state: the state.
     - errors (2,): estimated errors of the frequency, rad/s, and of the damping ratio.
+    - newton_iterations: of the way from rest to the point and of the point, as for this point alone.
+    - run_time: CPU seconds of the computing thread since the point before.
     """
 
     outcome: Outcome
@@ -40,6 +42,8 @@ class ModePoint:
     problem: ModeProblem | None = None
     state: ModeState | None = None
     errors: FloatArray | None = None
+    newton_iterations: int = 0
+    run_time: float = 0.0
 
 
 def solve_point(sweep: AmplitudeSweep, amplitude: float, budget: Budget) -> ModePoint:

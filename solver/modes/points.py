@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -44,16 +45,18 @@ def follow_mode(
     """
     way = _Way(model, friction_coefficient, number, direction, settings)
     for index in way.order(amplitudes):
-        way.budget.deadline = computing_time() + settings.time_limit
+        began = computing_time()
+        way.budget.deadline = began + settings.time_limit
         try:
-            yield index, way.point(float(amplitudes[index]))
+            point = way.point(float(amplitudes[index]))
         except OutOfTimeError:
-            yield index, ModePoint(Outcome.TIME_LIMIT)
+            point = ModePoint(Outcome.TIME_LIMIT)
         except np.linalg.LinAlgError:
-            yield index, ModePoint(Outcome.SINGULAR)
+            point = ModePoint(Outcome.SINGULAR)
         except Exception as error:
             # an error spoils one point only
-            yield index, ModePoint(Outcome.EXCEPTION, describe_error(error))
+            point = ModePoint(Outcome.EXCEPTION, describe_error(error))
+        yield index, replace(point, newton_iterations=way.iterations, run_time=computing_time() - began)
 
 
 def top_of(amplitude: float) -> float:
@@ -61,8 +64,25 @@ def top_of(amplitude: float) -> float:
     return float(MODES.top_base ** math.ceil(math.log(2.0 * amplitude, MODES.top_base)))
 
 
+@dataclass
+class _Lowered:
+    """A sweep with falling amplitude.
+
+    - nodes: where it begins. raised: Newton iterations of the way to there. lowered: iterations since then.
+    - sweep: the sweep, from its first point on.
+    """
+
+    nodes: Nodes
+    raised: int
+    lowered: int = 0
+    sweep: AmplitudeSweep | None = None
+
+
 class _Way:
-    """The sweeps to the points: one with rising amplitude, and one with falling amplitude from each `top_of`."""
+    """The sweeps to the points: one with rising amplitude, and one with falling amplitude from each `top_of`.
+
+    - iterations: Newton iterations of the way to the last point and of this point, those of other points left out.
+    """
 
     def __init__(
         self,
@@ -72,64 +92,91 @@ class _Way:
         direction: Direction,
         settings: SolverSettings,
     ) -> None:
-        self.budget = Budget()
+        self.budget, self.iterations = Budget(), 0
         self._direction = direction
         self._asked = (model, friction_coefficient, number, settings)
         self._rest: Rest | tuple[Outcome, str] | None = None
+        self._to_rest = self._raised = 0
         self._up: AmplitudeSweep | None = None
-        self._down: tuple[float, AmplitudeSweep] | None = None
+        self._tops: list[float] = []
+        self._down: dict[float, _Lowered] = {}
 
     def order(self, amplitudes: FloatArray) -> list[int]:
         """Indices of the amplitudes in the order in which the sweeps pass them."""
         values = [float(amplitude) for amplitude in amplitudes]
-        if self._direction == "up":
-            return sorted(range(len(values)), key=lambda index: values[index])
-        return sorted(range(len(values)), key=lambda index: (top_of(values[index]), -values[index]))
+        self._tops = sorted({top_of(value) for value in values})
+        return sorted(range(len(values)), key=lambda index: values[index], reverse=self._direction == "down")
 
     def point(self, amplitude: float) -> ModePoint:
         """The point at the next amplitude."""
+        before = self.budget.iterations
         if self._rest is None:
             self._rest = find_rest(*self._asked, self.budget)
+            self._to_rest = self.budget.iterations - before
+        self.iterations = self._to_rest
         if isinstance(self._rest, tuple):
             return ModePoint(*self._rest)
         if self._direction == "up" and not self._rest.glued:
             said = 'the joint has no such mode while its pairs stick: give direction = "down", from large amplitudes'
             return ModePoint(Outcome.START_FAILED, said)
-        if self._direction == "up" and amplitude < first_amplitude(self._rest):
+        first = self._direction == "up" and amplitude < first_amplitude(self._rest)
+        sweep = None if first else self._sweep_to(self._rest, amplitude)
+        if sweep is None and not first:
+            return self._failed()
+        before = self.budget.iterations
+        try:
+            if sweep is not None:
+                return solve_point(sweep, amplitude, self.budget)
             nodes = first_node(self._rest, amplitude, self.budget)
             return self._failed() if nodes is None else judge_point(nodes.problem, nodes.here, None, self.budget)
-        sweep = self._raised() if self._direction == "up" else self._lowered(top_of(amplitude))
-        if sweep is None:
-            return self._failed()
-        sweep.advance_to(amplitude)
-        return solve_point(sweep, amplitude, self.budget)
+        finally:
+            self.iterations += self.budget.iterations - before
 
     def _failed(self) -> ModePoint:
         return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
-    def _raised(self) -> AmplitudeSweep | None:
-        """The sweep with rising amplitude; None where it does not begin."""
-        assert isinstance(self._rest, Rest)
+    def _sweep_to(self, rest: Rest, amplitude: float) -> AmplitudeSweep | None:
+        """The sweep at the node before an amplitude; None where it does not begin."""
+        if self._direction == "up":
+            raised = self._raised_to(rest, amplitude)
+            self.iterations += self._raised
+            return raised
+        down = self._lowered(rest, top_of(amplitude))
+        if down is None:
+            return None
+        before = self.budget.iterations
+        down.sweep = down.sweep or AmplitudeSweep(down.nodes, -1.0, self.budget)
+        down.sweep.advance_to(amplitude)
+        down.lowered += self.budget.iterations - before
+        self.iterations += down.raised + down.lowered
+        return down.sweep
+
+    def _raised_to(self, rest: Rest, amplitude: float) -> AmplitudeSweep | None:
+        """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
+        before = self.budget.iterations
         if self._up is None:
-            nodes = first_node(self._rest, first_amplitude(self._rest), self.budget)
+            nodes = first_node(rest, first_amplitude(rest), self.budget)
             self._up = None if nodes is None else AmplitudeSweep(nodes, 1.0, self.budget)
+        if self._up is not None:
+            self._up.advance_to(amplitude)
+        self._raised += self.budget.iterations - before
         return self._up
 
-    def _lowered(self, top: float) -> AmplitudeSweep | None:
+    def _lowered(self, rest: Rest, wanted: float) -> _Lowered | None:
         """The sweep with falling amplitude from a top, m sqrt(kg); None where it does not begin.
 
-        The mode is raised to the top, or as far as it goes. A joint that has its mode only while it slides begins at
-        the top.
+        The mode is raised to all tops first, or as far as it goes. A joint that has its mode only while it slides
+        begins at the top.
         """
-        assert isinstance(self._rest, Rest)
-        if self._down is None or self._down[0] != top:
-            nodes: Nodes | None = None
-            if not self._rest.glued:
-                nodes = sliding_node(self._rest, top, self.budget)
-            elif (raised := self._raised()) is not None:
-                raised.advance_to(top)
+        for top in self._tops:
+            if top in self._down:
+                continue
+            nodes, before = None, self.budget.iterations
+            if not rest.glued:
+                nodes = sliding_node(rest, top, self.budget)
+            elif (raised := self._raised_to(rest, top)) is not None:
                 nodes = Nodes(raised.nodes.problem, (raised.ahead or raised.nodes.here,))
-            if nodes is None:
-                return None
-            self._down = top, AmplitudeSweep(nodes, -1.0, self.budget)
-        return self._down[1]
+            if nodes is not None:
+                spent = self._raised if rest.glued else self.budget.iterations - before
+                self._down[top] = _Lowered(nodes, spent)
+        return self._down.get(wanted)

@@ -257,14 +257,18 @@ def _kind(task: BranchTask | MarchTask) -> str:
 
 def _case(branch: BranchTask, position: int) -> dict[str, object]:
     """Columns of the file that describe a start state."""
+    if branch.mode is not None:
+        return {"sweep": branch.sweep}
     frequency = branch.frequencies[position]
     return {"sweep": branch.sweep, "excitation_amplitude": branch.excitation_amplitude, "frequency": frequency}
 
 
 def _totals(record: NDArray[np.void]) -> dict[str, object]:
     """Columns of the file that describe a result."""
-    shown: dict[str, object] = {name: record[name][0].item() for name in ("last_cycle", "error_estimate", "run_time")}
-    if "worn_volume" in (record.dtype.names or ()):
+    there = record.dtype.names or ()
+    totals = ("last_cycle", "error_estimate", "run_time")
+    shown: dict[str, object] = {name: record[name][0].item() for name in totals if name in there}
+    if "worn_volume" in there:
         known = record["worn_volume"][0][np.isfinite(record["worn_volume"][0])]
         shown["worn_volume"] = known[-1].item() if len(known) else None
     outcome = Outcome(record["outcome"][0].item()).meaning

@@ -15,13 +15,13 @@ from studyrunner.plan.planning import march_variables
 from studyrunner.plan.results import MarchResult
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
     return {
-        "cycle": len(study.cycles_kept),
+        **({} if study.has_modes else {"cycle": len(study.cycles_kept)}),
         "contact": len(facts.area),
         "response": len(facts.response_names),
         **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),
@@ -31,13 +31,14 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     """Data type of the record of a history: all values of a result."""
     sizes = variable_sizes(study, facts)
-    fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in KEPT.items()]
+    fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in study.kept.items()]
     for name in march_variables(study):
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
-        entry = {**ASKED, **LOOPS, **COUNTS}[name]
+        entry = {**study.variables, **LOOPS, **COUNTS}[name]
         fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
-    return np.dtype(fields)
+    # single values come first, see `_arrays_of`
+    return np.dtype(sorted(fields, key=lambda each: bool(each[2])))
 
 
 def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:

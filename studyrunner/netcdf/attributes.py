@@ -14,8 +14,8 @@ from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
 
-def attributes(name: str, entry: Variable) -> dict[str, object]:
-    """Attributes of a variable of the file."""
+def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
+    """Attributes of a variable of the file. of_modes: whether it is a file of nonlinear modes."""
     content = "coordinate" if name in COORDINATES else entry.content
     found: dict[str, object] = {
         "units": entry.units,
@@ -30,8 +30,8 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
     if name == "outcome":
         found["flag_values"] = np.array(list(Outcome), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
-        found["sentences"] = "\n".join(flag.sentence for flag in Outcome)
-    if name in ASKED and not entry.dtype.startswith("float"):
+        found["sentences"] = "\n".join(flag.sentence_of_mode if of_modes else flag.sentence for flag in Outcome)
+    if name in ASKED and "cycle" in entry.dimensions and not entry.dtype.startswith("float"):
         found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
     return found
 
@@ -41,6 +41,9 @@ def coordinate_entry(study: Study, name: str) -> Variable:
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
+    if name == "sweep" and study.has_modes:
+        comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
+        return Variable((), "1", "how the amplitude is reached", comment=comment)
     axis = next((axis for axis in study.scene_axes if axis.name == name), None)
     if axis is not None:
         return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
@@ -52,7 +55,7 @@ def coordinates(
 ) -> dict[str, tuple[tuple[str, ...], NDArray[np.generic]]]:
     """Coordinates of the file: name, dimensions, values."""
     along: dict[str, NDArray[np.generic]] = {name: _labels(values) for name, values in study.dimensions.items()}
-    along["cycle"] = np.array(study.cycles_kept)
+    along.setdefault("cycle", np.array(study.cycles_kept))
     along["contact"] = np.arange(len(facts.area), dtype=np.int32)
     along["response"] = _labels(facts.response_names)
     if study.outputs.loops:

@@ -31,9 +31,10 @@ from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.summary.certificates import CertificateTable
 from studyrunner.summary.findings import Findings
+from studyrunner.summary.mode_table import ModeTable
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import ASKED, COORDINATES, COUNTS, KEPT, LOOPS, Variable
+from studyrunner.variables import COORDINATES, COUNTS, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment
@@ -153,7 +154,8 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
         for march in itertools.chain.from_iterable(completion.plan.marches)
         for key, scaled in zip(completion.histories(march), march.histories, strict=True)
     ]
-    table, findings = CertificateTable(study, facts), Findings(study, facts)
+    table = ModeTable(study) if study.has_modes else CertificateTable(study, facts)
+    findings = Findings(study, facts)
     outcomes: Counter[int] = Counter()
     at_once = _records_at_once(completion.kind.itemsize)
     for first in range(0, len(histories), at_once):
@@ -185,8 +187,8 @@ def _write_values(
     on_contact = [name for name in _ON_CONTACT if pairs.exists is not None or name != "contact_exists"]
     shape = tuple(len(values) for values in study.dimensions.values())
     sizes = variable_sizes(study, facts)
-    asked = [name for name in ASKED if name in study.outputs.variables]
-    variables = {**{name: ASKED[name] for name in asked}, **(LOOPS if study.outputs.loops else {}), **KEPT}
+    asked = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
+    variables = {**asked, **(LOOPS if study.outputs.loops else {}), **study.kept}
     variables |= COUNTS if study.to_the_end else {}
     for name, size in itertools.chain(zip(study.dimensions, shape, strict=True), sizes.items()):
         file.createDimension(name, size)
@@ -199,6 +201,7 @@ def _write_values(
             continue
         own = (1 if _one_pair(name, dimension) else sizes[dimension] for dimension in entry.dimensions)
         variable = _create(file, name, entry, dimensions, (*slab, *own))
+        variable.setncatts(attributes(name, entry, study.has_modes))
         if "contact" in entry.dimensions or samples:
             drawn = [each.name for each in samples if set(each.entry.dimensions) <= set(dimensions)]
             variable.setncattr("coordinates", " ".join(on_contact * ("contact" in entry.dimensions) + drawn))

@@ -69,6 +69,11 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
         if len(values) > 1
     ]
     over = f", over {'; '.join(ranges)}" if ranges else ""
+    if study.has_modes:
+        return (
+            "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene"
+            f" {study.scene.model} with {pairs}{over}."
+        )
     return (
         f"Fretting wear of a joint under vibration: wear histories of the scene {study.scene.model} with {pairs}{over}."
         " Wear depths and worn volume, contact pressures and slip, vibration, and the errors of each."

@@ -14,7 +14,6 @@ from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
-from studyrunner.study.worn import AXIS
 from studyrunner.variables import COORDINATES, Variable
 
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
@@ -80,15 +79,15 @@ def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Input
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is None or len(facts) > 1:
         return
-    counts = [len(axis.values) for axis in study.scene_axes if axis.name == AXIS]
+    axis = next((axis for axis in study.scene_axes if axis.key == ("worn",)), None)
     # the axis of worn states is the last one
-    states = study.variants[: counts[0]] if counts else (study,)
+    states = (study,) if axis is None else study.variants[: len(axis.values)]
     values = np.array([worn_depth(state, facts[0]) for state in states])
-    dimensions = (AXIS, "contact") if counts else ("contact",)
+    dimensions = ("contact",) if axis is None else (axis.name, "contact")
     entry = Variable(
         dimensions, "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
     )
-    yield InputCoordinate("worn_depth", entry, values if counts else values[0])
+    yield InputCoordinate("worn_depth", entry, values[0] if axis is None else values)
 
 
 def _coordinate(

@@ -20,6 +20,12 @@ ITERATIONS_A_STATE = 50
 """Newton iterations for each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the
 dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
 
+ITERATIONS_OF_MODE = 300
+"""Newton iterations to the first point of a nonlinear mode that slips, with the reference sweep."""
+
+ITERATIONS_A_MODE_POINT = 60
+"""Newton iterations for each further amplitude of a nonlinear mode, those that show its errors included."""
+
 ITERATIONS_A_STEP = 3
 """Newton iterations of one step in slow time, explicit or implicit (measured: 2 to 4 where the joint slips)."""
 
@@ -63,6 +69,11 @@ def iterations_of_branch(sweep: str, n_frequencies: int) -> int:
     """Newton iterations of a sweep through so many frequencies, or of a ramp."""
     first = ITERATIONS_OF_RAMP if sweep == "ramp" else ITERATIONS_AT_FIRST
     return first + ITERATIONS_A_STATE * (n_frequencies - 1)
+
+
+def iterations_of_mode(n_amplitudes: int) -> int:
+    """Newton iterations of a nonlinear mode at so many amplitudes."""
+    return ITERATIONS_OF_MODE + ITERATIONS_A_MODE_POINT * (n_amplitudes - 1)
 
 
 def iterations_of_march(scheme: str, cycles: float, step: float) -> int:

@@ -38,7 +38,8 @@ class Identities:
             # A time limit decides whether there is a result, not the values of the result.
             settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
             follow = None if branch.follow is None else astuple(branch.follow)
-            line = (branch.excitation_amplitude, branch.sweep, settings, follow)
+            mode = () if branch.mode is None else ("mode", branch.mode)
+            line = (branch.excitation_amplitude, branch.sweep, settings, follow, *mode)
             joint = branch.joint
             scene = (self._digests[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
             key = _digest("line", scene, line)

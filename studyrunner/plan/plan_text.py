@@ -8,8 +8,10 @@ from studyrunner.plan.estimate import (
     ADAPTIVE_STEPS,
     AUTOMATIC_HARMONICS,
     COMPILE_SECONDS,
+    ITERATIONS_A_MODE_POINT,
     ITERATIONS_A_STEP,
     ITERATIONS_AN_ADAPTIVE_STEP,
+    ITERATIONS_OF_MODE,
     ITERATIONS_TO_A_FINAL_STATE,
     memory_a_rank,
     seconds_an_iteration,
@@ -21,7 +23,7 @@ from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
-from studyrunner.variables import ASKED, KEPT, SCENE
+from studyrunner.variables import SCENE
 
 
 def format_plan(
@@ -34,15 +36,10 @@ def format_plan(
     scenes: what there is to say of several scenes.
     """
     marches = [task for line in plan.marches for task in line]
-    n_tasks = len(plan.branches) + len(marches)
+    n_tasks = len(plan.branches) + (0 if study.has_modes else len(marches))
     n_values = _result_values(study, facts, plan.n_points)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
-    n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
-    n_along = len(plan.branches) - n_ramps
-    ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
-    ways += [f"{count(n_ramps, 'ramp')} of the excitation"] if n_ramps else []
-    branches = " and ".join(ways)
     left_out = [f"{count(item.n_points, 'point')}: {item.reason}" for item in plan.left_out] or [
         "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
     ]
@@ -54,13 +51,12 @@ def format_plan(
         *([("scenes", scenes)] if scenes else []),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
         *([("frequency", _followed(study))] if study.follow is not None else []),
-        ("cycles", _cycles(study)),
-        ("tasks", f"{n_tasks}: {branches}, then {count(len(marches), 'wear history', 'wear histories')}"),
+        *([] if study.has_modes else [("cycles", _cycles(study))]),
+        ("tasks", f"{n_tasks}: {_ways(study, plan)}"),
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
-        ("time", f"{_about(plan, prepared_in)}, to a factor of two, if every point wears;"),
-        ("", _range(plan)),
+        *_time(study, plan, prepared_in),
         ("assumed", _assumed(study, plan)),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
@@ -73,6 +69,26 @@ def _followed(study: Study) -> str:
     return what if study.cycles_kept[-1] == 0.0 else f"{what} and followed while the joint wears"
 
 
+def _ways(study: Study, plan: TaskPlan) -> str:
+    """The tasks in words."""
+    if study.has_modes:
+        return f"{count(len(plan.branches), 'nonlinear mode')} over the amplitude"
+    n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
+    n_along = len(plan.branches) - n_ramps
+    ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
+    ways += [f"{count(n_ramps, 'ramp')} of the excitation"] if n_ramps else []
+    n_marches = sum(len(line) for line in plan.marches)
+    return f"{' and '.join(ways)}, then {count(n_marches, 'wear history', 'wear histories')}"
+
+
+def _time(study: Study, plan: TaskPlan, prepared_in: float) -> list[tuple[str, str]]:
+    """Lines on the estimated time."""
+    about = _about(plan, prepared_in)
+    if study.has_modes:
+        return [("time", f"{about}, to a factor of three; a mode that is lost at a large amplitude takes longer")]
+    return [("time", f"{about}, to a factor of two, if every point wears;"), ("", _range(plan))]
+
+
 def _cycles(study: Study) -> str:
     if study.to_the_end:
         kept = f"{len(study.cycles_kept)} states are kept, spaced evenly in worn volume and cycles"
@@ -83,6 +99,9 @@ def _cycles(study: Study) -> str:
 def _assumed(study: Study, plan: TaskPlan) -> str:
     """Assumptions of the estimated time."""
     milliseconds = 1e3 * seconds_an_iteration(plan.n_unknowns)
+    if study.has_modes:
+        iterations = f"{ITERATIONS_A_MODE_POINT} Newton iterations of {milliseconds:.0f} ms or less a point"
+        return f"{iterations}, {ITERATIONS_OF_MODE} to the first; a first run compiles for {COMPILE_SECONDS} s more"
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
     if "final" in study.axes.scheme:
         said += f", final {ITERATIONS_TO_A_FINAL_STATE} in all where it needs no march"
@@ -94,7 +113,7 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
 def _solver(study: Study, facts: SceneFacts) -> str:
     """Settings of the solver, and the largest number of automatic harmonics in this scene."""
     values = {"harmonics": study.harmonics, "samples": study.samples, "tolerance": study.tolerance}
-    if AUTO in (*study.harmonics, *study.samples) or {"adaptive", "final"} & set(study.axes.scheme):
+    if study.has_modes or AUTO in (*study.harmonics, *study.samples) or {"adaptive", "final"} & set(study.axes.scheme):
         values["rtol"] = study.rtol
     shown = [f"{key} {' or '.join(map(_setting, items))}" for key, items in values.items()]
     if AUTO in study.harmonics and facts.largest_harmonics is not None:
@@ -133,7 +152,7 @@ def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
     """Number of values in the result, without coordinates, natural frequencies and mesh."""
     sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
     names = study.outputs.variables
-    asked = [ASKED[name] for name in names if name in ASKED]
+    asked = [entry for name, entry in study.variables.items() if name in names]
     asked.extend(SCENE["exact"].values() if "exact" in names else ())
     each = sum(math.prod(sizes[name] for name in entry.dimensions) for entry in asked)
-    return n_points * (len(KEPT) + each + loop_numbers(study))
+    return n_points * (len(study.kept) + each + loop_numbers(study))

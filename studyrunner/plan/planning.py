@@ -8,13 +8,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from solver.settings import Automatic, SolverSettings, ToTheEnd
-from studyrunner.plan.estimate import (
-    AUTOMATIC_HARMONICS,
-    iterations_of_branch,
-    iterations_of_march,
-    seconds_an_iteration,
-)
+from solver.settings import SolverSettings, ToTheEnd
+from studyrunner.plan.cases import joint_of, n_unknowns_of, settings_of_line
+from studyrunner.plan.estimate import iterations_of_branch, iterations_of_march, seconds_an_iteration
+from studyrunner.plan.mode_planning import build_mode_tasks
 from studyrunner.plan.sharing import (
     EQUAL_POINTS,
     IDLE_RTOL,
@@ -30,10 +27,11 @@ from studyrunner.plan.tasks import BranchTask, Joint, MarchTask, TaskPlan
 from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.realisation import Realisation
-from studyrunner.study.sections import AUTO, SOLVER_AXES
+from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
+from studyrunner.variables import CERTIFICATE, COUNTS, LOOPS
 
+_FOR_THE_MODES = ("natural_frequency", "damping_ratio")
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
 
 
@@ -74,12 +72,24 @@ def build_tasks(
     contacts: what is drawn for the pairs of each part of the study (`contact_changes`); None where nothing is.
     scenes: of the study, where they are known already.
     """
-    return _Planner(study, n_displacements, contacts, find_scenes(study) if scenes is None else scenes).plan()
+    scenes = find_scenes(study) if scenes is None else scenes
+    contacts = ((),) * len(scenes.parts) if contacts is None else contacts
+    n_scenes = len(scenes.studies)
+    sizes = (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
+    return (build_mode_tasks if study.has_modes else _plan)(study, sizes, contacts, scenes)
+
+
+def _plan(
+    study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
+) -> TaskPlan:
+    """Tasks of a study of wear. n_displacements: of each scene. contacts: of each part."""
+    return _Planner(study, n_displacements, contacts, scenes).plan()
 
 
 def march_variables(study: Study) -> tuple[str, ...]:
     """Variables that a march hands back: those asked for and those that the table at the end is made of."""
-    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    table = _FOR_THE_MODES if study.has_modes else _FOR_THE_TABLE
+    asked = (name for name in study.variables if name in study.outputs.variables or name in table)
     return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 
@@ -89,21 +99,18 @@ class _Planner:
     def __init__(
         self,
         study: Study,
-        n_displacements: int | Sequence[int],
-        contacts: Sequence[ContactChange] | None,
+        n_displacements: Sequence[int],
+        contacts: Sequence[ContactChange],
         scenes: SceneSet,
     ) -> None:
         self._study = study
         self._parts = scenes.parts
-        self._contacts: Sequence[ContactChange] = ((),) * len(self._parts) if contacts is None else contacts
+        self._contacts = contacts
         self._scenes = scenes
         # what all parts have in common
-        self._lines = [(lines, _settings(study, lines[0])) for lines in _lines(study)]
+        self._lines = [(lines, settings_of_line(study, lines[0][2:])) for lines in _lines(study)]
         self._variables = march_variables(study)
-        n_scenes = len(self._scenes.studies)
-        self._n_displacements = (
-            (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
-        )
+        self._n_displacements = n_displacements
         self._numbers = itertools.count()
         self._shared: dict[tuple[object, ...], Sharing] = {}
         self._causes: Counter[str] = Counter()
@@ -127,7 +134,7 @@ class _Planner:
             n_points=n_points,
             n_scenes=len(self._n_displacements),
             n_unknowns=max(
-                _unknowns(number, each) for number in set(self._n_displacements) for each in self._study.harmonics
+                n_unknowns_of(number, each) for number in set(self._n_displacements) for each in self._study.harmonics
             ),
         )
 
@@ -136,9 +143,7 @@ class _Planner:
         cases: dict[_Case, list[_Start]] = {}
         for number, (part, scene) in enumerate(zip(self._parts, self._scenes.numbers, strict=True)):
             study = part.study
-            contact = self._contacts[number]
-            of_pairs = any(name == "friction_coefficient" for name, _ in contact)
-            joint = Joint(scene, None if of_pairs else study.friction_coefficient, contact)
+            joint = joint_of(part, scene, self._contacts[number])
             for lines, settings in self._lines:
                 amplitude, sweep = study.axes.excitation_amplitude[lines[0][0]], study.axes.sweep[lines[0][1]]
                 case = _Case(joint, amplitude, sweep, settings)
@@ -148,7 +153,7 @@ class _Planner:
 
     def _add_branch(self, case: _Case, at: dict[float, list[_Start]]) -> None:
         number = len(self._branches)
-        n_unknowns = _unknowns(self._n_displacements[case.joint.scene], case.settings.harmonics)
+        n_unknowns = n_unknowns_of(self._n_displacements[case.joint.scene], case.settings.harmonics)
         self._branches.append(
             BranchTask(
                 number=number,
@@ -259,22 +264,6 @@ def _lines(study: Study) -> Iterator[tuple[Index, ...]]:
             yield tuple(lines)
         else:
             yield from ((one,) for one in lines)
-
-
-def _settings(study: Study, line: Index) -> SolverSettings:
-    harmonics, samples, tolerance, rtol = line[2:]
-    return SolverSettings(
-        harmonics=study.harmonics[harmonics],
-        samples=study.samples[samples],
-        tolerance=study.tolerance[tolerance],
-        rtol=study.rtol[rtol],
-        time_limit=math.inf if study.solver.time_limit is None else study.solver.time_limit,
-    )
-
-
-def _unknowns(n_displacements: int, harmonics: int | Automatic) -> int:
-    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
-    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
 
 
 def _point(own_axes: Sequence[str], part: Realisation, frequency: int, line: Index, choice: Choice) -> Index:

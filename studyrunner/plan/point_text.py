@@ -58,13 +58,14 @@ def settings_of(study: Study, point: Sequence[int]) -> Used:
         return at.get(key, getattr(study.solver, key))
 
     return Used(
-        scheme=str(at["scheme"]),
+        scheme=str(at.get("scheme", axes.scheme[0])),
         sweep=str(at["sweep"]),
         harmonics=of("harmonics"),
         samples=of("samples"),
         rtol=of("rtol"),
         schemes=axes.scheme,
-        sweeps=axes.sweep,
+        # the excitation of a mode is none that could be raised
+        sweeps=(*axes.sweep, "ramp") if study.has_modes else axes.sweep,
         by_depth=study.slow_time.largest_depth is not None,
         until=study.until is not None,
     )

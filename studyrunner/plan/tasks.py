@@ -11,7 +11,12 @@ from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
 from solver.settings import FollowedFrequency, SolverSettings, ToTheEnd, WearTarget
 from studyrunner.plan.cost_model import CostKeys
-from studyrunner.plan.estimate import ITERATIONS_A_STATE, iterations_of_branch
+from studyrunner.plan.estimate import (
+    ITERATIONS_A_MODE_POINT,
+    ITERATIONS_A_STATE,
+    iterations_of_branch,
+    iterations_of_mode,
+)
 from studyrunner.plan.sharing import Index, LeftOut, ScaledHistory, march_counts
 from studyrunner.scene.drawn_contacts import ContactChange
 
@@ -41,14 +46,15 @@ class Joint:
 
 @dataclass(frozen=True)
 class BranchTask:
-    """Start states along one branch; a result at each frequency.
+    """Start states along one branch; a result at each frequency. Or the points of a nonlinear mode over its amplitude.
 
     A sweep "up" or "down" passes all frequencies of a line. A "ramp" has a single frequency.
 
     number: number of the branch in the study.
     joint: scene and friction.
     excitation_amplitude: N.
-    frequencies: Hz, ascending.
+    frequencies: Hz, ascending; along a nonlinear mode its amplitudes, m sqrt(kg).
+    mode: number of the nonlinear mode whose points these are; None for forced vibration.
     cost: estimated time, s.
     follow: what the frequency follows in place of `frequencies`, whose only value is then the middle of the range.
     known: indices of the frequencies whose results are not needed, as an earlier run has left them or all histories
@@ -66,6 +72,7 @@ class BranchTask:
     frequencies: tuple[float, ...]
     cost: float
     follow: FollowedFrequency | None = None
+    mode: int | None = None
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
@@ -89,6 +96,9 @@ class BranchTask:
 
     def cost_of(self, *, first: bool) -> float:
         """Estimated time, s, of the first state with the sweep to it, or of one of the other states."""
+        if self.mode is not None:
+            share = iterations_of_mode(1) if first else ITERATIONS_A_MODE_POINT
+            return self.cost * share / iterations_of_mode(self.n_results)
         share = iterations_of_branch(self.sweep, 1) if first else ITERATIONS_A_STATE
         return self.cost * share / iterations_of_branch(self.sweep, self.n_results)
 

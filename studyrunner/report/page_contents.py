@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from studyrunner.report.drawing import Drawing, Missing, Table, style
 from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
+from studyrunner.report.figures.modes import draw_modes
 from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
 from studyrunner.report.figures.response import draw_responses
 from studyrunner.report.figures.sector import OF_SECTOR, draw_sector
@@ -16,6 +17,7 @@ from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import of_shown_scene
 from studyrunner.report.root.figures import draw_root
+from studyrunner.report.root.mode_fractions import draw_mode_fractions
 from studyrunner.report.scatter.figures import draw_scatter
 from studyrunner.report.trends.figures import draw_trends
 
@@ -26,7 +28,8 @@ _Part = Callable[[Result], Iterator[Item]]
 def draw_report(result: Result) -> Iterator[Item]:
     """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
 
-    Where no point holds a state, the results are left out with a single sentence.
+    Where no point holds a state, the results are left out with a single sentence. Of nonlinear modes there are figures
+    over the amplitude, and a sentence in place of those of wear.
     """
     of_results: tuple[_Part, ...] = (
         draw_scatter,
@@ -35,16 +38,16 @@ def draw_report(result: Result) -> Iterator[Item]:
         draw_volumes,
         *map(_of_pairs, (draw_root, draw_flanks, draw_loops)),
     )
+    if result.has_modes:
+        of_results = (draw_modes, _of_pairs(draw_mode_fractions), _tell_no_wear)
     if not result.held.any():
         of_results = (_tell_nothing,)
+    of_forced_vibration = (list_branches, list_stability, draw_certificates, _draw_precision)
     parts = (
         draw_outcomes,
-        lambda result: draw_sector(of_shown_scene(result, OF_SECTOR)),
+        *(() if result.has_modes else (lambda result: draw_sector(of_shown_scene(result, OF_SECTOR)),)),
         *of_results,
-        list_branches,
-        list_stability,
-        draw_certificates,
-        _draw_precision,
+        *(() if result.has_modes else of_forced_vibration),
     )
     for part in parts:
         # The style is that of the whole process: it is not left on while the caller has the word.
@@ -63,6 +66,11 @@ def _draw_precision(result: Result) -> Iterator[Item]:
     precision = study_precision(result)
     if precision is not None:
         yield from draw_precision(precision)
+
+
+def _tell_no_wear(_result: Result) -> Iterator[Missing]:
+    said = "A study with [axes] modal_amplitude has no excitation and no slow time: give [axes] frequency for these."
+    yield Missing("wear", "Frequency response, worn volume, wear depth, fretting loops", said)
 
 
 def _tell_nothing(_result: Result) -> Iterator[Missing]:

@@ -18,7 +18,7 @@ from studies.scenes import scene_frequencies, scene_has, scene_mesh
 from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
-from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
+from studyrunner.variables import COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -56,11 +56,11 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
         raise UserError(study.source, "outputs.loops", list(loops), remedy)
     sizes = {"cycle": len(study.cycles_kept), "contact": n_contact, "response": len(model.response_names)}
     # the variables of the certificate are there whether they are asked for or not
-    size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in ASKED.values())
+    size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in study.variables.values())
     if size > _LARGEST_HISTORY:
         remedy = f"give fewer: one point would take {1e-9 * size:.1f} GB"
         raise UserError(study.source, "slow_time.outputs", len(study.cycles_kept), remedy)
-    if "natural_frequency" in study.outputs.variables and not _has_frequencies(study):
+    if "natural_frequency" in study.scene_variables and not _has_frequencies(study):
         with _user_errors(study):
             stuck_frequencies(model)
 
@@ -83,7 +83,7 @@ def build_scene_variables(
     UserError
         Where the scene cannot give them.
     """
-    asked = study.outputs.variables
+    asked = study.scene_variables
     kept = InMemory() if computed is None else computed
     with _user_errors(study):
         return tuple(

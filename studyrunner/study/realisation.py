@@ -103,7 +103,7 @@ def check_scatter(study: Study) -> None:
     if of_pairs and "exact" in study.outputs.variables:
         remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
         raise UserError(study.source, "outputs.variables", "exact", remedy)
-    numbers = [*_OF_AXES, *OF_PAIRS, *_numbers_of(study)]
+    numbers = [*(() if study.has_modes else _OF_AXES), *OF_PAIRS, *_numbers_of(study)]
     for name, scattered in section.inputs.items():
         if name not in numbers:
             remedy = f"unknown input, give {nearest_name(name, dict.fromkeys(numbers))}"

@@ -10,11 +10,13 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 
 from solver.settings import TARGETS
 from studies.fe_models.model_files import ModelFiles
+from studyrunner.mode_variables import OF_MODES
 from studyrunner.study.values import (
     Axis,
     Cycles,
     Fraction,
     Harmonics,
+    Mode,
     NotNegative,
     Positive,
     Samples,
@@ -36,6 +38,8 @@ AUTO: Final = "auto"
 
 SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
+AXES_OF_MODES = ("mode", "sweep")
+"""Axes of a study of nonlinear modes, beside modal_amplitude."""
 
 _N_OUTPUTS = TypeAdapter(Annotated[int, whole(1, 1_000_000)])
 _COUNT = TypeAdapter(NotNegative)
@@ -67,12 +71,13 @@ def _read_outputs(value: object) -> int | tuple[float, ...]:
 def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
-    known = (*ASKED, *SCENE, *KEPT)
+    names_of_all = (*dict.fromkeys((*ASKED, *OF_MODES, *SCENE)),)
+    known = (*names_of_all, *KEPT)
     for name in value:
         if name != DEFAULT and name not in known:
             raise WrongValueError(name, f'give "{DEFAULT}" or names out of {", ".join(known)}')
     names = once(value)
-    return tuple(name for name in (*ASKED, *SCENE) if name in names)
+    return tuple(name for name in names_of_all if name in names)
 
 
 def _read_loops(value: object) -> tuple[int, ...]:
@@ -107,6 +112,10 @@ class AxesSection(Section):
     sweep: Axis[Sweep] = Field(
         ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"
     )
+    modal_amplitude: Axis[Positive] | None = Field(
+        None, description="m sqrt(kg), of nonlinear modes, in place of frequency and excitation"
+    )
+    mode: Axis[Mode] | None = Field(None, description="number of the nonlinear mode, by frequency, from 1 on")
     harmonics: Axis[Harmonics] | None = Field(None, description="harmonics above the static one")
     samples: Axis[Samples] | None = Field(None, description="time samples in a period")
     tolerance: Axis[Fraction] | None = Field(None, description="of the scaled residual")

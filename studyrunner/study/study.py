@@ -11,12 +11,14 @@ from pydantic import Field, model_validator
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
+from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.followed import LoadingSection
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import (
     AUTO,
     AXES,
+    AXES_OF_MODES,
     DEFAULT,
     SOLVER_AXES,
     AxesSection,
@@ -30,7 +32,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import COORDINATES, FOLLOWED_FREQUENCY, OF_SAMPLES, USUAL
+from studyrunner.variables import ASKED, COORDINATES, FOLLOWED_FREQUENCY, KEPT, OF_SAMPLES, SCENE, USUAL, Variable
 
 _MOST_POINTS = 1_000_000
 
@@ -77,6 +79,8 @@ class Study(Section):
         if not isinstance(names, list) or names.count(DEFAULT) != 1:
             return table
         usual = OF_SAMPLES if table.get("scatter") is not None else USUAL
+        if "modal_amplitude" in table.get("axes", {}):
+            usual = tuple(OF_MODES)
         followed = FOLLOWED_FREQUENCY if table.get("follow") is not None else ()
         cheap = [*usual, *followed, *(name for name in scene.offers if name == "mesh")]
         filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
@@ -84,6 +88,15 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _check_variables(self) -> Study:
+        for name in self.outputs.variables:
+            if self.has_modes and name in (*ASKED, "exact") and name not in OF_MODES:
+                remedy = (
+                    f"give names out of {', '.join(OF_MODES)}: there is no wear in a study with axes.modal_amplitude"
+                )
+                raise WrongValueError(name, remedy, "outputs.variables")
+            if not self.has_modes and name in OF_MODES and name not in (*ASKED, "natural_frequency"):
+                remedy = "leave it out, or give axes.modal_amplitude: only nonlinear modes have it"
+                raise WrongValueError(name, remedy, "outputs.variables")
         for name in ("mesh", "exact"):
             if name in self.outputs.variables and name not in self.scene.offers:
                 remedy = f"leave it out: the scene {self.scene.model} has none"
@@ -163,6 +176,26 @@ class Study(Section):
         return self
 
     @property
+    def has_modes(self) -> bool:
+        """Whether the points of the study are those of nonlinear modes; then nothing wears."""
+        return self.axes.modal_amplitude is not None
+
+    @property
+    def variables(self) -> Mapping[str, Variable]:
+        """Variables that the points of such a study have, if they are asked for."""
+        return OF_MODES if self.has_modes else ASKED
+
+    @property
+    def kept(self) -> Mapping[str, Variable]:
+        """Variables that the result of such a study always holds."""
+        return OF_A_MODE_POINT if self.has_modes else KEPT
+
+    @property
+    def scene_variables(self) -> tuple[str, ...]:
+        """What `outputs.variables` asks of the scene, names of SCENE."""
+        return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.variables)
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
         study_file = self.folder / Path(self.source).name
@@ -235,7 +268,11 @@ class Study(Section):
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
-        return {**{name: getattr(self.axes, name) for name in self.own_axes}, **self.axes_of_parts}
+        found = {**{name: getattr(self.axes, name) for name in self.own_axes}, **self.axes_of_parts}
+        if self.axes.modal_amplitude is None:
+            return found
+        worn = found.pop("cycle", (0.0,))
+        return {**found, "modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
 
     @property
     def axes_of_parts(self) -> Mapping[str, tuple[float | str, ...]]:
@@ -251,12 +288,13 @@ class Study(Section):
     @property
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
-        return (*AXES, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        axes = AXES_OF_MODES if self.has_modes else AXES
+        return (*axes, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
 
 
 def check_axes(study: Study) -> None:
     """Raises WrongValueError where a study has too many points, or two dimensions of the result have one name."""
-    if "nodal_diameter" in study.dimensions and "natural_frequency" in study.outputs.variables:
+    if "nodal_diameter" in study.dimensions and "natural_frequency" in study.scene_variables:
         remedy = "leave it out: it has a dimension nodal_diameter of its own; a study without this axis gives it"
         raise WrongValueError("natural_frequency", remedy, "outputs.variables")
     n_points = math.prod(len(values) for values in study.dimensions.values())

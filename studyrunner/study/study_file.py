@@ -15,6 +15,13 @@ import numpy as np
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
 from studyrunner.study.followed import take_followed
+from studyrunner.study.mode_tables import (
+    asks_for_modes,
+    check_mode_tables,
+    check_worn_counts,
+    with_idle_keys,
+    without_idle_keys,
+)
 from studyrunner.study.realisation import check_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.scene_axes import (
@@ -34,6 +41,7 @@ from studyrunner.study.study import Study, check_axes
 from studyrunner.study.study_of_result import Archived, read_archived
 from studyrunner.study.toml_text import read_toml, read_toml_file
 from studyrunner.study.wear_section import WearSection
+from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -87,7 +95,9 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
     else:
         for text in [overrides] if isinstance(overrides, str) else overrides:
             _override(table, text)
-    return check_study(table, argument, path, archived)
+    found = check_study(table, argument, path, archived)
+    check_worn_counts(found)
+    return found
 
 
 def bundled_studies() -> tuple[str, ...]:
@@ -118,6 +128,7 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     worn = _section(table, "scene").get("worn")
     if worn is not None:
         sections["scene"] = {**_section(table, "scene"), "worn": read_worn(worn, source, path.parent)}
+    check_mode_tables(sections, source)
     scene_axes = _take_scene_axes(sections, source)
     if scene_axes:
         return _with_variants(sections, scene_axes, source, path, archived)
@@ -128,7 +139,7 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     moved = _move_solver_axes(sections)
     given = {"source": source, "folder": path.parent, "archived": archived, "follow": follow}
     try:
-        study = check_table(Study, {**sections, **given}, source, "")
+        study = check_table(Study, {**with_idle_keys(sections), **given}, source, "")
         study = with_room_for_wear(study)
         check_scatter(study)
         return study
@@ -140,7 +151,8 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
 
 def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
     """Axes of the study that are keys of [scene] or [wear]."""
-    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"))
+    name = "cycle" if asks_for_modes(sections) else WORN_AXIS
+    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"), name)
     if all(name in AxesSection.model_fields for name in _section(sections, "axes")):
         return of_worn
     with scene_errors(source, None):
@@ -184,7 +196,7 @@ def format_study(study: Study) -> str:
         if sections["axes"][key] is not None:
             del sections["solver"][key]
     lines = []
-    for name, section in sections.items():
+    for name, section in without_idle_keys(sections).items():
         if section is None:
             continue
         lines.append(f"[{name}]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import decimal
 import math
 from collections.abc import Hashable, Iterable
 from fractions import Fraction as Rational
@@ -99,19 +100,35 @@ def read_axis(value: object) -> tuple[Any, ...]:
 def _spread_range(table: dict[str, object]) -> tuple[float, ...]:
     """Equally spaced values, each the number that a person would write: 212.8, not 212.79999999999998.
 
-    They are computed from the decimals of start and stop without round-off and rounded once, so that `sel` finds
-    them by the number written and a point is the same in a range and in a list.
+    With spacing = "log" their ratios are equal. Others are computed from the decimals of start and stop without
+    round-off and rounded once, so that `sel` finds them by the number written and a point is the same in a range and in
+    a list.
     """
-    if table.keys() != {"start", "stop", "num"}:
+    if table.keys() - {"spacing"} != {"start", "stop", "num"}:
         raise WrongValueError(table, "give a number, a list or {start, stop, num}")
+    spacing = table.get("spacing", "linear")
+    if spacing not in ("linear", "log"):
+        raise WrongValueError(spacing, 'give "linear" or "log" as spacing')
     start, stop, num = read(_NUMBER, table["start"]), read(_NUMBER, table["stop"]), read(_LENGTH, table["num"])
+    if spacing == "log" and min(start, stop) <= 0.0:
+        raise WrongValueError(min(start, stop), 'give start and stop above 0 with spacing = "log"')
     if num == 1:
         return (start,)
+    if spacing == "log":
+        return _equal_ratios(start, stop, num)
     first, last = Rational(repr(start)), Rational(repr(stop))
     whole = first.denominator * last.denominator
     low, high = int(first * whole), int(last * whole)
     # the quotient of two whole numbers is rounded correctly, whatever their length
     return tuple((low * (num - 1 - place) + high * place) / (whole * (num - 1)) for place in range(num))
+
+
+def _equal_ratios(start: float, stop: float, num: int) -> tuple[float, ...]:
+    """Values with equal ratios from start to stop, both above 0, at least two; equal on all machines."""
+    with decimal.localcontext(prec=40):
+        first, last = (decimal.Decimal(repr(value)).ln() for value in (start, stop))
+        between = (((num - 1 - place) * first + place * last) / (num - 1) for place in range(1, num - 1))
+        return (start, *(float(value.exp()) for value in between), stop)
 
 
 def read(kind: TypeAdapter[Any], value: object) -> Any:
@@ -140,6 +157,7 @@ Fraction = Annotated[float, Field(gt=0, lt=1), told("give a number between 0 and
 Switch = Annotated[bool, told("give true or false")]
 Text = Annotated[str, told("give a text in quotes")]
 Harmonics = Annotated[int | Automatic, whole(1, 1000, or_auto=True)]
+Mode = Annotated[int, whole(1, 1000)]
 Samples = Annotated[int | Automatic, whole(4, 100_000, or_auto=True)]
 Scheme = Annotated[
     Literal["implicit", "explicit", "adaptive", "final"], words("implicit", "explicit", "adaptive", "final")

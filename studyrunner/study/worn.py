@@ -153,10 +153,10 @@ def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:
     raise UserError(source, key, wanted, remedy)
 
 
-def worn_axis(table: Mapping[str, Any]) -> tuple[SceneAxis, ...]:
+def worn_axis(table: Mapping[str, Any], name: str) -> tuple[SceneAxis, ...]:
     """The axis of worn states; none where their cycle counts are not known. table: as `read_worn` gives it."""
     counts = table.get("cycle", [])
     if not counts:
         return ()
     meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(AXIS, "scene", ("worn",), tuple(counts), "1", meaning),)
+    return (SceneAxis(name, "scene", ("worn",), tuple(counts), "1", meaning),)

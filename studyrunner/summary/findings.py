@@ -66,7 +66,8 @@ class Findings:
         most = max(1, MOST_NAMED // max(1, len(ends)))
         for number, advice in sorted(ends):
             ending, ended = Outcome(number), ends[number, advice]
-            text = " ".join(filter(None, (ending.sentence, advice, self._remark(ending))))
+            sentence = ending.sentence_of_mode if self._study.has_modes else ending.sentence
+            text = " ".join(filter(None, (sentence, advice, self._remark(ending))))
             lines.append(f"{ended.n} x {ending.meaning}: {text}")
             if ending == Outcome.NOT_COMPUTED:
                 continue
@@ -79,7 +80,10 @@ class Findings:
 
     def _say(self, record: np.void) -> str:
         """What is known of a history: what its message says, and how far it came where that is not in it."""
-        message, last = str(record["message"]), float(record["last_cycle"])
+        message = str(record["message"])
+        if self._study.has_modes:
+            return message
+        last = float(record["last_cycle"])
         if int(record["outcome"]) in COMPLETE or "cycle" in message:
             return message
         if math.isnan(last):

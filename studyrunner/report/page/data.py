@@ -82,6 +82,8 @@ def build_page_data(result: Result, limit: float) -> PageData:
     Where there are too many numbers cycles are thinned out evenly, first those of the contact pairs, then those of the
     points; then points lose their maps and loops. A note says so.
     """
+    if result.has_modes:
+        return PageData(None, ("Of nonlinear modes the page has figures alone.",))
     n_points = result.held.size
     if n_points > MOST_POINTS:
         note = f"The study has {n_points} points, more than the {MOST_POINTS} that can be picked here."

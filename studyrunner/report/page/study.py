@@ -52,7 +52,8 @@ def describe_study(result: Result) -> StudyFacts:
     cycles = result.cycles
     ends = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}"
     kept = f"{ends}, {np.count_nonzero(~np.isnan(cycles))} kept"
-    facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
+    if not result.has_modes:
+        facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
     facts.append(("scene", _scene(result)))
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]

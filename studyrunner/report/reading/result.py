@@ -58,11 +58,16 @@ class Result:
         """Axes of more than one value."""
         return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
 
+    @property
+    def has_modes(self) -> bool:
+        """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
+        return "modal_amplitude" in self.axes
+
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
         """Points that were computed to the end, in the shape of the axes."""
         outcome = self.dataset["outcome"].values
-        if not self.has("last_cycle"):
+        if not self.has("last_cycle") and not self.has_modes:
             # an older file holds nothing of any other point
             return np.asarray(outcome == CONVERGED)
         complete = [number for number, ending in self.endings.items() if ending.word in _COMPLETE]
@@ -72,12 +77,16 @@ class Result:
     def last_cycle(self) -> NDArray[np.float64]:
         """Last cycle counts with values, NaN without values; in the shape of the axes."""
         last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
+        if self.has_modes:
+            return np.where(self.computed, 0.0, np.nan)
         # points of an older file, or of one that was joined to this
         return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
         """Points with values, be it of the first cycles only; in the shape of the axes."""
+        if self.has_modes:
+            return self.computed
         return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
 
     @cached_property
@@ -192,7 +201,7 @@ class Result:
     def read(self, name: str) -> xr.DataArray:
         """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
         values = self.dataset[name]
-        if values.dtype.kind in "iu" and "cycle" in values.dims:
+        if values.dtype.kind in "iu" and "cycle" in values.dims and not self.has_modes:
             if self.has("cycle_count"):
                 return values.where(self.dataset["cycle_count"].notnull())
             last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
@@ -208,7 +217,7 @@ class Result:
         where: dict[str, int | slice | list[int]] = {
             axis: index for axis, index in point.items() if axis in values.dims
         }
-        if "cycle" in values.dims:
+        if "cycle" in values.dims and not self.has_modes:
             where["cycle"] = cycle
         return values.isel(where)
 
@@ -230,9 +239,12 @@ class Result:
     @cached_property
     def _shown(self) -> dict[str, int]:
         candidates = []
-        if self.has("worn_volume"):
+        if self.has_modes:
+            amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
+            candidates.append(amplitude.transpose(*self.axes).values)
+        elif self.has("worn_volume"):
             candidates.append(self.worn)
-        if self.has("response_amplitude"):
+        if self.has("response_amplitude") and not self.has_modes:
             amplitude = self.read("response_amplitude").isel(cycle=0)
             candidates.append(amplitude.max("response", skipna=False).values)
         candidates.append(np.ones(self.computed.shape))
@@ -267,8 +279,9 @@ class Result:
         numbers where the file has one frequency only; None where nothing but words and samples varies.
         """
         numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
-        if "frequency" in numbers:
-            return "frequency"
+        for name in ("frequency", "modal_amplitude"):
+            if name in numbers:
+                return name
         return numbers[0] if numbers else None
 
     def choose(self, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:

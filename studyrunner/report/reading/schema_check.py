@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import numpy as np
 import xarray as xr
 
+from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
@@ -24,7 +25,15 @@ MOST_POINTS = 10**6
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = ("step_limit", "error_estimate", "worn_volume_error", "cycle_count", *CERTIFICATE)
+_INFINITE = (
+    "natural_frequency_error",
+    "damping_ratio_error",
+    "step_limit",
+    "error_estimate",
+    "worn_volume_error",
+    "cycle_count",
+    *CERTIFICATE,
+)
 _MOST_INPUTS, _MOST_DRAWN = 100, 2**24  # inputs that scatter, values of one of them
 _MOST_NAMES = 2**20  # values along any dimension
 _LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
@@ -59,21 +68,23 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     if lacking:
         raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
+    with_axes = OF_MODES | OF_A_MODE_POINT if "modal_amplitude" in axes else _WITH_AXES
+    without_axes = {name: entry for name, entry in _WITHOUT_AXES.items() if name not in with_axes}
     if not math.prod(dataset["outcome"].shape):
         raise UserError(source, "OUT.nc", None, f"holds no point; {_REMEDY}")
     try:
         _check_sizes(dataset, axes)
         kept = {name: _check_coordinate(dataset, name) for name in _coordinates(dataset, axes)}
-        for name, entry in _WITH_AXES.items():
+        for name, entry in with_axes.items():
             if name in dataset.variables:
                 kept[name] = _check_variable(dataset, name, entry, (*axes, *entry.dimensions))
-        for name, entry in (_WITHOUT_AXES | _OF_CONTACTS).items():
+        for name, entry in (without_axes | _OF_CONTACTS).items():
             if name in dataset.variables:
                 # where scenes differ, along the axes along which they do
                 along = tuple(axis for axis in axes if axis in dataset.variables[name].dims)
                 kept[name] = _check_variable(dataset, name, entry, (*along, *entry.dimensions))
         drawn = {name: _check_drawn(dataset, name, axes) for name in _drawn_names(dataset)}
-        _check_values(kept)
+        _check_values(kept, axes)
     except _WrongError as wrong:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
     names = set(_OF_CONTACTS) | set(_coordinates(dataset, axes))
@@ -237,9 +248,10 @@ def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions:
     return variable
 
 
-def _check_values(kept: Mapping[str, xr.Variable]) -> None:
+def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str]) -> None:
     """Tests the values that lead to other values: cycles, pairs, flags and mesh."""
-    cycles = kept["cycle"].values
+    # worn joints whose modes are sought stand in any order
+    cycles = np.sort(kept["cycle"].values) if "cycle" in axes else kept["cycle"].values
     if cycles.dtype.kind not in "iuf" or cycles[0] < 0 or (np.diff(cycles) <= 0).any():
         raise _WrongError("cycle", "no counts in ascending order")
     pairs = kept["contact"].values

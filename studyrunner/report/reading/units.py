@@ -57,6 +57,7 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
     "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
     "Hz": ((0.0, 1.0, "Hz"),),
+    "m kg^0.5": ((0.0, 1.0, "m√kg"),),
     "rad": ((0.0, 180.0 / np.pi, "°"),),
 }
 

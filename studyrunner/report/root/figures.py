@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -26,8 +27,8 @@ from studyrunner.report.root.views import View, find_views
 
 _MOST_CLOSE_UPS = 2
 _MOST_NUMBERS = 120
-_MOST_PAIRS = 20_000
-_MOST_FACES = 60_000
+MOST_PAIRS = 20_000
+MOST_FACES = 60_000
 NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
@@ -37,10 +38,10 @@ def draw_root(result: Result) -> Iterator[Drawing | Missing]:
 
     Nothing where there are no positions, or more pairs than can be told from each other.
     """
-    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
+    surface = read_root(result) if result.dataset.sizes["contact"] <= MOST_PAIRS else None
     if surface is None:
         return
-    surface = simplify(surface, _MOST_FACES)
+    surface = simplify(surface, MOST_FACES)
     views = find_views(result, surface)
     state = _find_state(result)
     if state is not None:
@@ -85,16 +86,8 @@ def draw_state(result: Result, surface: RootSurface, views: Sequence[View], stat
     largest, worn = float(state.values.max()), float(state.depth.max()) > NO_DEPTH
     factor = surface.exaggeration(float(state.depth.max())) if worn else 1.0
     scale = scale_for("m" if state.name == "wear_depth" else "Pa", state.values)
-    closer = [view for view in views if view.flank >= 0 and view.body == views[0].body][:_MOST_CLOSE_UPS]
-    drawn = [views[-1], *closer]
-    figure = new_figure(3.4)
-    panels = figure.subplots(1, len(drawn), squeeze=False, width_ratios=[1.0] + [2.0] * len(closer))[0]
-    norm = Normalize(0.0, scale(largest).item() or 1.0)
-    for panel, view in zip(panels, drawn, strict=True):
-        _paint(panel, surface, view, state, factor, scale, norm)
-        panel.set_title(view.title)
     label = state.name.replace("_", " ")
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(label), fraction=0.05, panchor=False)
+    figure = paint_state(surface, views, state, factor, scale, label)
     pair = result.dataset["contact"].values[int(np.argmax(state.values))]
     text = as_sentences(
         f"{label.capitalize()} {result.when(state.cycle, 'after')} at {result.describe(result.shown_point())}",
@@ -102,10 +95,31 @@ def draw_state(result: Result, surface: RootSurface, views: Sequence[View], stat
         f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
         if worn
         else "",
-        "Dashed: the edge of the contact surface before" if closer and worn else "",
+        "Dashed: the edge of the contact surface before" if _close_ups(views) and worn else "",
         "The file has no mesh: each pair is a patch" if not surface.is_mesh else "",
     )
     return Drawing("worn_root", "The worn root" if worn else "The root", text, figure)
+
+
+def _close_ups(views: Sequence[View]) -> list[View]:
+    """Views of contact surfaces of the outer body from close by."""
+    return [view for view in views if view.flank >= 0 and view.body == views[0].body][:_MOST_CLOSE_UPS]
+
+
+def paint_state(
+    surface: RootSurface, views: Sequence[View], state: State, factor: float, scale: Scale, label: str
+) -> Figure:
+    """The root and close-ups, coloured with the values of a state. factor: by which worn depths are exaggerated."""
+    closer = _close_ups(views)
+    drawn = [views[-1], *closer]
+    figure = new_figure(3.4)
+    panels = figure.subplots(1, len(drawn), squeeze=False, width_ratios=[1.0] + [2.0] * len(closer))[0]
+    norm = Normalize(0.0, scale(float(state.values.max())).item() or 1.0)
+    for panel, view in zip(panels, drawn, strict=True):
+        _paint(panel, surface, view, state, factor, scale, norm)
+        panel.set_title(view.title)
+    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(label), fraction=0.05, panchor=False)
+    return figure
 
 
 def _paint(

@@ -1,0 +1,102 @@
+"""Forced response near a resonance from a nonlinear mode: single nonlinear mode theory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from solver.model import ComplexArray, FloatArray, ReducedModel
+from solver.nonlinear_modes import Backbone
+
+
+@dataclass(frozen=True)
+class ModalResponse:
+    """A frequency response along its curve: up the side below the resonance, then down the other side.
+
+    - frequency (n,): Hz. The curve may pass a frequency several times.
+    - amplitude (n,): modal amplitude, m sqrt(kg).
+    - response (n, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)) to a harmonic load
+      Re(F exp(i omega t)).
+    - damping_ratio (n,): of the mode at this amplitude.
+
+    Where the resonance is beyond the largest amplitude of the mode, a row of NaN stands between the sides.
+    """
+
+    frequency: FloatArray
+    amplitude: FloatArray
+    response: ComplexArray
+    damping_ratio: FloatArray
+
+
+def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: float, points: int = 50) -> ModalResponse:
+    """Response to a harmonic load from a nonlinear mode alone, other modes left out.
+
+    With the natural frequency omega, the damping ratio zeta and the mass-normalised shape phi at the modal amplitude a,
+
+        (omega^2 - Omega^2 + 2 i zeta omega Omega) q = phi^H F,      |q| = a,
+
+    is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
+    above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142
+    (2020). It holds where one mode vibrates and its shape does not depend on the excitation.
+
+    Parameters
+    ----------
+    model
+        The model of the mode, with its harmonic load.
+    mode
+        From `solver.backbone`, at two amplitudes or more that have a state. The load is limited to its amplitudes.
+    excitation_amplitude
+        N, above 0; multiplies the harmonic load of the model.
+    points
+        Points of a side between two amplitudes of the mode; between these values are interpolated over log(amplitude).
+
+    Raises
+    ------
+    ValueError
+        The mode has fewer than two amplitudes with a state, the excitation is not above 0, or mode and model do not
+        belong together.
+    """
+    if not 0.0 < excitation_amplitude < np.inf:
+        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
+    linear, folded = model.harmonic_structure(1)
+    if mode.shape.shape[1] != len(linear.mass):
+        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
+    order = np.argsort(mode.amplitude)
+    order = order[np.isfinite(mode.frequency[order])]
+    if len(order) < 2:
+        raise ValueError("mode: give a mode with a state at two amplitudes or more")
+    known = np.log(mode.amplitude[order])
+    at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
+
+    def between(values: ComplexArray | FloatArray) -> ComplexArray:
+        columns = np.reshape(values[order], (len(order), -1)).T
+        found = [np.interp(at, known, each.real) + 1j * np.interp(at, known, each.imag) for each in columns]
+        return np.array(found).T
+
+    size = np.exp(at)
+    omega, zeta = 2.0 * np.pi * between(mode.frequency)[:, 0].real, between(mode.damping_ratio)[:, 0].real
+    shape = between(mode.shape / mode.amplitude[:, None])
+    load = linear.load_harmonic.conj() if folded else linear.load_harmonic
+    force = excitation_amplitude * (shape.conj() @ load)
+    # Omega^4 - 2 middle Omega^2 + omega^4 = |force|^2 / a^2
+    middle = omega**2 * (1.0 - 2.0 * zeta**2)
+    inside = middle**2 - omega**4 + (np.abs(force) / size) ** 2
+    with np.errstate(invalid="ignore"):
+        sides = [np.sqrt(middle + sign * np.sqrt(inside)) for sign in (-1.0, 1.0)]
+    shown = between(mode.response / mode.amplitude[:, None])
+    parts = []
+    for number, excited in enumerate(sides):
+        rows = np.flatnonzero(np.isfinite(excited))[:: 1 - 2 * number]
+        coordinate = force / (omega**2 - excited**2 + 2j * zeta * omega * excited)
+        parts.append((excited[rows] / (2.0 * np.pi), size[rows], coordinate[rows, None] * shown[rows], zeta[rows]))
+    gap = inside[-1] > 0.0
+    nothing = (
+        np.full(1, np.nan),
+        np.full(1, np.nan),
+        np.full((1, shown.shape[1]), np.nan, complex),
+        np.full(1, np.nan),
+    )
+    curve = [parts[0], nothing, parts[1]] if gap else parts
+    return ModalResponse(*(np.concatenate(each) for each in zip(*curve, strict=True)))

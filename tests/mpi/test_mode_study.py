@@ -1,0 +1,65 @@
+"""Nonlinear modes on several ranks, killed and gone on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from tests.mpi.launching import Running, count_rows, results, run_to_end
+
+STUDY = """
+[study]
+name = "modes"
+[scene]
+model = "sdof_slider"
+[axes]
+modal_amplitude = {start = 1.2e-5, stop = 1e-3, num = 12, spacing = "log"}
+sweep = "down"
+friction_coefficient = [0.4, 0.5, 0.6]
+"""
+
+pytestmark = [pytest.mark.slow, pytest.mark.mpi]
+
+
+@pytest.fixture(scope="module")
+def arguments(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    path = tmp_path_factory.mktemp("study") / "modes.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return ["-m", "studyrunner.cli", str(path), "-o", "out.nc"]
+
+
+@pytest.fixture(scope="module")
+def alone(arguments: list[str], tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """The result of one process without a launcher."""
+    folder = tmp_path_factory.mktemp("alone")
+    assert run_to_end(0, arguments, folder).status == 0
+    return results(folder / "out.nc")
+
+
+@pytest.mark.parametrize("n_ranks", [2, 3])
+def test_the_result_is_the_same_on_any_number_of_ranks(
+    n_ranks: int, arguments: list[str], alone: xr.Dataset, tmp_path: Path
+) -> None:
+    ended = run_to_end(n_ranks, arguments, tmp_path)
+    assert ended.status == 0, ended.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)
+
+
+def test_a_run_that_is_killed_keeps_its_points_and_goes_on(
+    arguments: list[str], alone: xr.Dataset, tmp_path: Path
+) -> None:
+    def kill(running: Running) -> None:
+        assert running.reaches(lambda: count_rows("start_states", tmp_path / "out.nc") > 2), running.said
+        with contextlib.suppress(ProcessLookupError, KeyError):
+            os.kill(running.ranks()[1], signal.SIGKILL)
+
+    assert run_to_end(2, arguments, tmp_path, disturb=kill).status != 0
+    assert count_rows("start_states", tmp_path / "out.nc") > 2
+    ended = run_to_end(2, arguments, tmp_path)
+    assert ended.status == 0, ended.said
+    xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)

@@ -1,0 +1,62 @@
+"""Single nonlinear mode theory against the linear oscillator and the full forced response."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import backbone, frequency_response, modal_response
+from tests.solver.test_modes import foot
+
+
+def test_without_slip_the_curve_is_that_of_a_linear_oscillator() -> None:
+    model = foot()
+    mode = backbone(model, np.geomspace(1e-9, 1e-6, 4), 0.5)
+    force = 1e-6  # N
+    curve = modal_response(model, mode, force)
+    omega, zeta = 2.0 * np.pi * mode.frequency[0], mode.damping_ratio[0]
+    shape = mode.shape[0] / mode.amplitude[0]
+    excited = 2.0 * np.pi * curve.frequency
+    participation = np.vdot(shape, model.linear[0].load_harmonic)
+    expected = shape[2] * participation * force / (omega**2 - excited**2 + 2j * zeta * omega * excited)
+    np.testing.assert_allclose(curve.response[:, 0], expected, rtol=1e-6)
+    # other modes of the full response are far away
+    near = np.argmax(np.abs(curve.response[:, 0]))
+    full = frequency_response(model, curve.frequency[[near]], 0.5, excitation_amplitude=force)
+    np.testing.assert_allclose(curve.response[near], full.response[0], rtol=1e-3)
+
+
+def test_with_slip_the_curve_is_near_the_full_response() -> None:
+    """The peak and both sides, at twice the damping of the joint that sticks."""
+    model = foot(loss=1e-6)
+    mode = backbone(model, np.geomspace(2e-6, 2e-4, 14), 0.5)
+    force = 0.5
+    curve = modal_response(model, mode, force)
+    assert np.isfinite(curve.frequency).all()
+    top = int(np.argmax(curve.amplitude))
+    assert curve.damping_ratio[top] > 2.0 * mode.damping_ratio[0]
+    sides = [top, int(np.argmin(np.abs(curve.amplitude[:top] - 0.5 * curve.amplitude[top])))]
+    full = frequency_response(model, np.sort(curve.frequency[sides]), 0.5, excitation_amplitude=force)
+    own = np.abs(curve.response[sides, 0])[np.argsort(curve.frequency[sides])]
+    np.testing.assert_allclose(own, np.abs(full.response[:, 0]), rtol=0.05)
+
+
+def test_a_resonance_beyond_the_mode_leaves_a_gap() -> None:
+    model = foot()
+    mode = backbone(model, [1e-9, 1e-8], 0.5)
+    curve = modal_response(model, mode, 1.0)
+    assert np.count_nonzero(np.isnan(curve.frequency)) == 1
+
+
+def test_wrong_arguments_are_named() -> None:
+    model = foot()
+    mode = backbone(model, [1e-9, 1e-8], 0.5)
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="excitation_amplitude: give a finite number above 0"):
+            modal_response(model, mode, wrong)
+    with pytest.raises(ValueError, match="a state at two amplitudes"):
+        modal_response(model, replace(mode, frequency=np.full(2, np.nan)), 1.0)
+    with pytest.raises(ValueError, match="a mode of this model"):
+        modal_response(model, replace(mode, shape=mode.shape[:, :2]), 1.0)

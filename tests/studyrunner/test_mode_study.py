@@ -1,0 +1,179 @@
+"""Studies of nonlinear modes: axes.modal_amplitude in place of frequency, excitation and wear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver import backbone
+from studies import build_scene
+from studyrunner.api import run_study
+from studyrunner.plan.planning import build_tasks
+from studyrunner.report.page.page import write_page
+from studyrunner.report.page_contents import draw_report
+from studyrunner.report.reading.result import open_for_report
+from studyrunner.study.study import Study
+from studyrunner.study.study_file import format_study, read_study
+from studyrunner.user_error import UserError
+
+# a mass on a rigid slider has its mode while it slides: above 1e-5 m sqrt(kg)
+SLIDER = """
+[study]
+name = "slider_modes"
+[scene]
+model = "sdof_slider"
+worn = {depth = [[1e-6], [0.0]], cycle = [1e4, 0]}
+[axes]
+modal_amplitude = [1e-3, 1e-6, 1e-4]
+mode = [1, 3]
+sweep = "down"
+[scatter]
+samples = 2
+friction_coefficient = {normal = {std = 0.03}}
+"""
+SHAPE = {"mode": 2, "sweep": 1, "sample": 2, "modal_amplitude": 3, "cycle": 2}
+
+
+@pytest.fixture(scope="module")
+def study_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("modes") / "slider_modes.toml"
+    path.write_text(SLIDER, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(study_file: Path) -> xr.Dataset:
+    return run_study(study_file, study_file.with_name("out.nc"), progress=False).load()
+
+
+def without_time(dataset: xr.Dataset) -> xr.Dataset:
+    return dataset.drop_vars("run_time").drop_attrs(deep=False)
+
+
+def test_the_result_has_its_axes_and_the_values_of_the_solver(result: xr.Dataset) -> None:
+    """Amplitudes and worn joints in the order of the study file, each the same as in Python."""
+    sizes = dict(zip(result.natural_frequency.dims, result.natural_frequency.shape, strict=True))
+    assert list(sizes.items()) == list(SHAPE.items())
+    np.testing.assert_array_equal(result.cycle, [1e4, 0.0])
+    for variable in result.variables.values():
+        assert {"units", "long_name"} <= variable.attrs.keys()
+    model = build_scene("sdof_slider")
+    for sample, friction in enumerate(result.sample_friction_coefficient.values):
+        for cycle, depth in enumerate((1e-6, 0.0)):
+            direct = backbone(model, result.modal_amplitude, friction, direction="down", wear_depth=depth)
+            at = result.isel(mode=0, sweep=0, sample=sample, cycle=cycle)
+            for name, values in {
+                "natural_frequency": direct.frequency,
+                "natural_frequency_error": direct.frequency_error,
+                "damping_ratio": direct.damping_ratio,
+                "damping_ratio_error": direct.damping_error,
+                "response_amplitude": np.abs(direct.response),
+                "slip_fraction": direct.slip_fraction,
+                "open_fraction": direct.open_fraction,
+                "harmonics_used": direct.harmonics_used,
+                "outcome": direct.outcome,
+            }.items():
+                np.testing.assert_array_equal(at[name], values, err_msg=name)
+    assert (result.harmonics_used.sel(mode=1, modal_amplitude=[1e-4, 1e-3]) > 0).all()
+
+
+def test_a_mode_that_is_not_there_says_so(result: xr.Dataset) -> None:
+    assert "followed down to the amplitude" in str(
+        result.message.sel(mode=1, modal_amplitude=1e-6, cycle=0)[0, 0].item()
+    )
+    assert "fewer linear modes" in str(result.message.sel(mode=3, cycle=0)[0, 0, 0].item())
+    found = result.natural_frequency.sel(mode=1, modal_amplitude=[1e-4, 1e-3])
+    first, second = result.attrs["certificate_summary"].splitlines()
+    assert first.startswith(f"mode 1: {found.min():.6g} to {found.max():.6g} Hz, damping ")
+    assert second == "mode 3: found at none of 12 points"
+    assert "folds of the amplitude are not passed" in result.outcome.attrs["sentences"]
+
+
+def test_points_are_the_same_in_another_list(study_file: Path, result: xr.Dataset, tmp_path: Path) -> None:
+    """And a study with more amplitudes goes on from the points that are there."""
+    changes = {"scatter.samples": 1, "axes.mode": 1, "scene.worn": {"depth": 0.0, "cycle": 0}}
+    few = {**changes, "axes.modal_amplitude": [1e-4]}
+    more = {**changes, "axes.modal_amplitude": {"start": 1e-5, "stop": 1e-3, "num": 3, "spacing": "log"}}
+    run_study(study_file, tmp_path / "out.nc", overrides=few, progress=False).close()
+    found = run_study(study_file, tmp_path / "out.nc", overrides=more, progress=False, overwrite=True).load()
+    np.testing.assert_array_equal(found.modal_amplitude, [1e-5, 1e-4, 1e-3])
+    for amplitude in (1e-4, 1e-3):
+        where = {"modal_amplitude": [amplitude], "cycle": [0.0], "mode": [1], "sample": [0]}
+        xr.testing.assert_identical(without_time(found.sel(where)), without_time(result.sel(where)).drop_vars([]))
+
+
+def test_the_effective_study_is_the_same_study(study_file: Path, tmp_path: Path) -> None:
+    study = read_study(study_file)
+    text = format_study(study)
+    for name in ("slow_time", "[wear]", "frequency =", "scheme", "step"):
+        assert name not in text.replace("natural_frequency", "")
+    (tmp_path / "again.toml").write_text(text, encoding="utf-8")
+    assert read_study(tmp_path / "again.toml").dimensions == study.dimensions
+    assert format_study(read_study(tmp_path / "again.toml")) == text
+
+
+def test_points_of_a_line_share_a_task(study_file: Path) -> None:
+    """Lines that are equal are followed once."""
+    study: Study = read_study(study_file, {"scene.worn.depth": [[0.0], [0.0]], "axes.sweep": ["up", "down"]})
+    plan = build_tasks(study, 2)
+    assert plan.n_points == 2 * 2 * 2 * 3 * 2
+    assert [branch.frequencies for branch in plan.branches] == [(1e-6, 1e-4, 1e-3)] * len(plan.branches)
+    points = [point for line in plan.marches for march in line for point in march.points]
+    assert len(set(points)) == len(points) == plan.n_points
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("axes.frequency", 200, "axes.frequency = 200: leave it out"),
+        ("axes.scheme", "adaptive", 'axes.scheme = "adaptive": leave it out'),
+        ("axes.sweep", "ramp", 'axes.sweep = "ramp": give "up" or "down"'),
+        ("axes.mode", 0, "axes.mode = 0: give a whole number, at least 1"),
+        ("axes.modal_amplitude", -1.0, "axes.modal_amplitude = -1.0: give a finite number above 0"),
+        ("slow_time.cycles", 10, "slow_time.cycles = 10: leave it out"),
+        ("wear.law", "energy", 'wear.law = "energy": leave it out'),
+        ("outputs.loops", [0], "outputs.loops = [0]: leave it out"),
+        ("outputs.variables", ["worn_volume"], 'outputs.variables = "worn_volume": give names out of natural_freq'),
+        ("scene.worn", {"depth": 0.0}, "scene.worn.cycle: missing: give the cycle count of each depth"),
+        ("scatter.wear_coefficient", {"normal": {"std": 1e-12}}, "scatter.wear_coefficient: unknown input"),
+    ],
+)
+def test_what_modes_have_no_use_for_is_named(study_file: Path, key: str, value: object, said: str) -> None:
+    with pytest.raises(UserError) as error:
+        read_study(study_file, {key: value})
+    assert said in str(error.value)
+
+
+def test_keys_of_modes_need_an_amplitude() -> None:
+    with pytest.raises(UserError, match=r"axes.mode = 1: give axes.modal_amplitude as well"):
+        read_study("sdof_slider", {"axes.mode": 1})
+    with pytest.raises(UserError, match="only nonlinear modes have it"):
+        read_study("sdof_slider", {"outputs.variables": ["damping_ratio"]})
+
+
+def test_equal_ratios_end_where_they_are_told_to() -> None:
+    table = {"start": 1e-6, "stop": 1e-2, "num": 5, "spacing": "log"}
+    study = read_study("sdof_slider", {"axes.wear_coefficient": table})
+    assert study.axes.wear_coefficient == (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+    for wrong, said in (({**table, "start": 0.0}, "start and stop above 0"), ({**table, "spacing": "lin"}, '"log"')):
+        with pytest.raises(UserError, match=said):
+            read_study("sdof_slider", {"axes.wear_coefficient": wrong})
+
+
+@pytest.mark.slow
+def test_the_report_draws_frequency_and_damping(result: xr.Dataset, study_file: Path, tmp_path: Path) -> None:
+    with open_for_report(study_file.with_name("out.nc")).dataset as dataset:
+        assert dataset.sizes == result.sizes
+    shown = open_for_report(study_file.with_name("out.nc"))
+    items = {item.name: item for item in draw_report(shown)}
+    assert {"natural_frequency", "damping_ratio", "outcomes", "wear"} <= items.keys()
+    summary = write_page(shown, items.values(), tmp_path / "index.html")
+    assert summary.n_missing == 1
+    lines = items["damping_ratio"].figure.axes[0].get_lines()
+    found = [100.0 * result.damping_ratio.sel(mode=1, cycle=cycle).isel(sweep=0, sample=0).values for cycle in (1e4, 0)]
+    drawn = [line.get_ydata() for line in lines if line.get_label().startswith("cycle")]
+    np.testing.assert_allclose(drawn[0], found[0][[1, 2, 0]])
+    shown.close()
