@@ -67,6 +67,7 @@ __all__ = [
     "frequency_response",
     "integrate_mission",
     "march_wear",
+    "modal_response",
     "response_curve",
     "tuned",
 ]
@@ -78,7 +79,6 @@ _PLACES = {
     "FrequencyResponse": "forced_response",
     "HarmonicBalance": "balance_functions",
     "MissionHistory": "missions.result",
-    "ModalResponse": "modal_response",
     "ModalResponse": "modal_response",
     "Outcome": "outcome",
     "PeriodicMotion": "results.periodic_motion",
