@@ -228,7 +228,6 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
     from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-    from studyrunner.sample_lines import describe_samples
     from studyrunner.scene.scene_set import merge_facts
     from studyrunner.scene_building import build_scenes
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
@@ -258,6 +257,10 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
     head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
     untouched = [] if summary.written else [f"{path} is the finished result that it was"]
-    samples = [] if study.scatter is None or not summary.written else describe_samples(target.path)
+    samples = []
+    if study.scatter is not None and summary.written:
+        from studyrunner.sample_lines import describe_samples  # where it is used: it takes a second to load
+
+        samples = describe_samples(target.path)
     print(head, summary.certificates, *summary.findings, *untouched, *samples, sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED

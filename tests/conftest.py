@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -17,3 +18,13 @@ settings.register_profile(
     "tests", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("tests")
+
+_WITH_OTHERS = ("mpi", "processes", "browser")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What waits for other processes is tried once more when it fails; the summary names what was (R)."""
+    for item in items:
+        if any(item.get_closest_marker(name) for name in _WITH_OTHERS):
+            item.add_marker(pytest.mark.flaky(reruns=1))

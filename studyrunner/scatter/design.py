@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from studyrunner.scatter.section import Method
 from studyrunner.user_error import WrongValueError
@@ -91,6 +90,8 @@ def unit_design(
 
 def _sobol(seed: int, samples: int, dimensions: int) -> NDArray[np.float64]:
     """Scrambled here and not by scipy, whose scrambling of a column depends on the number of columns."""
+    from scipy.stats import qmc  # where it is used: it takes a while to load
+
     if dimensions > qmc.Sobol.MAXDIM:
         remedy = f'give "random": a Sobol\' sequence has at most {qmc.Sobol.MAXDIM} columns, {dimensions} are drawn'
         raise WrongValueError("sobol", remedy, "scatter.method")

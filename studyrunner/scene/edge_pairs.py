@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 if TYPE_CHECKING:
     from solver.model import ContactInterface
@@ -46,6 +45,8 @@ def edge_pairs(contact: ContactInterface) -> NDArray[np.bool_]:
 
 def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Of one surface, positions (n, 3), m; all of them where it cannot be told."""
+    from scipy.spatial import Delaunay, QhullError  # where it is used: it takes a while to load
+
     unknown = np.ones(len(position), np.bool_)
     if not np.isfinite(position).all():
         return unknown

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
 
 from studyrunner.study.checked_table import check_table
@@ -16,6 +15,9 @@ from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.values import NotNegative, Section, Text, read
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
@@ -86,6 +88,8 @@ def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
     UserError
         Where the table or the result file is wrong.
     """
+    import xarray as xr  # where it is used: it takes a while to load
+
     if not isinstance(table, Mapping):
         remedy = 'give {result = "OUT.nc", cycle = [...]} with the axes of a point, or {depth = ...}'
         raise UserError(source, "scene.worn", table, remedy)

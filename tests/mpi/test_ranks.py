@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, Running, launcher, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, SOON, Running, launcher, run_to_end
 
 GRID = [
     *CHEAP,
@@ -57,6 +57,7 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
     arguments = [
         *("-m", "studyrunner.cli", "dovetail"),
         *("--set", "axes.frequency=[211.5, 212.5]"),
+        *("--set", "axes.scheme=['explicit', 'adaptive']"),
         *("--set", "scene.mesh=1"),
         *("--set", "solver.harmonics=3"),
         *("--set", "solver.samples=64"),
@@ -71,7 +72,7 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results.append(result.load().drop_vars("run_time"))
     assert (results[0].worn_volume.isel(cycle=-1) > 0.0).any()
-    assert results[0].loop_force.notnull().any(["frequency", "cycle", "phase", "component"]).sum() == 2 * 3
+    assert results[0].loop_force.notnull().any(["frequency", "cycle", "phase", "component"]).sum() == 2 * 2
     assert "mesh_quad" in results[0]
     xr.testing.assert_identical(results[1], results[0])
 
@@ -114,11 +115,12 @@ def test_an_interrupted_run_ends_at_once(
 
     ended = run_to_end(n_ranks, [FAKED, *GRID, "-o", "out.nc"], tmp_path, {"FAKE_SECONDS": "60"}, interrupt)
     assert ended.status == 130
-    assert ended.seconds < 20.0
+    assert ended.seconds < SOON
     assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
     assert "of 312 points, the same command goes on" in ended.said
     assert "Traceback" not in ended.said
-    assert len(ended.said.splitlines()) < 9
+    # beside lines of progress, which a busy machine has more of
+    assert sum(not line.startswith("[") for line in ended.said.splitlines()) < 6
     assert sorted(path.name for path in tmp_path.glob("*out.nc*")) == ["out.nc", "out.nc.progress"]
     with xr.open_dataset(tmp_path / "out.nc") as result:
         assert (result.outcome == Outcome.NOT_COMPUTED).any()

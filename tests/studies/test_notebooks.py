@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-import time
+import resource
 
 import nbformat
 import pytest
@@ -83,14 +83,20 @@ def tells(source):
     return shows or "print(" in source or "subplots(" in source
 
 
+def children_seconds():
+    """Time of processors that processes of this one have taken, s: it does not depend on what else the machine does."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [path for path in NOTEBOOKS if path.stem in RUN], ids=lambda path: path.stem)
 def test_notebook_runs_without_a_warning_and_draws_its_figures(path, request, tmp_path):
     reads = path.stem in READ_A_RESULT
     variables = {"RESULT": str(request.getfixturevalue("small_result"))} if reads else {}
-    begin = time.monotonic()
+    begin = children_seconds()
     cells = run(path, tmp_path, variables)
-    assert time.monotonic() - begin < 120.0
+    assert children_seconds() - begin < 120.0
     assert not written_as_warning(cells)
     assert count_figures(cells) == FIGURES[path.stem]
     if not reads:

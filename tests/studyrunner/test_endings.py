@@ -15,6 +15,8 @@ import pytest
 
 from studyrunner.system.endings import begin_ending, is_ending, raise_ending, take_endings, uninterrupted
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 
 WRITER = """

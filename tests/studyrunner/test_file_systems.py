@@ -14,6 +14,8 @@ import xarray as xr
 
 from studyrunner.user_error import StorageError
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 
 SHIM = r"""

@@ -11,7 +11,7 @@ import pytest
 from tests.studyrunner.fuzzed import read_mutations, together, write_whole_files
 from tests.studyrunner.fuzzing import KINDS
 
-N_FILES = 100
+N_FILES = 50
 N_DRAWN = 10
 AT_ONCE = 2
 

@@ -21,7 +21,7 @@ from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import ReadingProcess
 
 # all files but those of the command alone
-pytestmark = pytest.mark.usefixtures("reader")
+pytestmark = [pytest.mark.usefixtures("reader"), pytest.mark.processes]
 
 IN_A_RESULT = (*("huge matrix", "inflating chunk", "external link", "many objects", "not a number"),)
 """One of each kind of harm: behind this door is the same reader of scenes."""

@@ -21,7 +21,7 @@ from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.studyrunner.faked_runs import SMALL, Solver, Task
 
-pytestmark = pytest.mark.usefixtures("folder")
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
 FAULTS = [OSError(122, "Disk quota exceeded"), MemoryError()]
 

@@ -21,6 +21,8 @@ from studyrunner.mpi.version_check import Machine
 from studyrunner.scene.scene import describe_scene
 from tests.mpi.launching import processes_may_share
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 
 READER = """
@@ -41,7 +43,7 @@ from studyrunner.mpi.shared_memory import SharedObject
 shared = SharedObject(dict(a=np.arange(100000.0)))
 sys.stdout.buffer.write(pickle.dumps(shared.address))
 sys.stdout.flush()
-time.sleep(60)
+time.sleep(600)
 """
 
 

@@ -12,6 +12,8 @@ import pytest
 
 from tests.mpi.launching import PATIENCE, launcher, results
 
+pytestmark = pytest.mark.processes
+
 ROOT = Path(__file__).parents[2]
 STUDY = "two_masses --set axes.wear_coefficient=1e-11 --set slow_time.cycles=20000 --set slow_time.outputs=3 -o out.nc"
 DEAF = {"full log of everything": ">/dev/full 2>&1", "closed": "<&- >&- 2>&-", "a reader of one line": "2>&1 | head -1"}

@@ -16,6 +16,8 @@ from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, 
 from studyrunner.report.drawing import Missing, Table
 from tests.studyrunner.report.page_cases import build_file
 
+pytestmark = pytest.mark.processes
+
 
 def short_report(_result: object) -> Iterator[Missing | Table]:
     yield Missing("loops", "[bold]Loops", "Ask for them.")
