@@ -76,12 +76,13 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
         models.add(0, model)
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        guard_kernel_cache()
         number = task.joint.scene
+        # first of all: rank 0 sends the model once, also where the task breaks off
         if task.model is not None:
             models.add(number, _open_model(task.model))
         elif not models.use(number):
             raise RuntimeError(f"no model of scene {number} for {task}")
+        guard_kernel_cache()
         of_task, own = replace(task, model=None), models[number]
         if task.joint.contact:
             drawn: dict[str, Any] = {name: np.array(values) for name, values in task.joint.contact}

@@ -240,6 +240,14 @@ class TaskPlan:
         marches = itertools.chain.from_iterable(self.marches)
         return sum(task.cost for task in self.branches) + sum(task.cost for task in marches)
 
+    @property
+    def longest(self) -> float:
+        """Estimated time, s, of the longest branch with a history from it, which cannot be computed side by side."""
+        return max(
+            branch.cost + max((task.cost for task in line), default=0.0)
+            for branch, line in zip(self.branches, self.marches, strict=True)
+        )
+
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """Tasks of the wear histories from one start state."""
         line = self.marches[branch]

@@ -55,8 +55,8 @@ def two_groups(values: SampleValues) -> Groups | None:
     longer than the gap by trend, and the ratio of the gap to the mean of these k spacings is above r with a probability
     of at most (1 + r / k)^-k, the one of a uniform density. The gap is compared with the side on which the probability
     is larger; that any of n gaps passes by chance has a probability below 0.5 %. The gap must be longer than the
-    numerical errors beside it. Of the gaps that pass the longest is taken. A sample whose error is more than half of the
-    range of all samples may lie on either side of a gap and counts as one without a value.
+    numerical errors beside it. Of the gaps that pass the longest is taken. A sample whose error is more than half of
+    the range of all samples may lie on either side of a gap and counts as one without a value.
     """
     values = _without_vague(values)
     known = values.is_known

@@ -1,10 +1,12 @@
-"""Records what the tasks of the bundled dovetail study take, for the replay in tests.benchmarks.scheduling.
+"""Records what the tasks of bundled studies take, for the replay in tests.benchmarks.scheduling.
 
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.record_costs > tests/benchmarks/dovetail_costs.csv
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.record_costs samples > tests/benchmarks/scatter_costs.csv
 
-A branch along 100 frequencies, and two marches from every fourth of them. A few minutes on one core. A line of the
-table: frequency (Hz), wear coefficient (1/Pa; 0 for the start state), CPU seconds, unknowns of the start state with the
-harmonics that it took, and whether anything moves there.
+`dovetail`: a branch along 100 frequencies, and two marches from every fourth of them. A line of the table: frequency
+(Hz), wear coefficient (1/Pa; 0 for the start state), CPU seconds, unknowns of the start state with the harmonics that
+it took, and whether anything moves there. `scatter`: a line for each sample, with the CPU seconds of its start state
+and of its history. A few minutes on one core each.
 """
 
 from __future__ import annotations
@@ -15,7 +17,10 @@ import time
 from studyrunner.evaluate import build_evaluator
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
+from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import start_marches
 
@@ -27,17 +32,17 @@ STUDY = (
 EVERY = 4
 
 
-def main() -> None:
-    """Prints the table as comma-separated values."""
+def record_line() -> None:
+    """Prints the table of the study `dovetail` as comma-separated values."""
     study = read_study("dovetail", STUDY)
     model = build_study_scene(study)
     plan = build_tasks(study, describe_scene(model).n_displacements)
     evaluate = build_evaluator(model)
-    next(iter(evaluate(plan.branches[0])))  # compiles
+    next(iter(evaluate(plan.branches[0], _forget)))  # compiles
     print("frequency,wear_coefficient,seconds,n_unknowns,moves")
     (branch,) = plan.branches
     began = time.thread_time()
-    for started in evaluate(branch):
+    for started in evaluate(branch, _forget):
         spent = time.thread_time() - began
         assert isinstance(started, StartResult)
         place, kind = f"{branch.frequencies[started.position]:.4f}", f"{started.n_unknowns},{int(started.moves)}"
@@ -45,11 +50,38 @@ def main() -> None:
         planned = plan.marches_from(0, started.position) if started.position % EVERY == 0 else ()
         for march in start_marches(planned, started):
             began = time.thread_time()
-            list(evaluate(march))
+            list(evaluate(march, _forget))
             print(f"{place},{march.wear_coefficient:g},{time.thread_time() - began:.4f},{kind}")
         sys.stdout.flush()
         began = time.thread_time()
 
 
+def record_samples() -> None:
+    """Prints the table of the study `scatter` as comma-separated values."""
+    study = read_study("scatter")
+    model, scenes = build_study_scene(study), find_scenes(study)
+    facts = describe_scene(model)
+    plan = build_tasks(study, facts.n_displacements, contact_changes(study, scenes, [facts]), scenes)
+    evaluate = build_evaluator(model)
+    next(iter(evaluate(plan.branches[0], _forget)))  # compiles
+
+    def timed(task: BranchTask | MarchTask) -> tuple[object, float]:
+        began = time.thread_time()
+        (result,) = evaluate(task, _forget)
+        return result, time.thread_time() - began
+
+    print("start_seconds,n_unknowns,moves,seconds")
+    for branch in plan.branches:
+        started, spent = timed(branch)
+        assert isinstance(started, StartResult)
+        (march,) = start_marches(plan.marches_from(branch.number, 0), started)
+        _, seconds = timed(march)
+        print(f"{spent:.3f},{started.n_unknowns},{int(started.moves)},{seconds:.3f}", flush=True)
+
+
+def _forget(_: object) -> None:
+    """Takes the progress of a task."""
+
+
 if __name__ == "__main__":
-    main()
+    record_samples() if sys.argv[1:] == ["samples"] else record_line()

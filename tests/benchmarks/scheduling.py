@@ -7,6 +7,11 @@ gets the recorded one, shifted along the frequency and scaled by a factor, and e
 drawn once and do not depend on the number of ranks. `known` is the efficiency where all costs are known before, with
 the longest way first. `possible` is the efficiency that no order of the tasks exceeds: the longest way along a branch
 and through a march from it bounds the time of a run.
+
+4096 samples on 256 ranks are 0.965 busy. On 1024 ranks each has four samples, 8 tasks of about 3 to 6 s: 0.87, where
+known costs give 0.95, and the ranks end half a task apart on average. What a history takes follows from its start state
+only in part: the rank correlation with its unknowns, which the cost model uses, is 0.57, with the iterations and the
+run time of the sweep it is below 0.1.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ FIGURES = {
     "several_files": 1,
     "trends": 4,
     "python_api": 3,
-    "scatter": 2,
+    "scatter": 3,
 }
 LARGEST = 150_000  # bytes of a file
 

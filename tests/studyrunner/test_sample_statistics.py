@@ -230,6 +230,18 @@ def test_the_density_has_both_peaks_and_the_weight_of_one() -> None:
     assert grid[np.argmax(found)] == pytest.approx(2.25, abs=0.01)
 
 
+def test_a_sample_that_may_lie_on_either_side_is_in_no_group() -> None:
+    values = known(np.r_[np.linspace(1.5, 1.6, 20), 1.9, np.linspace(2.2, 2.3, 20)])
+    assert two_groups(values) is not None
+    error = np.where(np.arange(41) == 20, 0.41, 0.01)  # of a range of 0.8
+    groups = two_groups(SampleValues(values.low, values.high, error))
+    assert groups is not None
+    assert (groups.n_lower, groups.n_upper) == (20, 20)
+    assert (groups.lower_end, groups.upper_end) == (1.6, 2.2)
+    # one that is known better closes the gap
+    assert two_groups(SampleValues(values.low, values.high, np.where(error > 0.1, 0.39, error))) is None
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_pair_whose_depth_separates_both_groups_decides(sign: float) -> None:
     rng = np.random.default_rng(1)

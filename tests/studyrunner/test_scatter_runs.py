@@ -10,10 +10,11 @@ import pytest
 import xarray as xr
 from scipy.stats import norm
 
+from studyrunner.netcdf.sample_coordinates import sample_coordinates
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import drawn_contacts
-from studyrunner.scene.drawn_contacts import pair_values
-from studyrunner.scene.scene import SceneFacts, build_study_scene
+from studyrunner.scene.drawn_contacts import contact_changes, pair_values
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.realisation import draw_inputs, realise
@@ -265,3 +266,21 @@ def test_indices_of_saltelli_are_those_of_a_product() -> None:
             low, high = found[f"{index}_interval"].sel(input=name).values
             assert low < exact < high
         assert float(found.total_index.sel(input=name, bound="lowest")) == pytest.approx(exact, abs=0.1)
+
+
+# --- the drawn values of pairs in the result file ---
+
+
+def test_drawn_gaps_stand_along_the_axes_along_which_pairs_differ() -> None:
+    gap = "scatter={samples = 2, gap = {normal = {std = 1e-9}, of = 'each pair'}}"
+    axes = ("axes.strips=[20, 10]", "axes.E=[1e11, 2e11]", "scene.half_width=1e-3")
+    study = read_study("cylinder_on_flat", [*axes, gap])
+    scenes = find_scenes(study)
+    facts = [describe_scene(build_study_scene(each)) for each in scenes.studies]
+    (found,) = sample_coordinates(study, facts, scenes)
+    assert found.entry.dimensions == ("strips", "sample", "contact")
+    assert np.isfinite(found.values).sum(axis=-1).tolist() == [[10, 10], [5, 5]], "half of the strips, by symmetry"
+    changes = contact_changes(study, scenes, facts)
+    for place, part in enumerate(scenes.parts):
+        ((_, gaps),) = changes[place]
+        np.testing.assert_array_equal(found.values[part.place[0], part.place[-1]][: len(gaps)], gaps)

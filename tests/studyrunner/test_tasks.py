@@ -127,6 +127,9 @@ def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines["unknowns"].startswith("22 ")
     assert lines["left out"].startswith("72 points: wear_coefficient = 0")
     assert lines["time"].endswith("on two, to a factor of two, if every point wears;")
+    assert lines["ranks"].startswith(
+        "up to about 4 stay busy to the end, with 32 tasks each; no number takes less than"
+    )
     assert "ms or less a step" in lines["assumed"]
     assert "GB a rank" in lines["memory"]
 

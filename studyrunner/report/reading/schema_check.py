@@ -214,14 +214,21 @@ def _drawn_names(dataset: xr.Dataset) -> list[str]:
 
 
 def _check_drawn(dataset: xr.Dataset, name: str, axes: Sequence[str]) -> xr.Variable:
-    """What the samples draw of an input: finite numbers, along the samples, and along one axis or the pairs."""
+    """What the samples draw of an input: finite numbers along the samples, and along an axis before them.
+
+    Or of each pair, then along any axes; NaN where a scene does not have a pair.
+    """
     variable = dataset.variables[name]
-    shapes = [(SAMPLE,), (SAMPLE, "contact"), *((axis, SAMPLE) for axis in axes if axis != SAMPLE)]
-    if SAMPLE not in axes or variable.dims not in shapes:
+    of_pairs, along = variable.dims[-1:] == ("contact",), [each for each in variable.dims if each != "contact"]
+    in_order = along == [axis for axis in axes if axis in along] and along[-1:] == [SAMPLE]
+    if not in_order or variable.ndim != len(along) + of_pairs or (len(along) > 2 and not of_pairs):
         raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
     if variable.dtype.kind != "f" or variable.size > _MOST_DRAWN:
         raise _WrongError(name, f"type {variable.dtype} of shape {variable.shape}")
-    if not (np.abs(variable.values) < _LARGEST_NUMBER).all():
+    is_right = np.abs(variable.values) < _LARGEST_NUMBER
+    if of_pairs:
+        is_right = is_right.any(axis=-1, keepdims=True) & (is_right | np.isnan(variable.values))
+    if not is_right.all():
         raise _WrongError(name, "a value that is no finite number")
     return xr.Variable(variable.dims, variable.values, _attributes(variable))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shutil
 from collections.abc import Callable
@@ -11,14 +12,16 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.report.reading.result import open_for_report
-from studyrunner.report.reading.schema_check import check_numbers
+from studyrunner.report.reading.schema_check import check_dataset, check_numbers
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import ReadingProcess
 from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.report.scatter_cases import sample_file
 
 pytestmark = pytest.mark.usefixtures("reader")
 
@@ -197,3 +200,27 @@ def test_numbers_that_are_damaged_where_they_are_large(folder: Path, capsys: pyt
     assert main(["large.nc"]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert line == "study-report: large.nc: the file = damaged: give a result file of run-study that is whole"
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "missing", "right"),
+    [
+        (("sample", "contact"), 0, True),
+        (("frequency", "sample", "contact"), 1, True),
+        (("frequency", "sample", "contact"), 100, False),
+        (("sample", "frequency", "contact"), 0, False),
+        (("frequency", "contact"), 0, False),
+        (("contact", "sample"), 0, False),
+        (("frequency", "scheme", "sample"), 0, False),
+    ],
+)
+def test_drawn_values_of_pairs_are_along_any_axes_in_order(
+    dimensions: tuple[str, ...], missing: int, right: bool
+) -> None:
+    """missing: number of pairs that no sample has."""
+    dataset = sample_file(4)
+    gap = np.ones([dataset.sizes[name] for name in dimensions])
+    gap[..., :missing] = np.nan
+    dataset = dataset.assign_coords(sample_gap=(dimensions, gap, {"units": "m"}))
+    with contextlib.nullcontext() if right else pytest.raises(UserError, match="sample_gap = "):
+        xr.testing.assert_equal(check_dataset(dataset, "s.nc").sample_gap.variable, dataset.sample_gap.variable)
