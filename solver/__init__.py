@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.forced_response import FrequencyResponse, frequency_response
-    from solver.modal_response import ModalResponse, modal_response
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
     from solver.nonlinear_modes import Backbone, backbone
     from solver.outcome import Outcome
     from solver.results.history import WearHistory
     from solver.settings import SolverSettings
+    from solver.single_mode_theory import ModalResponse, modal_response
     from solver.tuning import tuned
     from solver.wear_history import march_wear
 
@@ -56,7 +56,7 @@ __all__ = [
 _PLACES = {
     "Backbone": "nonlinear_modes",
     "FrequencyResponse": "forced_response",
-    "ModalResponse": "modal_response",
+    "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
     "ReducedModel": "model",
     "SolverSettings": "settings",
@@ -65,7 +65,7 @@ _PLACES = {
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
     "march_wear": "wear_history",
-    "modal_response": "modal_response",
+    "modal_response": "single_mode_theory",
     "tuned": "tuning",
 }
 
