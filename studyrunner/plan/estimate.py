@@ -21,11 +21,11 @@ ITERATIONS_A_STATE = 50
 dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
 
 ITERATIONS_OF_MODE = 900
-"""Newton iterations to the first point of a nonlinear mode, so many that they take the time: one with frequency, damping
-and drive among the unknowns takes about five times as long as one of forced vibration."""
+"""Newton iterations to the first point of a nonlinear mode, so many that they take the time: one with frequency and
+damping among the unknowns takes about five times as long as one of forced vibration."""
 
 ITERATIONS_A_MODE_POINT = 300
-"""The same for each further amplitude, errors included (study `modes`: 3300 for 9 amplitudes; 30 where nothing slips)."""
+"""The same for each further amplitude, with errors (study `modes`: 3300 for 9 amplitudes; 30 where nothing slips)."""
 
 ITERATIONS_A_STEP = 3
 """Newton iterations of one step in slow time, explicit or implicit (measured: 2 to 4 where the joint slips)."""
