@@ -3,10 +3,10 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc trends wear_maps
 
-`dovetail.nc` is the result of the bundled study, `run-study dovetail`, read by some notebooks; two read `scatter.nc` and
-`modes.nc` beside it, the results of `run-study scatter` and `run-study modes`; the others run a small study of their own.
-Without names all are run, in a folder of their own. Two runs on one machine store the same, but for the CPU times of
-`error_against_run_time`: nothing is kept of when, where and by which version of Python they ran.
+`dovetail.nc` is the result of the bundled study, `run-study dovetail`, read by some notebooks; two read `scatter.nc`
+and `modes.nc` beside it, the results of `run-study scatter` and `run-study modes`; the others run a small study of
+their own. Without names all are run, in a folder of their own. Two runs on one machine store the same, but for the
+CPU times of `error_against_run_time`: nothing is kept of when, where and by which version of Python they ran.
 """
 
 from __future__ import annotations
