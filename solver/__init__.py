@@ -5,6 +5,7 @@ For use in Python, from this package itself:
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
+- `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
 - `tuned`: other limits of the solver for hard cases;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
@@ -14,9 +15,9 @@ unilateral contact through a period), `harmonic_balance` (the DLFT balance and i
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
 transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
-slow time). On top: `forced_response`, `nonlinear_modes`, `wear_history`, `tuning`. On the ground: `model`,
-`model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention,
-the misprints of the paper, and measurements.
+slow time). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`, `wear_history`, `tuning`. On the ground:
+`model`, `model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign
+convention, the misprints of the paper, and measurements.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ name = "modes"
 [scene]
 model = "sdof_slider"
 [axes]
-modal_amplitude = {start = 1.2e-5, stop = 1e-3, num = 12, spacing = "log"}
+modal_amplitude = {start = 2e-5, stop = 1e-3, num = 8, spacing = "log"}
 sweep = "down"
 friction_coefficient = [0.4, 0.5, 0.6]
 """
