@@ -5,6 +5,7 @@ For use in Python, from this package itself:
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
+- `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
 - `integrate_mission`: wear over missions, each a list of `Block`, a `MissionHistory`;
 - `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
@@ -19,10 +20,10 @@ unilateral contact through a period), `harmonic_balance` (the DLFT balance and i
 linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
 transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
-slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `wear_history`,
-`mission_history`, `balance_functions`, `whole_response`, `tuning`. On the ground: `model`, `model_from_matrices`,
-`settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention, the misprints of the
-paper, and measurements.
+slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`,
+`wear_history`, `mission_history`, `balance_functions`, `whole_response`, `tuning`. On the ground: `model`,
+`model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention,
+the misprints of the paper, and measurements.
 """
 
 from __future__ import annotations
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from solver.mission_history import integrate_mission
     from solver.missions.blocks import Block
     from solver.missions.result import MissionHistory
-    from solver.modal_response import ModalResponse, modal_response
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
     from solver.nonlinear_modes import Backbone, backbone
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from solver.results.history import WearHistory
     from solver.results.periodic_motion import PeriodicMotion
     from solver.settings import SolverSettings
+    from solver.single_mode_theory import ModalResponse, modal_response
     from solver.tuning import tuned
     from solver.wear_history import march_wear
     from solver.whole_response import ResponseCurve, response_curve
@@ -79,7 +80,7 @@ _PLACES = {
     "FrequencyResponse": "forced_response",
     "HarmonicBalance": "balance_functions",
     "MissionHistory": "missions.result",
-    "ModalResponse": "modal_response",
+    "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
     "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
@@ -92,7 +93,7 @@ _PLACES = {
     "frequency_response": "forced_response",
     "integrate_mission": "mission_history",
     "march_wear": "wear_history",
-    "modal_response": "modal_response",
+    "modal_response": "single_mode_theory",
     "response_curve": "whole_response",
     "tuned": "tuning",
 }

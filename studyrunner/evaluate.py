@@ -18,7 +18,6 @@ from solver.results.history import StartState, WearHistory
 from solver.results.mode_values import ModeValues, without_state
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.history_result import build_result
-from studyrunner.mode_result import build_mode_result
 from studyrunner.mpi.shared_memory import Address, open_shared
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -89,8 +88,6 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
             own = replace(own, contact=replace(own.contact, **drawn))
         if isinstance(of_task, BranchTask):
             yield from (follow if of_task.mode is None else follow_amplitudes)(own, of_task, keep)
-        elif isinstance(of_task.start, Packed) and isinstance(point := unpack(of_task.start), ModeValues):
-            yield build_mode_result(of_task, point)
         else:
             yield from integrate(own, of_task, keep)
 

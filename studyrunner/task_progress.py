@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from solver.outcome import Outcome
+from solver.packing import unpack
 from studyrunner.checkpoint.completion_index import CompletionIndex
+from studyrunner.mode_result import build_mode_result
 from studyrunner.mpi.crashes import MOST_DEATHS, Crash
 from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.results import MarchResult, StartResult
@@ -139,6 +141,13 @@ class TaskProgress:
 
     def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
         planned = self._completion.marches_from(branch.number, result.position)
+        if branch.mode is not None:
+            # nothing is left to be computed
+            for march in planned:
+                self._completion.add_history(march, build_mode_result(march, unpack(result.start)))
+                self._left[MARCHES] -= march.cost
+                self.n_points += len(march.points)
+            return ()
         new = start_marches(planned, result)
         for before, march in zip(planned, new, strict=True):
             self._left[MARCHES] -= before.cost
@@ -172,8 +181,6 @@ class TaskProgress:
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             what = f"{how} to {task.frequencies[place]:.6g} Hz"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
-        if not task.scheme:
-            return "a point of a mode"
         return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
 
 

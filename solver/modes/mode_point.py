@@ -49,6 +49,10 @@ class ModePoint:
 def solve_point(sweep: AmplitudeSweep, amplitude: float, budget: Budget) -> ModePoint:
     """The point of a mode at an amplitude, m sqrt(kg), to which a sweep was advanced."""
     found, reference = sweep.state_at(amplitude)
+    if found is None and not sweep.lost:
+        here, ahead = (f"{each.amplitude:.4g}" for each in (sweep.nodes.here, sweep.ahead or sweep.nodes.here))
+        said = f"no state was found between the amplitudes {here} and {ahead} m sqrt(kg), where the mode has states"
+        return ModePoint(Outcome.BRANCH_LOST, said)
     if found is None:
         return ModePoint(Outcome.BRANCH_LOST, describe_loss(sweep))
     other = None if reference is None else (sweep.reference.problem, reference)

@@ -16,6 +16,8 @@ from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
 
+_FOR_THE_TABLE = ("natural_frequency", "damping_ratio")
+
 
 @dataclass(frozen=True)
 class _Line:
@@ -73,6 +75,11 @@ def build_mode_tasks(
     )
 
 
+def mode_variables(study: Study) -> tuple[str, ...]:
+    """Variables of a point of a mode: those asked for and those that the last lines of a run are made of."""
+    return tuple(name for name in study.variables if name in study.outputs.variables or name in _FOR_THE_TABLE)
+
+
 def _lines(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Line, list[dict[str, int]]]:
     """Lines over the amplitude, each with the places along the other axes that have it."""
     axes, names = study.axes, tuple(study.axes_of_parts)
@@ -96,7 +103,7 @@ def _index(places: Mapping[str, int], names: Sequence[str]) -> Index:
 
 
 def _report(study: Study, branch: BranchTask, number: int, position: int, points: tuple[Index, ...]) -> MarchTask:
-    """The task that brings a point of a mode into the form of the result; nothing is integrated."""
+    """A point of a mode in the form of the result; it is there with the state, no rank gets it as a task."""
     return MarchTask(
         number=number,
         joint=branch.joint,
@@ -109,12 +116,9 @@ def _report(study: Study, branch: BranchTask, number: int, position: int, points
         histories=(ScaledHistory(0.0, 1.0, points),),
         held=True,
         cycles=(0.0,),
-        variables=tuple(name for name in study.variables if name in study.outputs.variables),
+        variables=mode_variables(study),
         loops=(),
-        cost=_SECONDS_TO_REPORT,
+        cost=0.0,
         n_unknowns=1,
         moves=False,
     )
-
-
-_SECONDS_TO_REPORT = 1e-3

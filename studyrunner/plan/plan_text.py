@@ -61,7 +61,7 @@ def format_plan(
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
         *_time(study, plan, prepared_in),
-        ("ranks", _ranks(plan, n_tasks)),
+        *([] if study.has_modes else [("ranks", _ranks(plan, n_tasks))]),
         ("assumed", _assumed(study, plan)),
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]

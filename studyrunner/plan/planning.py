@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.plan.cases import joint_of, n_unknowns_of, settings_of_line
 from studyrunner.plan.estimate import iterations_of_branch, iterations_of_march, seconds_an_iteration
-from studyrunner.plan.mode_planning import build_mode_tasks
+from studyrunner.plan.mode_planning import build_mode_tasks, mode_variables
 from studyrunner.plan.sharing import (
     EQUAL_POINTS,
     IDLE_RTOL,
@@ -29,9 +29,8 @@ from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.variables import CERTIFICATE, COUNTS, LOOPS
+from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
-_FOR_THE_MODES = ("natural_frequency", "damping_ratio")
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
 
 
@@ -88,8 +87,9 @@ def _plan(
 
 def march_variables(study: Study) -> tuple[str, ...]:
     """Variables that a march hands back: those asked for and those that the table at the end is made of."""
-    table = _FOR_THE_MODES if study.has_modes else _FOR_THE_TABLE
-    asked = (name for name in study.variables if name in study.outputs.variables or name in table)
+    if study.has_modes:
+        return mode_variables(study)
+    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
     return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 

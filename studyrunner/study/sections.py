@@ -71,7 +71,7 @@ def _read_outputs(value: object) -> int | tuple[float, ...]:
 def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
-    names_of_all = (*dict.fromkeys((*ASKED, *OF_MODES, *SCENE)),)
+    names_of_all = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES)))
     known = (*names_of_all, *KEPT)
     for name in value:
         if name != DEFAULT and name not in known:

@@ -18,9 +18,9 @@ name = "modes"
 [scene]
 model = "sdof_slider"
 [axes]
-modal_amplitude = {start = 1.2e-5, stop = 1e-3, num = 12, spacing = "log"}
+modal_amplitude = {start = 2e-5, stop = 1e-3, num = 5, spacing = "log"}
 sweep = "down"
-friction_coefficient = [0.4, 0.5, 0.6]
+friction_coefficient = [0.4, 0.6]
 """
 
 pytestmark = [pytest.mark.slow, pytest.mark.mpi]
@@ -41,11 +41,8 @@ def alone(arguments: list[str], tmp_path_factory: pytest.TempPathFactory) -> xr.
     return results(folder / "out.nc")
 
 
-@pytest.mark.parametrize("n_ranks", [2, 3])
-def test_the_result_is_the_same_on_any_number_of_ranks(
-    n_ranks: int, arguments: list[str], alone: xr.Dataset, tmp_path: Path
-) -> None:
-    ended = run_to_end(n_ranks, arguments, tmp_path)
+def test_the_result_is_the_same_on_two_ranks(arguments: list[str], alone: xr.Dataset, tmp_path: Path) -> None:
+    ended = run_to_end(2, arguments, tmp_path)
     assert ended.status == 0, ended.said
     xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)
 
@@ -53,6 +50,8 @@ def test_the_result_is_the_same_on_any_number_of_ranks(
 def test_a_run_that_is_killed_keeps_its_points_and_goes_on(
     arguments: list[str], alone: xr.Dataset, tmp_path: Path
 ) -> None:
+    """With the result of one rank, on three."""
+
     def kill(running: Running) -> None:
         assert running.reaches(lambda: count_rows("start_states", tmp_path / "out.nc") > 2), running.said
         with contextlib.suppress(ProcessLookupError, KeyError):
@@ -60,6 +59,6 @@ def test_a_run_that_is_killed_keeps_its_points_and_goes_on(
 
     assert run_to_end(2, arguments, tmp_path, disturb=kill).status != 0
     assert count_rows("start_states", tmp_path / "out.nc") > 2
-    ended = run_to_end(2, arguments, tmp_path)
+    ended = run_to_end(3, arguments, tmp_path)
     assert ended.status == 0, ended.said
     xr.testing.assert_identical(results(tmp_path / "out.nc"), alone)

@@ -29,6 +29,7 @@ FIGURES = {
     "trends": 4,
     "python_api": 3,
     "scatter": 3,
+    "modes": 3,
 }
 LARGEST = 150_000  # bytes of a file
 
@@ -158,7 +159,7 @@ def test_notebook_uses_what_users_have(path):
         if isinstance(node, ast.ImportFrom):
             imported.add(node.module)
     own = {name for name in imported if name.split(".")[0] in ("solver", "studies", "studyrunner", "tests")}
-    doors = {"solver", "studies"} if path.stem == "python_api" else set()
+    doors = {"solver", "studies"} if path.stem in ("python_api", "modes") else set()
     doors |= set() if path.stem in READ_A_RESULT else {"studyrunner"}
     assert all(
         name in doors or name == "studyrunner.accessor" or name.startswith("studyrunner.report.") for name in own

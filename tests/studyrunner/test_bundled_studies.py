@@ -40,6 +40,7 @@ SMALL = {
         "solver.harmonics=3",
         "solver.samples=64",
     ],
+    "modes": ["axes.modal_amplitude=[2e-4, 4e-4]"],
     "scatter": [
         "scatter.samples=4",
         "scene.mesh=1",
@@ -111,8 +112,18 @@ def wears_in_each_sample_another_volume(result: xr.Dataset) -> None:
     assert (result.sample_gap.std("sample") > 0.0).all()
 
 
+def resonates_lower_the_more_it_is_worn(result: xr.Dataset) -> None:
+    assert (
+        result.natural_frequency.diff("cycle") + result.natural_frequency_error.isel(cycle=slice(1, None)) < 0
+    ).all()
+    # what is worn a little slips where the new joint sticks
+    first = result.damping_ratio.sel(modal_amplitude=2e-4).squeeze()
+    assert first.sel(cycle=1e4) > 2.0 * first.sel(cycle=[0.0, 1e5]).max()
+
+
 SHOWN: dict[str, Callable[[xr.Dataset], None]] = {
     "scatter": wears_in_each_sample_another_volume,
+    "modes": resonates_lower_the_more_it_is_worn,
     "dovetail": wears_near_its_resonance_only,
     "vibro_impact": has_two_branches,
     "work_precision": agrees_better_with_smaller_steps,

@@ -41,6 +41,9 @@ def find_writer(result: Result) -> Callable[[Path], Series]:
     if find_spec("meshio") is None:
         remedy = "install the library: pip install meshio"
         raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
+    if result.has_modes:
+        remedy = "leave it out: the series goes over the cycles, which nonlinear modes do not have"
+        raise UserError("command line", "--vtu", Verbatim("nothing to draw"), remedy)
     result = of_shown_scene(result)
     surface = read_root(result)
     if surface is None:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
-from solver.model import ComplexArray, FloatArray, ReducedModel
+from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.nonlinear_modes import Backbone
 
 
@@ -39,7 +40,8 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
     above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142
-    (2020). It holds where one mode vibrates and its shape does not depend on the excitation.
+    (2020). It holds near the resonance, where one mode vibrates. Friction forces do not grow with the
+    frequency as the damping term does: at a distance from the resonance the error of the damping is as large.
 
     Parameters
     ----------
@@ -58,22 +60,15 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
         The mode has fewer than two amplitudes with a state, the excitation is not above 0, or mode and model do not
         belong together.
     """
-    if not 0.0 < excitation_amplitude < np.inf:
-        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
     linear, folded = model.harmonic_structure(1)
-    if mode.shape.shape[1] != len(linear.mass):
-        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
-    order = np.argsort(mode.amplitude)
-    order = order[np.isfinite(mode.frequency[order])]
-    if len(order) < 2:
-        raise ValueError("mode: give a mode with a state at two amplitudes or more")
+    order = _usable(mode, excitation_amplitude, len(linear.mass))
     known = np.log(mode.amplitude[order])
     at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
 
     def between(values: ComplexArray | FloatArray) -> ComplexArray:
-        columns = np.reshape(values[order], (len(order), -1)).T
-        found = [np.interp(at, known, each.real) + 1j * np.interp(at, known, each.imag) for each in columns]
-        return np.array(found).T
+        columns = np.reshape(values[order], (len(order), -1)).astype(complex)
+        real, imaginary = (PchipInterpolator(known, part)(at) for part in (columns.real, columns.imag))
+        return np.asarray(real + 1j * imaginary)
 
     size = np.exp(at)
     omega, zeta = 2.0 * np.pi * between(mode.frequency)[:, 0].real, between(mode.damping_ratio)[:, 0].real
@@ -89,8 +84,9 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
     parts = []
     for number, excited in enumerate(sides):
         rows = np.flatnonzero(np.isfinite(excited))[:: 1 - 2 * number]
-        coordinate = force / (omega**2 - excited**2 + 2j * zeta * omega * excited)
-        parts.append((excited[rows] / (2.0 * np.pi), size[rows], coordinate[rows, None] * shown[rows], zeta[rows]))
+        at_rows, own = excited[rows], omega[rows]
+        coordinate = force[rows] / (own**2 - at_rows**2 + 2j * zeta[rows] * own * at_rows)
+        parts.append((at_rows / (2.0 * np.pi), size[rows], coordinate[:, None] * shown[rows], zeta[rows]))
     gap = inside[-1] > 0.0
     nothing = (
         np.full(1, np.nan),
@@ -100,3 +96,16 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
     )
     curve = [parts[0], nothing, parts[1]] if gap else parts
     return ModalResponse(*(np.concatenate(each) for each in zip(*curve, strict=True)))
+
+
+def _usable(mode: Backbone, excitation_amplitude: float, n_displacements: int) -> IntArray:
+    """Indices of the amplitudes that have a state, ascending in amplitude. Raises ValueError as `modal_response`."""
+    if not 0.0 < excitation_amplitude < np.inf:
+        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
+    if mode.shape.shape[1] != n_displacements:
+        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
+    _, order = np.unique(mode.amplitude, return_index=True)
+    order = order[np.isfinite(mode.frequency[order])]
+    if len(order) < 2:
+        raise ValueError("mode: give a mode with a state at two amplitudes or more")
+    return np.asarray(order)
