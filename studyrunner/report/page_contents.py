@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from studyrunner.report.drawing import Drawing, Missing, Table, style
+from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
 from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
@@ -33,6 +34,7 @@ def draw_report(result: Result) -> Iterator[Item]:
         draw_trends,
         draw_responses,
         draw_volumes,
+        draw_excitation,
         *map(_of_pairs, (draw_root, draw_flanks, draw_loops)),
     )
     if not result.held.any():

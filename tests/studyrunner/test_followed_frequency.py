@@ -9,6 +9,9 @@ import pytest
 import xarray as xr
 
 from studyrunner.plan.planning import build_tasks
+from studyrunner.report.drawing import Drawing
+from studyrunner.report.figures.excitation import draw_excitation
+from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studyrunner.test_scene_axes import compute
@@ -53,6 +56,21 @@ def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixt
     assert (found.excitation_frequency_error > 0.0).all()
     first, last = float(followed[0, 0]), float(followed[0, -1])
     assert f"the resonance moves from {first:.6g} to {last:.6g} Hz" in said.out + said.err
+
+
+def test_the_report_draws_the_frequency_over_cycles() -> None:
+    found = computed("drawn.nc")
+    result = Result(Path("drawn.nc"), found)
+    (drawing,) = draw_excitation(result)
+    assert isinstance(drawing, Drawing)
+    lines = drawing.figure.axes[0].get_lines()
+    followed = found.excitation_frequency.squeeze().values
+    assert len(lines) == len(followed) == 2
+    for line, expected in zip(lines, followed, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), expected)
+    assert drawing.caption.startswith(f"The excitation follows the resonance: from {followed[0, 0]:.6g} to")
+    # the middle of the range is no frequency of the point
+    assert "205" not in result.describe(result.shown_point(), ["frequency"])
 
 
 def test_without_cycles_the_result_is_the_resonance_of_the_unworn_joint() -> None:
