@@ -84,8 +84,8 @@ class ContinuationOptions:
 
     # states at a given phase lag
     frequency_difference: float = 1e-7
-    """Difference of two frequencies over the frequency, for derivatives. With ten times the value and with a tenth the
-    steps of Newton's method agree to 1e-5 (`tests/solver/test_phase_lag.py`)."""
+    """Difference of two frequencies over the frequency, for derivatives. They agree to 1e-5 with central differences a
+    hundred times as long (`tests/solver/test_phase_lag.py`)."""
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
     derivative_solves: int = 4
@@ -93,6 +93,20 @@ class ContinuationOptions:
     derivative_error: float = 1e-6
     """Relative residual of a derivative of the motion."""
 
+    # largest amplitudes over the frequency
+    peak_rise: float = 1.0
+    """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts
+    as the largest one: its frequency is then within rtol of half the width of the resonance, and the amplitude within
+    rtol^2 / 2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
+    dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
+    largest_peak_rise: float = 0.02
+    """Upper limit of this rise, 1/rad."""
+    peak_solves: int = 20
+    """Most solves for the phase lag of the largest amplitude; a step takes one or two."""
+    least_peak_slope: float = 0.1
+    """Smallest fall of this rise with the lag, 1/rad2, in a secant step; it is 1 for one degree of freedom."""
+    largest_lag_step: float = 0.2
+    """Largest change of the phase lag between two solves, rad."""
     @property
     def linear_change(self) -> float:
         """Largest change over a step between two states in which no pair slips or opens.

@@ -10,9 +10,6 @@ implicit step with the wear depth that grows with the motion, and
 Newton's method eliminates p: the solver of the Jacobian dR/dp gives the step of p for the residual and for the
 frequency, and one equation remains. The wear depth is eliminated in the Jacobian, so that its change with the frequency
 is part of the step.
-
-The largest amplitude has a lag of its own. For a linear oscillator of one degree of freedom with the damping ratio
-zeta its frequency is omega_0 sqrt(1 - 2 zeta^2), while the one of phase resonance is omega_0.
 """
 
 from __future__ import annotations
@@ -170,41 +167,3 @@ def _product_change(tangent: Linearisation, step: FloatArray) -> complex:
     """Change of `F^H x`, N m, for a step (n_rel, 2H+1) of the predicted force, N."""
     joint = tangent.joint
     return complex(joint.structure.drive @ _first(joint, tangent.transmit(step)[0]))
-
-
-def _accurately(tangent: Linearisation, right: FloatArray, solver: JacobianSolver) -> FloatArray:
-    """Step (n_rel, m) with Jacobian times step = right (n_rel, m): more accurate than a Newton direction."""
-    step, left = np.zeros_like(right), right
-    for _ in range(CONTINUATION.derivative_solves):
-        step = step + solver.solve(tangent, left)
-        left = right - tangent.apply(step)
-        if np.linalg.norm(left) <= CONTINUATION.derivative_error * np.linalg.norm(right):
-            break
-    return step
-
-
-def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) -> tuple[float, float]:
-    """Changes along the frequency at fixed wear depth and tangential history, both s/rad.
-
-    Returns
-    -------
-    rise : float
-        Of the logarithm of the amplitude of the first response, in the first harmonic.
-    turn : float
-        Of the lag.
-    """
-    held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
-    state = replace(state, balance=held)
-    by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    step = _accurately(tangent, -by_frequency.residual, solver)
-    moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
-    if joint.penalty.inertial.any():
-        ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)
-        moved = moved + ahead.displacement_h - state.at.displacement_h
-    values = [
-        (to_complex(at.structure.response_h(at.to_relative(motion)))[0, 0], excitation_product(at, motion))
-        for at, motion in ((joint, state.at.displacement_h), (by_frequency.ahead, moved))
-    ]
-    (response, product), (response_ahead, product_ahead) = values
-    rise = math.log(abs(response_ahead) / abs(response)) / by_frequency.length
-    return rise, -cmath.phase(product_ahead / product) / by_frequency.length

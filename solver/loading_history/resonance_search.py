@@ -1,8 +1,9 @@
 """The resonance that a sweep over a range of frequencies meets first: where a history with followed frequency begins.
 
 The sweep is the loading history of the point, up or down, with nodes of its own (`sweep`). Between two nodes the
-resonance is where the phase lag passes pi/2, or where the amplitude of the first response stops to rise. A resonance
-that the sweep jumps over, from a fold to a branch beyond, is none of its states.
+resonance is where the phase lag passes pi/2. A resonance that the sweep jumps over, from a fold to a branch beyond, is
+none of its states. The largest amplitude is sought from there, and the sweep then leads to its frequency. Along the
+sweep the amplitude has small maxima where pairs begin to slip, far from any resonance.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from solver.continuation.phase_lag import LaggingState, phase_lag, rise_of_response
-from solver.harmonic_balance.converged import PathPoint
+from solver.continuation.largest_response import solve_at_peak
+from solver.continuation.phase_lag import phase_lag
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
 from solver.loading_history.options import LOADING
@@ -62,7 +63,8 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
             step, _ = nodes.state_at(omega, budget)
             if step is None:
                 raise _lost(line, nodes, omega)
-            return nodes.direction * _rise(nodes, step.point, follow)
+            joint = nodes.path.joint_at(omega)
+            return nodes.direction * math.cos(phase_lag(joint, step.point.evaluation))
 
         place, end = (2.0 * math.pi * frequency for frequency in (near, far))
         if nodes.here is not None and (nodes.here.parameter - place) * nodes.direction > 0.0:
@@ -79,7 +81,8 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
             target = min(nodes.ahead.point.parameter, end, key=lambda at: (at - place) * nodes.direction)
             there = excess(target)
             if here > 0.0 >= there:
-                return _between(excess, place, target, nodes, follow) / (2.0 * math.pi)
+                found = _between(excess, place, target, nodes)
+                return (found if follow.of == "resonance" else _peak(line, nodes, found, budget)) / (2.0 * math.pi)
             place, here = target, there
         before = here
     raise _NoneFoundError(
@@ -98,18 +101,20 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
     return ((high, low) for low, high in reversed(parts)) if down else iter(parts)
 
 
-def _rise(nodes: NodeSweep, point: PathPoint, follow: FollowedFrequency) -> float:
-    """Positive below the resonance, negative above, dimensionless."""
-    joint, at = nodes.path.joint_at(point.parameter), point.evaluation
-    if follow.of == "resonance":
-        return math.cos(phase_lag(joint, at))
-    state = LaggingState(Balance.frozen(joint, at.history, at.wear_depth), at, 0.0)
-    return joint.omega * rise_of_response(nodes.case, state, JacobianSolver())[0]
+def _peak(line: FrequencySweep, nodes: NodeSweep, omega: float, budget: Budget) -> float:
+    """Frequency of the largest amplitude near phase resonance, rad/s. Raises _NoneFoundError."""
+    step, _ = nodes.state_at(omega, budget)
+    if step is None:
+        raise _lost(line, nodes, omega)
+    at = step.point.evaluation
+    balance = Balance.frozen(nodes.path.joint_at(omega), at.history, at.wear_depth)
+    found = solve_at_peak(nodes.case, balance, at.predicted_h, 0.5 * math.pi, JacobianSolver(), budget)
+    if found is None:
+        raise _NoneFoundError(f"no largest amplitude is found near phase resonance at {omega / (2.0 * math.pi):.6g} Hz")
+    return found[0].omega
 
 
-def _between(
-    excess: Callable[[float], float], one: float, other: float, nodes: NodeSweep, follow: FollowedFrequency
-) -> float:
+def _between(excess: Callable[[float], float], one: float, other: float, nodes: NodeSweep) -> float:
     """Frequency, rad/s, at which the excess passes zero between two nodes. Raises _NoneFoundError."""
     if excess(one) <= 0.0:
         # zero but for round-off
@@ -119,7 +124,7 @@ def _between(
     for fold in nodes.ahead.folds:
         if abs(found - fold) <= LOADING.free_step * fold:
             way, back = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
-            over = f"{follow.of} at {fold / (2.0 * math.pi):.6g} Hz"
+            over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
             raise _NoneFoundError(f'the sweep {way} jumps over the {over}: give sweep = "{back}"')
     return found
 

@@ -1,18 +1,16 @@
 """An excitation whose frequency follows the structure while the joint wears.
 
 Each state of a history has its own frequency, an unknown with one more equation: a given phase lag of the vibration
-(`solver.continuation.phase_lag`). In phase resonance the lag is pi/2. At the largest amplitude of the first response
-the lag follows from the rise of the amplitude with the lag, which is zero there, by a secant. The lag changes little
-from step to step, so that most steps take one or two solves.
+(`solver.continuation.phase_lag`), or that of the largest amplitude (`solver.continuation.largest_response`). The lag of
+the largest amplitude changes little from step to step, so that most steps take one or two solves.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from solver.continuation.phase_lag import rise_of_response, solve_at_lag
+from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
+from solver.continuation.phase_lag import LaggingState, solve_at_lag
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -48,32 +46,21 @@ def end_at_resonance(
     solver, budget, most
         As in `solve_balance`.
     """
-    below, above, accuracy = 0.0, math.pi, _accepted_rise(case.settings.rtol)
-    before: tuple[float, float] | None = None
-    lag, half_width = state.lag, state.half_width
-    for _ in range(WEAR.peak_solves):
+    found: LaggingState | None
+    lag = state.lag
+    if follow.of == "peak":
+        peak = solve_at_peak(case, balance, start, lag, solver, budget, most)
+        found, lag = (None, lag) if peak is None else peak
+    else:
         found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
-        if found is None:
-            return None
-        rise, turn = 0.0, found.turn
-        if follow.of == "peak" or (half_width == 0.0 and math.isnan(turn)):
-            rise, turn = rise_of_response(case, found, solver)
-        if follow.of == "peak" and not turn > 0.0:
-            # where the lag falls with the frequency there is no resonance
-            return None
-        half_width = half_width if math.isnan(turn) else abs(1.0 / turn) if turn != 0.0 else math.inf
-        rise = rise * half_width if follow.of == "peak" else 0.0
-        below, above = (lag, above) if rise > 0.0 else (below, lag)
-        if abs(rise) <= accuracy or above - below <= accuracy:
-            point = PathPoint(0.0, found.at, final_history(found.balance, found.at))
-            return Reached(point, found.omega, lag, half_width)
-        # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
-        slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
-        step = float(np.clip(-rise / min(slope, -WEAR.least_peak_slope), -WEAR.largest_lag_step, WEAR.largest_lag_step))
-        before = lag, rise
-        lag = lag + step if below < lag + step < above else 0.5 * (below + above)
-        balance, start = found.balance, found.at.predicted_h
-    return None
+    if found is None:
+        return None
+    turn = abs(found.turn)
+    if math.isnan(turn) and state.half_width == 0.0:
+        turn = abs(rise_of_response(case, found, solver)[1])
+    half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
+    point = PathPoint(0.0, found.at, final_history(found.balance, found.at))
+    return Reached(point, found.omega, lag, half_width)
 
 
 def frequency_error(follow: FollowedFrequency | None, state: WearState, response_error: float, rtol: float) -> float:
@@ -86,13 +73,8 @@ def frequency_error(follow: FollowedFrequency | None, state: WearState, response
         return 0.0
     lag = response_error
     if follow.of == "peak":
-        lag = math.sqrt(2.0 * response_error) + _accepted_rise(rtol)
+        lag = math.sqrt(2.0 * response_error) + accepted_rise(rtol)
     return state.half_width * lag / (2.0 * math.pi)
-
-
-def _accepted_rise(rtol: float) -> float:
-    """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return min(WEAR.peak_rise * rtol, WEAR.largest_peak_rise)
 
 
 def lost_resonance(follow: FollowedFrequency, state: WearState) -> Failure:

@@ -98,21 +98,6 @@ class WearOptions:
     jump_iterations: int = 800
     """Most Newton iterations of the search for the state after a jump."""
 
-    # frequencies that are followed
-    peak_rise: float = 1.0
-    """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts
-    as the largest one: its frequency is then within rtol of half the width of the resonance, and the amplitude within
-    rtol^2 / 2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
-    dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
-    largest_peak_rise: float = 0.02
-    """Upper limit of this rise, 1/rad."""
-    peak_solves: int = 20
-    """Most solves for the phase lag of the largest amplitude; a step takes one or two."""
-    least_peak_slope: float = 0.1
-    """Smallest fall of this rise with the lag, 1/rad2, in a secant step; it is 1 for one degree of freedom."""
-    largest_lag_step: float = 0.2
-    """Largest change of the phase lag between two solves, rad."""
-
     # joints that slide as a whole
     free_closing: float = 1e-6
     """Largest closing component of a free direction of norm 1, for sliding closes no pair."""

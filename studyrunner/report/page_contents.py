@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from studyrunner.report.drawing import Drawing, Missing, Table, style
+from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
 from studyrunner.report.figures.modes import draw_modes
@@ -36,6 +37,7 @@ def draw_report(result: Result) -> Iterator[Item]:
         draw_trends,
         draw_responses,
         draw_volumes,
+        draw_excitation,
         *map(_of_pairs, (draw_root, draw_flanks, draw_loops)),
     )
     if result.has_modes:

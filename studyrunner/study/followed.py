@@ -50,7 +50,7 @@ def take_followed(sections: dict[str, Any], source: str) -> FollowedFrequency | 
             raise UserError(source, "loading", loading, remedy)
         return None
     if words[0] not in FOLLOWED:
-        raise UserError(source, "axes.frequency", words[0], 'give frequencies in Hz, or "resonance" or "peak"')
+        raise UserError(source, "axes.frequency", words[0], 'give a number in Hz, or "resonance" or "peak"')
     if given not in (words[0], words):
         remedy = f'give "{words[0]}" alone: every point has the frequency that it finds'
         raise UserError(source, "axes.frequency", given, remedy)

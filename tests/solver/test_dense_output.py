@@ -25,13 +25,14 @@ def report(depth: Sequence[float], value: float, resolution: Resolution = RESOLU
     """All numbers of a state but its depths are `value`."""
     pairs = np.full(2, value)
     return StateReport(
-        excitation_frequency=160.0,
         wear_depth=np.array(depth, float),
         mean_pressure=pairs,
         slip_range=pairs,
         open_fraction=pairs,
         response=np.full(1, value * 1j),
         response_peak=np.full(1, value),
+        excitation_frequency=value,
+        excitation_frequency_error=value,
         loop_displacement=value * LOOP,
         loop_force=value * LOOP,
         certificate=Certificate(*([value] * 8), stable=value < 2.5),

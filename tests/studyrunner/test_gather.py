@@ -140,6 +140,7 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
             "no_final_state",
             "contact_cut_off",
             "unsettled",
+            "resonance_lost",
         ]
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:

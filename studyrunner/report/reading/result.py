@@ -172,6 +172,12 @@ class Result:
         except UserError:
             return {}
 
+    @property
+    def followed(self) -> str:
+        """What the frequency of the excitation follows, "resonance" or "peak"; empty for given frequencies."""
+        given = self.study.get("axes", {}).get("frequency")
+        return given if isinstance(given, str) else ""
+
     def study_number(self, table: str, key: str) -> float:
         """A number of the study; NaN where the file does not say."""
         value = self.study.get(table, {}).get(key)
@@ -321,7 +327,11 @@ class Result:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         return ", ".join(
-            show_value(self.dataset[name], point[name]) for name in self.axes if name in kept and name in point
+            f"the {self.followed}"
+            if name == "frequency" and self.followed
+            else show_value(self.dataset[name], point[name])
+            for name in self.axes
+            if name in kept and name in point
         )
 
     def cycle_label(self, index: int) -> str:

@@ -1,0 +1,65 @@
+"""A followed resonance of the dovetail root against responses of the worn joint over the frequency, and cost.
+
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.resonance
+
+For each tenth of 1e5 cycles: frequency and amplitude of the history with their errors, and the maximum of a sweep up of
+the joint as it is worn at this count. The sweep has a loading history of its own, which the worn joint did not have.
+Then the CPU time of a followed step over that of a step at a fixed frequency, from the same start, in one process.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver import frequency_response, march_wear
+from solver.clock import computing_time
+from solver.model import ReducedModel
+from solver.settings import FOLLOWED, Followed
+from studies import build_scene
+
+BETWEEN = (205.0, 220.0)  # Hz
+LOAD, FRICTION, WEAR = 0.5, 0.5, 1.1e-11  # N, 1, 1/Pa
+
+
+def main() -> None:
+    """Print both tables."""
+    model = build_scene("dovetail_sector", mesh=1)
+    cycles = np.linspace(0.0, 1e5, 11)
+    for word in FOLLOWED:
+        history = march_wear(model, word, LOAD, FRICTION, WEAR, cycles, between=BETWEEN)
+        print(f"{word}: {history.outcome.meaning}, {1e9 * history.worn_volume[-1]:.4g} mm3")
+        for row, depth in enumerate(history.wear_depth):
+            found, error = history.excitation_frequency[row], history.excitation_frequency_error[row]
+            around = found + np.linspace(-0.2, 0.2, 9)
+            answer = frequency_response(model, around, LOAD, FRICTION, wear_depth=depth)
+            curve = np.polynomial.Polynomial.fit(around, abs(answer.response[:, 0]), 4)
+            fine = np.linspace(around[0], around[-1], 2001)
+            largest = float(fine[np.argmax(curve(fine))])
+            print(
+                f"{cycles[row]:8.0f} cycles  {found:.4f} +- {error:.4f} Hz, brute force {largest:.4f} Hz;"
+                f"  {1e3 * abs(history.response[row, 0]):.4f} +- {100 * history.response_error[row]:.2g} %,"
+                f" brute force {1e3 * curve(largest):.4f} mm",
+                flush=True,
+            )
+    at = float(march_wear(model, "resonance", LOAD, FRICTION, 0.0, 0.0, between=BETWEEN).excitation_frequency[0])
+    times: dict[str, float] = {}
+    for name, frequency in (("first", at), ("fixed", at), *((word, word) for word in FOLLOWED)):
+        between = BETWEEN if isinstance(frequency, str) else None
+        starting, whole = (_seconds(model, frequency, between, cycles) for cycles in (0.0, 1e4))
+        times[name] = whole - starting
+        print(f"{name}: start state {starting:.2f} s, 40 steps {times[name]:.2f} s", flush=True)
+    for word in FOLLOWED:
+        print(f"{word}: {times[word] / times['fixed']:.2f} of a fixed frequency")
+
+
+def _seconds(
+    model: ReducedModel, frequency: float | Followed, between: tuple[float, float] | None, cycles: float
+) -> float:
+    """CPU time of a history, s."""
+    began = computing_time()
+    march_wear(model, frequency, LOAD, FRICTION, WEAR, cycles, scheme="implicit", step=250.0, between=between)
+    return computing_time() - began
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,226 @@
+"""Histories whose frequency follows the resonance: exact motions, brute force, interruption, loss of the resonance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from solver import frequency_response, march_wear
+from solver.loading_history.start_states import follow_branch
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.results.history import StartState, WearHistory
+from solver.settings import Followed, FollowedFrequency, Scheme, SolverSettings
+from solver.wear.options import WEAR as WEAR_OPTIONS
+from tests.references import slider_orbit
+from tests.solver.models import march_wear as march_from
+from tests.solver.models import scene
+
+DAMPING = 20.0  # N s/m: 8 % of the critical damping of the slider
+CYCLES = np.linspace(0.0, 4e4, 6)
+WEAR = 1.1e-11  # 1/Pa
+BETWEEN = (180.0, 230.0)
+SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
+
+
+@lru_cache
+def worn(
+    word: Followed = "resonance", scheme: Scheme = "adaptive", wear: float = WEAR, rtol: float = 1e-2
+) -> WearHistory:
+    """History of the slider; steps of the other schemes are an eighth of the cycles."""
+    return march_wear(
+        scene("sdof_slider", damping=DAMPING),
+        word,
+        10.0,
+        0.5,
+        wear,
+        CYCLES * WEAR / wear,
+        scheme=scheme,
+        step=5e3 * WEAR / wear,
+        between=BETWEEN,
+        settings=SolverSettings(rtol=rtol),
+    )
+
+
+def exact_response(frequency: float, depth: float) -> complex:
+    """First harmonic of the slider at a wear depth, from event to event."""
+    friction = 0.5 * (10.0 - 1e5 * depth)
+    return complex(slider_orbit(0.1, DAMPING, 1.6e5, 10.0, friction, 2.0 * np.pi * frequency).harmonic(0))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_phase_resonance_is_that_of_the_exact_motion(scheme: Scheme) -> None:
+    history = worn(scheme=scheme)
+    assert history.outcome is Outcome.CONVERGED
+    assert history.excitation_frequency[-1] - history.excitation_frequency[0] > 1.0
+    for depth, found, error in zip(
+        history.wear_depth[:, 0], history.excitation_frequency, history.excitation_frequency_error, strict=True
+    ):
+        expected = brentq(lambda at, depth=depth: exact_response(at, depth).real, 195.0, 205.0, xtol=1e-6)
+        assert abs(found - expected) < error < 0.3
+
+
+def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
+    history = worn("peak", rtol=1e-3)
+    assert history.outcome is Outcome.CONVERGED
+    # below phase resonance, which is above 199 Hz
+    assert (history.excitation_frequency < 198.5).all()
+    for row in (0, 2, 5):
+        depth, response = history.wear_depth[row, 0], history.response[row, 0]
+        found, error = history.excitation_frequency[row], history.excitation_frequency_error[row]
+        around = np.linspace(192.0, 202.0, 13)
+        sizes = [abs(exact_response(float(at), depth)) for at in around]
+        curve = np.polynomial.Polynomial.fit(around, sizes, 6)
+        expected = brentq(curve.deriv(), 193.0, 201.0)
+        assert abs(found - expected) < error < 2.0
+        assert abs(response) == pytest.approx(curve(expected), rel=2e-3)
+
+
+def test_of_two_masses_no_response_around_is_larger() -> None:
+    """Brute force: responses over the frequency; the friction is constant, so that the joint does not change."""
+    model, settings = scene("two_masses"), SolverSettings(harmonics=5, samples=128)
+    history = march_wear(model, "peak", 20.0, 0.5, 0.0, [0.0, 1.0], between=(0.08, 0.15), settings=settings)
+    assert history.outcome is Outcome.CONVERGED
+    found, error = history.excitation_frequency[0], history.excitation_frequency_error[0]
+    around = np.linspace(0.998, 1.002, 7) * found
+    sizes = abs(frequency_response(model, around, 20.0, 0.5, settings=settings).response[:, 0])
+    curve = np.polynomial.Polynomial.fit(around, sizes, 4)
+    expected = brentq(curve.deriv(), around[1], around[-2])
+    assert abs(found - expected) < error
+    assert abs(history.response[0, 0]) == pytest.approx(curve(expected), rel=1e-3)
+
+
+def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
+    fast = worn(wear=10.0 * WEAR)
+    np.testing.assert_allclose(fast.excitation_frequency, worn().excitation_frequency, rtol=1e-9)
+    np.testing.assert_allclose(fast.worn_volume, worn().worn_volume, rtol=1e-9)
+
+
+@lru_cache
+def slider_start(word: Followed) -> StartState:
+    """Start state of the slider."""
+    model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN)
+    ((_, start),) = follow_branch(model, 0.5, 10.0, np.array([math.nan]), "up", SolverSettings(), follow=follow)
+    return start
+
+
+@pytest.mark.parametrize("word", ["resonance", "peak"])
+def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR_OPTIONS, iterations_per_save=8))
+    model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
+    kept: list[Packed] = []
+
+    def history(resume: Packed | None = None) -> WearHistory:
+        return march_from(
+            model,
+            0.5,
+            slider_start(word),
+            WEAR,
+            1e3,
+            "implicit",
+            CYCLES,
+            settings,
+            keep=kept.append,
+            resume=resume,
+            follow=follow,
+        )
+
+    whole = history()
+    n_saves = len(kept)
+    assert n_saves > 1
+    for place in (0, n_saves - 1):
+        again = history(kept[place])
+        for name in ("excitation_frequency", "excitation_frequency_error", "wear_depth", "worn_volume_error"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(whole, name), name)
+        assert again.newton_iterations == whole.newton_iterations
+
+
+def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
+    model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
+    kept: list[Packed] = []
+    nowhere = np.array([math.nan])
+    ((_, whole),) = follow_branch(model, 0.5, 10.0, nowhere, "up", SolverSettings(), kept.append, follow=follow)
+    assert whole.state is not None
+    assert len(kept) > 2
+    for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
+        ((_, again),) = follow_branch(model, 0.5, 10.0, nowhere, "up", SolverSettings(), resume=progress, follow=follow)
+        assert again.state is not None
+        assert again.state.omega == whole.state.omega
+        np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)
+
+
+def test_both_sweeps_find_the_one_resonance_of_the_slider() -> None:
+    model = scene("sdof_slider", damping=DAMPING)
+    # the range lies in three quarter octaves, of which each has a sweep of its own
+    found = [
+        march_wear(model, "resonance", 10.0, 0.5, 0.0, 0.0, sweep=sweep, between=(175.0, 260.0))
+        for sweep in ("up", "down")
+    ]
+    assert [history.outcome for history in found] == [Outcome.CONVERGED] * 2
+    one, other = (float(history.excitation_frequency[0]) for history in found)
+    assert one == pytest.approx(other, rel=1e-7)
+    assert one == pytest.approx(worn().excitation_frequency[0], rel=1e-7)
+
+
+def test_a_resonance_that_leaves_its_range_ends_the_history_with_a_sentence() -> None:
+    history = march_wear(
+        scene("sdof_slider", damping=DAMPING), "resonance", 10.0, 0.5, WEAR, CYCLES, between=(180.0, 200.3)
+    )
+    assert history.outcome is Outcome.RESONANCE_LOST
+    assert "out of the range from 180 to 200.3 Hz" in history.message
+    known = np.isfinite(history.worn_volume)
+    # the values of the states within the range are kept
+    assert known[0]
+    assert not known[3:].any()
+    kept = history.excitation_frequency[known]
+    np.testing.assert_allclose(kept, worn().excitation_frequency[known], atol=0.05)
+
+
+def test_a_range_without_resonance_is_an_outcome_with_a_sentence() -> None:
+    history = march_wear(
+        scene("sdof_slider", damping=DAMPING), "resonance", 10.0, 0.5, WEAR, CYCLES, between=(100.0, 150.0)
+    )
+    assert history.outcome is Outcome.RESONANCE_LOST
+    assert history.message == "the sweep up meets no resonance between 100 and 150 Hz: give another range"
+    assert np.isnan(history.excitation_frequency).all()
+
+
+@pytest.mark.slow
+def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states() -> None:
+    """The mass that bounces stiffens: a sweep down jumps from the lower branch to the upper one below its resonance."""
+    settings, between = SolverSettings(harmonics=1, samples=64), (1.07 / (2.0 * np.pi), 1.3 / (2.0 * np.pi))
+    history = march_wear(
+        scene("vibro_impact"), "resonance", 0.02, 0.0, 0.0, 0.0, sweep="down", between=between, settings=settings
+    )
+    assert history.outcome is Outcome.RESONANCE_LOST
+    assert "the sweep down jumps over the resonance at 0.17" in history.message
+    assert 'give sweep = "up"' in history.message
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"frequency": "resonnance"}, "frequency"),
+        ({"between": None}, "between: give"),
+        ({"between": (215.0, 205.0)}, "between: give the lowest"),
+        ({"between": (205.0, np.nan)}, "between: give finite"),
+        ({"frequency": 210.0}, "between: leave it out"),
+        ({"sweep": "ramp"}, "sweep: give"),
+        ({"scheme": "final", "cycles": np.inf}, "scheme: the scheme"),
+    ],
+)
+def test_wrong_input_is_named(asked: dict[str, object], said: str) -> None:
+    given: dict[str, object] = {"frequency": "resonance", "cycles": 1.0, "between": BETWEEN}
+    with pytest.raises(ValueError, match=said):
+        march_wear(
+            scene("sdof_slider"),
+            excitation_amplitude=10.0,
+            friction_coefficient=0.5,
+            wear_coefficient=WEAR,
+            **(given | asked),  # type: ignore[arg-type]
+        )

@@ -1,0 +1,148 @@
+"""Studies whose excitation follows the resonance: what they take, what they compute, what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studyrunner.plan.planning import build_tasks
+from studyrunner.report.drawing import Drawing
+from studyrunner.report.figures.excitation import draw_excitation
+from studyrunner.report.reading.result import Result
+from studyrunner.study.study_file import format_study, read_study
+from studyrunner.user_error import UserError
+from tests.studyrunner.test_scene_axes import compute
+
+SLIDER = {
+    "axes.frequency": "resonance",
+    "axes.wear_coefficient": [1.1e-11, 5.5e-12],
+    "axes.excitation_amplitude": 10.0,
+    "axes.scheme": "adaptive",
+    "loading.between": [180.0, 230.0],
+    "scene.damping": 20.0,
+    "slow_time.cycles": 4e4,
+    "slow_time.outputs": 5,
+    "solver.harmonics": 3,
+    "solver.samples": 64,
+}
+SAMPLES = {"scatter.frequency": {"scatter.samples": 3}}
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(folder: Path) -> None:
+    """Results go to a folder of their own."""
+
+
+def computed(path: str, **more: object) -> xr.Dataset:
+    """The result of a study of the slider."""
+    given = {**SLIDER, **{name.replace("__", "."): value for name, value in more.items()}}
+    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
+    return compute("sdof_slider", path, *words)
+
+
+def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixture[str]) -> None:
+    found = computed("out.nc")
+    said = capsys.readouterr()
+    assert found.frequency.values.tolist() == [205.0]
+    followed = found.excitation_frequency.squeeze()
+    assert followed.dims == ("wear_coefficient", "cycle")
+    assert followed.units == "Hz"
+    assert (np.diff(followed) > 0.0).all()
+    # half the wear coefficient wears half as fast
+    np.testing.assert_allclose(followed[1, ::2], followed[0, :3], rtol=1e-12)
+    assert (found.excitation_frequency_error > 0.0).all()
+    first, last = float(followed[0, 0]), float(followed[0, -1])
+    assert f"the resonance moves from {first:.6g} to {last:.6g} Hz" in said.out + said.err
+
+
+def test_the_report_draws_the_frequency_over_cycles() -> None:
+    found = computed("drawn.nc")
+    result = Result(Path("drawn.nc"), found)
+    (drawing,) = draw_excitation(result)
+    assert isinstance(drawing, Drawing)
+    lines = drawing.figure.axes[0].get_lines()
+    followed = found.excitation_frequency.squeeze().values
+    assert len(lines) == len(followed) == 2
+    for line, expected in zip(lines, followed, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), expected)
+    assert drawing.caption.startswith(f"The excitation follows the resonance: from {followed[0, 0]:.6g} to")
+    # the middle of the range is no frequency of the point
+    assert "205" not in result.describe(result.shown_point(), ["frequency"])
+
+
+def test_without_cycles_the_result_is_the_resonance_of_the_unworn_joint() -> None:
+    found = computed("unworn.nc", slow_time__cycles=0, axes__wear_coefficient=1.1e-11)
+    at = float(found.excitation_frequency.squeeze())
+    assert 198.0 < at < 201.0
+    assert abs(float(found.response_phase.squeeze()) + 0.5 * np.pi) < 1e-7
+    assert 0.0 < float(found.excitation_frequency_error.squeeze()) < 1.0
+
+
+@pytest.mark.slow
+def test_each_scene_and_each_sample_has_its_own_frequency() -> None:
+    of_scenes = computed("scenes.nc", slow_time__cycles=0, axes__wear_coefficient=1.1e-11, axes__mass=[0.1, 0.11])
+    one, other = of_scenes.excitation_frequency.squeeze().values
+    # friction hardly moves the resonance from that of the mass on its spring
+    assert one / other == pytest.approx(np.sqrt(1.1), rel=5e-3)
+    drawn = {"scatter__samples": 4, "scatter__mass": "{uniform={half_width=0.01}}"}
+    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in SLIDER.items()]
+    words += [f"{name.replace('__', '.')}={value}" for name, value in drawn.items()]
+    samples = compute("sdof_slider", "samples.nc", *words, "slow_time.cycles=0", "axes.wear_coefficient=1.1e-11")
+    square = samples.excitation_frequency.squeeze() ** 2 * samples.sample_mass
+    np.testing.assert_allclose(square, one**2 * 0.1, rtol=1e-2)
+    assert float(samples.excitation_frequency.std()) > 1.0
+
+
+def test_the_effective_study_is_the_same_study() -> None:
+    study = read_study("sdof_slider", SLIDER)
+    text = format_study(study)
+    assert 'frequency = "resonance"' in text
+    assert "between = [180.0, 230.0]" in text
+    Path("again.toml").write_text(text, encoding="utf-8")
+    again = read_study("again.toml")
+    assert again.follow == study.follow
+    assert format_study(again) == text
+
+
+def test_a_task_says_what_it_follows() -> None:
+    for word in ("resonance", "peak"):
+        study = read_study("sdof_slider", {**SLIDER, "axes.frequency": word})
+        plan = build_tasks(study, 2)
+        follows = [task.follow for task in (*plan.branches, *plan.marches[0])]
+        assert follows == [study.follow] * 2
+        assert study.follow is not None
+        assert (study.follow.of, study.follow.low, study.follow.high) == (word, 180.0, 230.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        (
+            "axes.frequency",
+            "resonnance",
+            'axes.frequency = "resonnance": give a number in Hz, or "resonance" or "peak"',
+        ),
+        ("axes.frequency", ["resonance", 200.0], 'give "resonance" alone'),
+        ("axes.frequency", ["resonance", "peak"], "another study for the other"),
+        ("axes.frequency", 200.0, 'loading = {"between": [180.0, 230.0]}: leave it out'),
+        ("loading.between", [230.0, 180.0], "loading.between = [230.0, 180.0]: give the lowest and the highest"),
+        ("loading.between", [180.0], "loading.between"),
+        ("loading.between", 180.0, "loading.between = 180.0: give the lowest and the highest"),
+        ("loading.betwen", [1.0, 2.0], "loading.betwen = [1.0, 2.0]: unknown key, give between"),
+        ("axes.sweep", "ramp", 'axes.sweep = "ramp": give "up" or "down"'),
+        ("scatter.frequency", {"normal": {"std": 1.0}}, "each sample finds its own frequency"),
+        ("outputs.variables", ["exact"], "leave it out: it is of given frequencies"),
+    ],
+)
+def test_wrong_input_is_one_sentence(key: str, value: object, said: str) -> None:
+    with pytest.raises(UserError) as refused:
+        read_study("sdof_slider", {**SLIDER, key: value, **SAMPLES.get(key, {})})
+    assert said.replace('{"between": [180.0, 230.0]}', "{between = [180.0, 230.0]}") in str(refused.value)
+
+
+def test_a_word_without_a_range_names_what_is_missing() -> None:
+    with pytest.raises(UserError, match=r"loading\.between: missing"):
+        read_study("sdof_slider", {"axes.frequency": "peak"})
