@@ -61,13 +61,6 @@ class BlockRun:
         """Whether the block was flown to its end."""
         return self.failure.outcome is Outcome.CONVERGED
 
-    def up_to(self, mission: int) -> BlockRun:
-        """The block flown for fewer missions, of which the number is among `missions`."""
-        kept = self.missions.index(mission) + 1
-        return replace(
-            self, missions=self.missions[:kept], growth=self.growth[:kept], response=self.response[:kept], last=None
-        )
-
 
 @dataclass(frozen=True)
 class BlockCase:

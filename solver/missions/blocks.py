@@ -67,6 +67,11 @@ class Mission:
         """Area of the pairs (n_contact,), m2."""
         return self.blocks[0].model.contact.area
 
+    @property
+    def reversible(self) -> bool:
+        """Whether the blocks can be flown in reverse order: all of them continue another one, or none does."""
+        return len({block.begin == "continue" for block in self.blocks}) == 1
+
     def continued_by(self, place: int) -> bool:
         """Whether the block behind a block begins from its last state."""
         return self.blocks[(place + 1) % len(self.blocks)].begin == "continue"

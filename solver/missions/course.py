@@ -37,7 +37,7 @@ class MissionNode:
     half: number of missions within the step, and depth worn by each block there; None for a step of one mission.
     responses: of some missions of the step, in order.
     likes: of each block, for the reference solution.
-    error: estimated local error of the step, m3.
+    error (n_contact,): error of the step in two parts by the order of the blocks, m; None where there is none.
     carried: state at the end of the last block, for a first block that continues; of the last node only.
     """
 
@@ -46,7 +46,7 @@ class MissionNode:
     half: tuple[int, FloatArray] | None = None
     responses: tuple[Responses, ...] = ()
     likes: tuple[Like, ...] = ()
-    error: float = 0.0
+    error: FloatArray | None = None
     carried: StartState | None = None
 
 

@@ -171,13 +171,20 @@ class MissionSolutions:
         self.progress = replace(self.progress, length=max(shorter, least), runs=())
 
     def _wanted(self, node: MissionNode, step: Step, length: int) -> float:
-        """Length of a step with the allowed error, missions: the error is the square of the error by the order."""
-        grown = float((step.node.growth - node.growth).sum(axis=0) @ self.mission.area)
+        """Length of a step with the allowed error, missions.
+
+        The square of the error by the order of the blocks adds up. This error itself may be seen at the end of a step,
+        over all wear so far.
+        """
+        area, aim = self.mission.area, MISSIONS.step_error_fraction * self.mission.settings.rtol
         if step.order_error == 0.0:
             return math.inf
-        at_mean_rate = float(step.node.growth.sum(axis=0) @ self.mission.area) * length / step.node.mission
-        allowed = MISSIONS.step_error_fraction * self.mission.settings.rtol * max(1.0, at_mean_rate / grown)
-        return MISSIONS.step_safety * length * math.sqrt(allowed) / step.order_error
+        grown = float((step.node.growth - node.growth).sum(axis=0) @ area)
+        whole = float(step.node.growth.sum(axis=0) @ area)
+        squared = math.sqrt(aim * max(1.0, whole * length / (step.node.mission * grown))) / step.order_error
+        # the wear of a step grows with its length, too
+        itself = math.sqrt(aim * whole / (step.order_error * grown))
+        return MISSIONS.step_safety * length * min(squared, itself)
 
 
 def halves(length: int) -> tuple[int, ...]:
