@@ -6,7 +6,7 @@ For use in Python, from this package itself:
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
-- `integrate_mission`: wear over missions, each a list of `Block`, a `MissionHistory`;
+- `integrate_mission`: wear over missions, each a list of `Block`, steady or a `Passage`, a `MissionHistory`;
 - `tuned`: other limits of the solver for hard cases;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from solver.forced_response import FrequencyResponse, frequency_response
     from solver.mission_history import integrate_mission
-    from solver.missions.blocks import Block
+    from solver.missions.blocks import Block, Passage
     from solver.missions.result import MissionHistory
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
@@ -45,6 +45,7 @@ __all__ = [
     "FrequencyResponse",
     "MissionHistory",
     "Outcome",
+    "Passage",
     "ReducedModel",
     "SolverSettings",
     "WearHistory",
@@ -63,6 +64,7 @@ _PLACES = {
     "FrequencyResponse": "forced_response",
     "MissionHistory": "missions.result",
     "Outcome": "outcome",
+    "Passage": "missions.blocks",
     "ReducedModel": "model",
     "SolverSettings": "settings",
     "WearHistory": "results.history",

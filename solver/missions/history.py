@@ -14,6 +14,7 @@ from solver.accuracy.options import ACCURACY
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionCourse
 from solver.missions.one_block import integrate_one_block, is_one_history
+from solver.missions.options import MISSIONS
 from solver.missions.result import MissionHistory
 from solver.missions.solutions import ENDS_ALL, MissionSolutions
 from solver.model import FloatArray
@@ -81,6 +82,7 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
         wear_depth_error=of_pairs,
         block_volume=volumes,
         reference_volume=other @ area,
+        swiftness=fine.swiftness,
         error_estimate=float(relative[reached[-1]]) if reached.size else math.nan,
         last_mission=float(fine.ends[-1]),
         steps=np.diff(fine.ends),
@@ -180,6 +182,9 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
         remarks.append(
             f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
         )
+    for place in np.flatnonzero(fine.swiftness > MISSIONS.largest_swiftness):
+        swift = "too swift for the steady states that it is computed from: its rate over (zeta f)^2 is"
+        remarks.append(f"{_called(mission, int(place))} is {swift} {fine.swiftness[place]:.2g}")
     if not math.isnan(fine.cut_off):
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
     if error > SENSITIVE_ERROR:
@@ -191,7 +196,11 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
         return Failure(Outcome.SENSITIVE, "; ".join((said, *remarks)))
     worst = int(np.argmax(fine.inaccurate))
     if fine.inaccurate[worst] > 0.0:
-        name = mission.blocks[worst].name or f"block {worst + 1}"
-        said = f"in {name} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
+        said = f"in {_called(mission, worst)} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
         return Failure(Outcome.INACCURATE, "; ".join((said, *remarks)))
     return Failure(Outcome.CONVERGED, "; ".join(remarks))
+
+
+def _called(mission: Mission, place: int) -> str:
+    """Name of a block in messages."""
+    return mission.blocks[place].name or f"block {place + 1}"
