@@ -7,7 +7,7 @@ For use in Python, from this package itself:
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
-- `integrate_mission`: wear over missions, each a list of `Block`, a `MissionHistory`;
+- `integrate_mission`: wear over missions, each a list of `Block`, steady or a `Passage`, a `MissionHistory`;
 - `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
   multipliers, a `ResponseCurve`;
 - `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, and all Fourier
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from solver.balance_functions import HarmonicBalance, balance_of
     from solver.forced_response import FrequencyResponse, frequency_response
     from solver.mission_history import integrate_mission
-    from solver.missions.blocks import Block
+    from solver.missions.blocks import Block, Passage
     from solver.missions.result import MissionHistory
     from solver.model import ReducedModel
     from solver.model_from_matrices import build_model
@@ -57,6 +57,7 @@ __all__ = [
     "MissionHistory",
     "ModalResponse",
     "Outcome",
+    "Passage",
     "PeriodicMotion",
     "ReducedModel",
     "ResponseCurve",
@@ -82,6 +83,7 @@ _PLACES = {
     "MissionHistory": "missions.result",
     "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
+    "Passage": "missions.blocks",
     "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
     "ResponseCurve": "whole_response",

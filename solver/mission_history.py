@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word
 from solver.loading_history.sweep_start import Sweep
-from solver.missions.blocks import Begin, Block, Mission
+from solver.missions.blocks import Begin, Block, Mission, Passage
 from solver.missions.history import integrate_missions
 from solver.missions.result import MissionHistory
 from solver.settings import TARGETS, SolverSettings, WearTarget
@@ -88,8 +88,7 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
     """The block with its numbers checked; errors name it by its number and its name."""
     try:
         check_word("begin", block.begin, get_args(Begin))
-        frequency = check_number("frequency", block.frequency, above=0.0)
-        cycles = check_number("cycles", block.cycles, above=0.0)
+        frequency, cycles = _checked_times(block)
         load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
         wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
         if block.begin == "continue":
@@ -98,6 +97,26 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
     except ValueError as error:
         raise ValueError(f"{_called(place, block)}: {error}") from error
     return replace(block, frequency=frequency, cycles=cycles, excitation_amplitude=load, friction_coefficient=friction)
+
+
+def _checked_times(block: Block) -> tuple[float | Passage, float | None]:
+    """Frequency and cycles of a block."""
+    if not isinstance(block.frequency, Passage):
+        if block.cycles is None:
+            raise ValueError("cycles: missing: only a passage has cycles of its own")
+        return check_number("frequency", block.frequency, above=0.0), check_number("cycles", block.cycles, above=0.0)
+    passage = Passage(
+        check_number("frequency.start", block.frequency.start, above=0.0),
+        check_number("frequency.stop", block.frequency.stop, above=0.0),
+        check_number("frequency.rate", block.frequency.rate, above=0.0),
+    )
+    if passage.start == passage.stop:
+        raise ValueError("frequency.stop: give another frequency than start")
+    if block.cycles is not None:
+        raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
+    if block.begin != passage.sweep:
+        raise ValueError(f'begin: this passage goes {passage.sweep}: give "{passage.sweep}"')
+    return passage, None
 
 
 def _check_neighbours(before: Block, block: Block, place: int) -> None:

@@ -107,6 +107,7 @@ class ContinuationOptions:
     """Smallest fall of this rise with the lag, 1/rad2, in a secant step; it is 1 for one degree of freedom."""
     largest_lag_step: float = 0.2
     """Largest change of the phase lag between two solves, rad."""
+
     @property
     def linear_change(self) -> float:
         """Largest change over a step between two states in which no pair slips or opens.

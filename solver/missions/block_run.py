@@ -41,6 +41,7 @@ class BlockRun:
     like: what the reference solution takes over.
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
+    swiftness: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
     """
 
     missions: tuple[int, ...]
@@ -55,18 +56,12 @@ class BlockRun:
     like: Like | None = None
     last: StartState | None = None
     iterations: int = 0
+    swiftness: float = 0.0
 
     @property
     def completed(self) -> bool:
         """Whether the block was flown to its end."""
         return self.failure.outcome is Outcome.CONVERGED
-
-    def up_to(self, mission: int) -> BlockRun:
-        """The block flown for fewer missions, of which the number is among `missions`."""
-        kept = self.missions.index(mission) + 1
-        return replace(
-            self, missions=self.missions[:kept], growth=self.growth[:kept], response=self.response[:kept], last=None
-        )
 
 
 @dataclass(frozen=True)
@@ -95,7 +90,7 @@ class BlockCase:
     @property
     def counts(self) -> FloatArray:
         """Cycle counts (n,) of the block at which it is read."""
-        return np.array(self.missions, np.float64) * self.block.cycles
+        return np.array(self.missions, np.float64) * self.block.steady[1]
 
     @property
     def law(self) -> WearLaw:
@@ -113,7 +108,7 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     sweep: Sweep = case.mission.first if block.begin == "continue" else block.begin
     start = begin_block(block, case.depth, sweep, case.carried, case.settings)
     if start.state is None:
-        return _nothing(case, Failure(start.outcome, start.message), start.newton_iterations)
+        return not_flown(case, Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
     model = worn(block.model, case.depth)
     asked = SlowTime(
@@ -133,7 +128,7 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         output = solutions.output_of_reference(ended)
     iterations = start.newton_iterations + ended.iterations
     if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return _nothing(case, ended.failure, iterations)
+        return not_flown(case, ended.failure, iterations)
     return _read(case, ended, output.read(case.counts), start, iterations)
 
 
@@ -185,7 +180,7 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
     )
 
 
-def _nothing(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
+def not_flown(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
     """A block that was not flown to its end."""
     unknown = np.full((len(case.missions), case.depth.size), np.nan)
     response = np.full((len(case.missions), len(case.block.model.response_names)), np.nan, complex)

@@ -46,7 +46,7 @@ def begin_block(
     """
     if carried is not None:
         return _continued(block, depth, carried, settings)
-    model, frequency = worn(block.model, depth), np.array([block.frequency])
+    model, frequency = worn(block.model, depth), np.array([block.steady[0]])
     branch = follow_branch(model, block.friction_coefficient, block.excitation_amplitude, frequency, sweep, settings)
     return next(branch)[1]
 
@@ -81,15 +81,14 @@ class _Continuation:
         before, amplitude = self.start.state, self.block.excitation_amplitude
         self._settle()
         ways = [("ramp", before.omega / (2.0 * np.pi), amplitude)]
-        if self.block.frequency != before.omega / (2.0 * np.pi):
+        frequency, _ = self.block.steady
+        if frequency != before.omega / (2.0 * np.pi):
             smaller = min(amplitude, before.excitation_amplitude)
-            on_the_way = ("sweep", self.block.frequency, smaller)
-            ways = (
-                [on_the_way, ("ramp", self.block.frequency, amplitude)] if amplitude > smaller else [*ways, on_the_way]
-            )
-        for kind, frequency, load in ways:
+            on_the_way = ("sweep", frequency, smaller)
+            ways = [on_the_way, ("ramp", frequency, amplitude)] if amplitude > smaller else [*ways, on_the_way]
+        for kind, at, load in ways:
             if self.start.state is not None:
-                self._go(kind == "ramp", frequency, load)
+                self._go(kind == "ramp", at, load)
         return replace(self.start, newton_iterations=self.iterations)
 
     def _settle(self) -> None:

@@ -15,14 +15,33 @@ Begin = Literal["ramp", "up", "down", "continue"]
 
 
 @dataclass(frozen=True)
+class Passage:
+    """Frequencies that a machine passes: start and stop, Hz, not equal, and the rate, Hz/s, above 0 up or down."""
+
+    start: float
+    stop: float
+    rate: float
+
+    @property
+    def cycles(self) -> float:
+        """Cycles of one passage."""
+        return abs(self.stop**2 - self.start**2) / (2.0 * self.rate)
+
+    @property
+    def sweep(self) -> Sweep:
+        """The direction."""
+        return "up" if self.stop > self.start else "down"
+
+
+@dataclass(frozen=True)
 class Block:
-    """A part of a mission: steady vibration for a number of cycles.
+    """A part of a mission: steady vibration for a number of cycles, or a passage (`solver.missions.passage`).
 
     - model: the joint, e.g. at the speed of the block. All blocks of a mission have equal contact pairs.
-    - frequency: Hz.
+    - frequency: Hz, or a passage, which begins with a sweep of its own direction.
     - excitation_amplitude: N.
     - friction_coefficient: one number, (n_contact,) for each pair, or None for the model's own.
-    - cycles: of the block in one mission, above 0.
+    - cycles: of the block in one mission, above 0; None for a passage, whose cycles follow from its rate.
     - begin: "ramp", "up" and "down": from the static state of the model with the depths worn so far, as `sweep` of
       `solver.march_wear`. "continue": from the last state of the block before (before the first block: of the last
       block of the mission before), whose tangential history is kept. Amplitude and frequency then change slowly, one
@@ -31,12 +50,19 @@ class Block:
     """
 
     model: ReducedModel
-    frequency: float
+    frequency: float | Passage
     excitation_amplitude: float
     friction_coefficient: float | FloatArray | None
-    cycles: float
+    cycles: float | None = None
     begin: Begin = "ramp"
     name: str = ""
+
+    @property
+    def steady(self) -> tuple[float, float]:
+        """Frequency, Hz, and cycles of a block that is no passage."""
+        assert isinstance(self.frequency, float)
+        assert self.cycles is not None
+        return self.frequency, self.cycles
 
 
 @dataclass(frozen=True)
@@ -66,6 +92,11 @@ class Mission:
     def area(self) -> FloatArray:
         """Area of the pairs (n_contact,), m2."""
         return self.blocks[0].model.contact.area
+
+    @property
+    def reversible(self) -> bool:
+        """Whether the blocks can be flown in reverse order: all of them continue another one, or none does."""
+        return len({block.begin == "continue" for block in self.blocks}) == 1
 
     def continued_by(self, place: int) -> bool:
         """Whether the block behind a block begins from its last state."""

@@ -37,7 +37,7 @@ class MissionNode:
     half: number of missions within the step, and depth worn by each block there; None for a step of one mission.
     responses: of some missions of the step, in order.
     likes: of each block, for the reference solution.
-    error: estimated local error of the step, m3.
+    error (n_contact,): error of the step in two parts by the order of the blocks, m; None where there is none.
     carried: state at the end of the last block, for a first block that continues; of the last node only.
     """
 
@@ -46,7 +46,7 @@ class MissionNode:
     half: tuple[int, FloatArray] | None = None
     responses: tuple[Responses, ...] = ()
     likes: tuple[Like, ...] = ()
-    error: float = 0.0
+    error: FloatArray | None = None
     carried: StartState | None = None
 
 
@@ -60,6 +60,7 @@ class MissionCourse:
     start_rates (n_block, n_contact): wear rates at the starts of the blocks of the first mission, m per cycle.
     start_errors (n_block,): estimated relative errors of these rates.
     inaccurate (n_block,): largest error of a state of each block above rtol, 0 where there is none.
+    swiftness (n_block,): largest `BlockRun.swiftness` of each block.
     held, cut_off: number of missions from which on a block has `BlockRun.held`, `BlockRun.cut_off`; NaN if never.
     iterations: Newton iterations.
     """
@@ -69,6 +70,7 @@ class MissionCourse:
     start_rates: FloatArray
     start_errors: FloatArray
     inaccurate: FloatArray
+    swiftness: FloatArray
     held: float = float("nan")
     cut_off: float = float("nan")
     iterations: int = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
-from solver.missions.blocks import Mission
+from solver.missions.blocks import Mission, Passage
 from solver.missions.result import MissionHistory
 from solver.packing import Packed
 from solver.results.history import WearHistory
@@ -19,7 +19,9 @@ from solver.wear.solutions import SlowTime
 def is_one_history(mission: Mission) -> bool:
     """Whether a mission history is one wear history."""
     block = mission.blocks[0]
-    return len(mission.blocks) == 1 and (block.begin == "continue" or mission.missions[-1] == 1)
+    if len(mission.blocks) > 1 or isinstance(block.frequency, Passage):
+        return False
+    return block.begin == "continue" or mission.missions[-1] == 1
 
 
 def integrate_one_block(
@@ -27,13 +29,14 @@ def integrate_one_block(
 ) -> MissionHistory:
     """The wear history of the only block, read at its missions; arguments as of `integrate_missions`."""
     (block,) = mission.blocks
+    frequency, cycles = block.steady
     sweep: Sweep = mission.first if block.begin == "continue" else block.begin
     _, start = next(
         follow_branch(
             block.model,
             block.friction_coefficient,
             block.excitation_amplitude,
-            np.array([block.frequency]),
+            np.array([frequency]),
             sweep,
             mission.settings,
         )
@@ -41,10 +44,10 @@ def integrate_one_block(
     ends = np.array(mission.missions, np.float64)
     begins = np.clip(ends - 1.0, 0.0, None)
     read = np.unique(np.concatenate([ends, begins, begins + 1.0]))
-    asked = SlowTime(mission.wear_coefficient, "adaptive", block.cycles * read, law=mission.law, until=mission.until)
+    asked = SlowTime(mission.wear_coefficient, "adaptive", cycles * read, law=mission.law, until=mission.until)
     history = integrate_wear(block.model, block.friction_coefficient, mission.settings, start, asked, keep, resume)
     rows, of_begins = np.searchsorted(read, ends), np.searchsorted(read, begins)
-    return _as_missions(history, ends, block.cycles, rows, (of_begins, np.searchsorted(read, begins + 1.0)))
+    return _as_missions(history, ends, cycles, rows, (of_begins, np.searchsorted(read, begins + 1.0)))
 
 
 def _as_missions(
@@ -69,6 +72,7 @@ def _as_missions(
         response_begin=begin,
         response_end=end,
         reference_volume=history.reference_volume[rows],
+        swiftness=np.zeros(1),
         error_estimate=history.error_estimate,
         last_mission=history.last_cycle / cycles,
         steps=np.array([history.last_cycle / cycles]),

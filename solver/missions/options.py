@@ -21,5 +21,17 @@ class MissionOptions:
     first_step: int = 2
     """Missions of the first step: the shortest that has an estimated error."""
 
+    # passages
+    first_frequencies: int = 17
+    """Frequencies before those that are added."""
+    most_frequencies: int = 400
+    """Most frequencies of a passage."""
+    frequency_error: float = 0.25
+    """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
+    beside_jump: float = 1e-6
+    """Fraction of the frequency of a jump: distance of the states before and behind it."""
+    largest_swiftness: float = 0.3
+    """|df/dt| / (zeta f)^2 above which a message says that a passage is too swift for steady states."""
+
 
 MISSIONS = MissionOptions()

@@ -21,6 +21,8 @@ class MissionHistory:
     response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
         block, in the mission that ends at the number, at 0 in the first one.
     reference_volume (n_output,): m3, worn volume of the reference solution.
+    swiftness (n_block,): |df/dt| / (zeta f)^2 of each passage, with its half-power width 2 zeta f; 0 where none is
+        passed and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
     error_estimate: `worn_volume_error` at the last number that was reached.
     last_mission: number of missions up to which the history was computed.
     steps (n_step,): missions flown in each step.
@@ -41,6 +43,7 @@ class MissionHistory:
     response_begin: ComplexArray
     response_end: ComplexArray
     reference_volume: FloatArray
+    swiftness: FloatArray
     error_estimate: float
     last_mission: float
     steps: FloatArray

@@ -11,9 +11,10 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.missions.block_run import BlockCase, BlockRun, run_block
-from solver.missions.blocks import Mission
+from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
 from solver.missions.options import MISSIONS
+from solver.missions.passage import run_passage
 from solver.missions.step import Fly, Step, take_step
 from solver.model import FloatArray
 from solver.outcome import Outcome
@@ -138,7 +139,8 @@ class MissionSolutions:
             settings = self.mission.settings
             left = replace(settings, time_limit=settings.time_limit - self.spent)
             case = BlockCase(self.mission, place, depth, carried, missions, left)
-            found = run_block(case, None if like is None else like.likes[place])
+            through = run_passage if isinstance(case.block.frequency, Passage) else run_block
+            found = through(case, None if like is None else like.likes[place])
             if found.failure.outcome is not Outcome.TIME_LIMIT:
                 # with more time it goes on from the block before
                 self.progress = replace(self.progress, runs=(*self.progress.runs, found), spent=self.spent)
@@ -171,13 +173,20 @@ class MissionSolutions:
         self.progress = replace(self.progress, length=max(shorter, least), runs=())
 
     def _wanted(self, node: MissionNode, step: Step, length: int) -> float:
-        """Length of a step with the allowed error, missions: the error is the square of the error by the order."""
-        grown = float((step.node.growth - node.growth).sum(axis=0) @ self.mission.area)
+        """Length of a step with the allowed error, missions.
+
+        The square of the error by the order of the blocks adds up. This error itself may be seen at the end of a step,
+        over all wear so far.
+        """
+        area, aim = self.mission.area, MISSIONS.step_error_fraction * self.mission.settings.rtol
         if step.order_error == 0.0:
             return math.inf
-        at_mean_rate = float(step.node.growth.sum(axis=0) @ self.mission.area) * length / step.node.mission
-        allowed = MISSIONS.step_error_fraction * self.mission.settings.rtol * max(1.0, at_mean_rate / grown)
-        return MISSIONS.step_safety * length * math.sqrt(allowed) / step.order_error
+        grown = float((step.node.growth - node.growth).sum(axis=0) @ area)
+        whole = float(step.node.growth.sum(axis=0) @ area)
+        squared = math.sqrt(aim * max(1.0, whole * length / (step.node.mission * grown))) / step.order_error
+        # the wear of a step grows with its length, too
+        itself = math.sqrt(aim * whole / (step.order_error * grown))
+        return MISSIONS.step_safety * length * min(squared, itself)
 
 
 def halves(length: int) -> tuple[int, ...]:
@@ -189,20 +198,23 @@ def _begun(n_block: int, n_contact: int) -> MissionCourse:
     """The course before the first step."""
     start = MissionNode(0, np.zeros((n_block, n_contact)))
     unknown, nothing = np.full((n_block, n_contact), np.nan), np.zeros(n_block)
-    return MissionCourse((start,), None, unknown, nothing, nothing)
+    return MissionCourse((start,), None, unknown, nothing, nothing, nothing)
 
 
 def _longer(course: MissionCourse, step: Step) -> MissionCourse:
     """The course with another step."""
     before, n_block = course.nodes[-1], len(course.inaccurate)
     nodes = (*course.nodes[:-1], replace(before, carried=None), step.node)
-    inaccurate = course.inaccurate.copy()
+    inaccurate, swiftness = course.inaccurate.copy(), course.swiftness.copy()
     for place, run in enumerate(step.runs):
+        # runs of one block lie n_block apart
         inaccurate[place % n_block] = max(inaccurate[place % n_block], run.inaccurate)
+        swiftness[place % n_block] = max(swiftness[place % n_block], run.swiftness)
     found = replace(
         course,
         nodes=nodes,
         inaccurate=inaccurate,
+        swiftness=swiftness,
         held=_first(course.held, before.mission, any(run.held for run in step.runs)),
         cut_off=_first(course.cut_off, before.mission, any(run.cut_off for run in step.runs)),
         iterations=course.iterations + sum(run.iterations for run in step.runs),

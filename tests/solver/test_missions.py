@@ -1,0 +1,355 @@
+"""Missions: blocks in order, flown many times, against wear histories, exact volumes and missions one by one."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import Block, MissionHistory, Outcome, SolverSettings, integrate_mission, march_wear
+from solver.contact.wear_law import WearLaw, WearTable
+from solver.missions import solutions
+from solver.missions.block_run import BlockCase, BlockRun
+from solver.missions.blocks import Begin, Mission
+from solver.missions.course import MissionNode, growth_within
+from solver.missions.history import integrate_missions
+from solver.missions.step import Step, missions_read, take_step
+from solver.model import FloatArray, ReducedModel
+from solver.packing import Packed
+from solver.settings import WearTarget
+from solver.wear.solutions import Like
+from solver.wear.state import Failure
+from tests.solver.models import scene
+
+SETTINGS = SolverSettings(harmonics=3, samples=64)
+WEAR, FRICTION = 1.1e-11, 0.5
+
+
+@lru_cache
+def slider() -> ReducedModel:
+    """A mass on a support, pressed by a spring that wear relaxes."""
+    return scene("sdof_slider")
+
+
+def two_blocks(begin: Begin = "continue", cycles: float = 200.0) -> tuple[Block, Block]:
+    """Two blocks that slip."""
+    return (
+        Block(slider(), 160.0, 10.0, FRICTION, cycles, begin, "cruise"),
+        Block(slider(), 150.0, 14.0, FRICTION, 1.5 * cycles, begin),
+    )
+
+
+def integrate(blocks: tuple[Block, ...], missions: Any, **more: Any) -> MissionHistory:
+    return integrate_mission(blocks, WEAR, missions, settings=SETTINGS, **more)
+
+
+# --- one block ---
+
+
+@pytest.mark.parametrize("flown", [(1, 4e4), (4, 1e4)], ids=["one mission", "continued"])
+def test_one_block_is_a_wear_history_to_the_last_bit(flown: tuple[int, float]) -> None:
+    missions, cycles = flown
+    counts = cycles * np.arange(missions + 1.0)
+    one = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
+    begin: Begin = "up" if missions == 1 else "continue"
+    history = integrate((Block(slider(), 160.0, 10.0, FRICTION, cycles, begin),), np.arange(missions + 1))
+    for name in ("worn_volume", "worn_volume_error", "wear_depth", "wear_depth_error", "reference_volume"):
+        np.testing.assert_array_equal(getattr(history, name), getattr(one, name))
+    np.testing.assert_array_equal(history.response_end[1:, 0], one.response[1:])
+    np.testing.assert_array_equal(history.response_begin[1:, 0], one.response[:-1])
+    assert history.outcome is one.outcome is Outcome.CONVERGED
+
+
+def test_two_halves_with_continue_are_the_whole() -> None:
+    """And the first block of several is the wear history of its cycles to the last bit."""
+    half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "continue")
+    history = integrate((half, half), 1)
+    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, [2e4, 4e4], settings=SETTINGS)
+    bars = history.wear_depth_error[-1] + whole.wear_depth_error[-1]
+    assert (np.abs(history.wear_depth[-1] - whole.wear_depth[-1]) < bars).all()
+    assert (bars < 0.02 * whole.wear_depth[-1]).all()
+    np.testing.assert_allclose(history.block_volume[-1, 0], whole.worn_volume[1], rtol=1e-4)
+    anew = integrate((replace(half, begin="up"), replace(half, begin="up")), 1)
+    assert anew.block_volume[-1, 0] == whole.worn_volume[1]
+
+
+# --- exact volumes ---
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, -1])
+def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order: int) -> None:
+    """V = k_w N s with the slip path s of a period: no wear acts back on a constant normal force."""
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    amplitudes, cycles = ((10.0, 14.0), (3e3, 5e3))
+    blocks = tuple(Block(model, 160.0, *of, "continue") for of in zip(amplitudes, (FRICTION,) * 2, cycles, strict=True))
+    history = integrate(blocks[::order], 50)
+    once = [march_wear(model, 160.0, load, FRICTION, WEAR, 1.0, settings=SETTINGS) for load in amplitudes]
+    exact = np.array([50.0 * n * one.wear_rate[0] for n, one in zip(cycles, once, strict=True)])[::order]
+    np.testing.assert_allclose(history.block_volume[-1], exact, rtol=1e-6)
+    # the slip path is four amplitudes
+    amplitude = float(np.abs(history.response_end[-1, 0, 0]))
+    assert exact[0] / (50.0 * cycles[::order][0]) == pytest.approx(WEAR * 10.0 * 4.0 * amplitude, rel=0.05)
+    assert history.outcome is Outcome.CONVERGED
+    assert history.steps.tolist() == [2, 8, 32, 8]
+
+
+# --- many missions against missions one by one, with blocks whose wear is known exactly ---
+
+# Both pairs slip in both blocks. Wear takes load from one pair to the other, so that the depths of the pairs come to
+# differ by a constant, which is another one in each block.
+RATES = np.array([[2e-9, 1e-9], [1e-9, 2.5e-9]])  # m per cycle of the unworn pairs, by block
+LOSS = 2e-3 * np.array([1.0, 0.8])[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])  # 1 per cycle
+
+
+def pairs() -> ReducedModel:
+    """Two pairs, of which only the areas count here."""
+    one = scene("two_masses")
+    contact = replace(one.contact, area=np.array([1e-4, 2e-4]), surface=("one", "other"))
+    return replace(one, contact=contact)
+
+
+def exact_run(case: Any, like: Any = None) -> BlockRun:
+    """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
+    rate, loss = RATES[case.place] * (1.0 if like is None else 1.001), LOSS[case.place]
+    values, vectors = np.linalg.eigh(loss)
+    now, modal = vectors.T @ case.depth, vectors.T @ rate
+    growth = []
+    for n in case.counts:
+        decay = np.where(values > 1e-12, -np.expm1(-values * n) / np.where(values > 1e-12, values, 1.0), n)
+        growth.append(vectors @ (decay * (modal - values * now)))
+    response = np.array([[complex(depth.sum())] for depth in case.depth + np.array(growth)])
+    done = Failure(Outcome.CONVERGED)
+    return BlockRun(case.missions, np.array(growth), response, done, rate - loss @ case.depth, like=Like((), 1.0, 1))
+
+
+@pytest.fixture
+def exact_blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Blocks of exactly known wear; the list has the missions of each run."""
+    flown: list[int] = []
+
+    def run(case: Any, like: Any = None) -> BlockRun:
+        flown.append(case.missions[-1])
+        return exact_run(case, like)
+
+    monkeypatch.setattr(solutions, "run_block", run)
+    return flown
+
+
+def exactly_known(missions: Any, cycles: float = 1.0, order: int = 1, **more: Any) -> MissionHistory:
+    model = pairs()
+    blocks = (Block(model, 1.0, 1.0, 0.5, cycles), Block(model, 2.0, 1.0, 0.5, 2.0 * cycles))
+    return integrate_missions(Mission(blocks[::order], 1.0, missions, SETTINGS, **more))
+
+
+@pytest.mark.parametrize(("cycles", "limit"), [(0.1, 60), (0.3, 100), (3.0, 1000)])
+def test_two_thousand_missions_agree_with_missions_one_by_one(
+    exact_blocks: list[int], cycles: float, limit: float
+) -> None:
+    """The longer the blocks, the more they adapt the pressures against each other in few missions, and the more steps."""
+    rows = (0, 1, 7, 200, 1000, 2000)
+    once = exactly_known(rows, cycles, largest_step=1)
+    flown_once = len(exact_blocks)
+    many = exactly_known(rows, cycles)
+    assert many.outcome is once.outcome is Outcome.CONVERGED
+    bars = many.wear_depth_error + once.wear_depth_error
+    assert (np.abs(many.wear_depth - once.wear_depth) <= bars).all()
+    np.testing.assert_allclose(many.wear_depth[:2], once.wear_depth[:2], rtol=1e-9)
+    assert many.error_estimate < SETTINGS.rtol
+    assert (np.abs(many.block_volume - once.block_volume) <= 2.0 * (bars @ pairs().contact.area)[:, None]).all()
+    # each mission is two blocks and their reference solution
+    flown = (len(exact_blocks) - flown_once) / 4
+    assert flown < limit
+    assert flown_once == 2000 * 4
+    assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
+
+
+def test_a_step_is_of_second_order_and_exact_for_two_missions(exact_blocks: list[int]) -> None:
+    model = pairs()
+    mission = Mission((Block(model, 1.0, 1.0, 0.5, 1.0), Block(model, 2.0, 1.0, 0.5, 2.0)), 1.0, (0, 64), SETTINGS)
+    start = MissionNode(0, np.zeros((2, 2)))
+
+    def run(place: int, depth: FloatArray, carried: Any, missions: tuple[int, ...]) -> BlockRun:
+        return exact_run(BlockCase(mission, place, depth, carried, missions, SETTINGS))
+
+    def end(parts: tuple[int, ...], steps: int) -> FloatArray:
+        node = start
+        for _ in range(steps):
+            taken = take_step(mission, node, parts, run)
+            assert isinstance(taken, Step)
+            node = taken.node
+        return node.growth
+
+    once = end((1,), 64)
+    np.testing.assert_allclose(end((1, 1), 32), once, rtol=1e-12)
+    errors = [float(np.abs(end((n // 2, n // 2), 64 // n) - once).max()) for n in (32, 16, 8)]
+    assert 3.0 < errors[0] / errors[1] < 5.0
+    assert 3.0 < errors[1] / errors[2] < 7.0
+    # uneven parts are as good
+    assert float(np.abs(end((5, 3), 8) - once).max()) < 2.0 * errors[2]
+
+
+def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks: list[int]) -> None:
+    one, other = (exactly_known((0, 40), 5.0, order, largest_step=1) for order in (1, -1))
+    many = [exactly_known((0, 40), 5.0, order) for order in (1, -1)]
+    apart = one.wear_depth[-1] - other.wear_depth[-1]
+    assert np.abs(apart).max() > 1e-4 * one.wear_depth[-1].max()
+    for literal, history in zip((one, other), many, strict=True):
+        assert (np.abs(history.wear_depth - literal.wear_depth) <= history.wear_depth_error).all()
+
+
+def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks: list[int]) -> None:
+    model = pairs()
+    blocks = (Block(model, 1.0, 1.0, 0.5, 3.0), Block(model, 2.0, 1.0, 0.5, 6.0))
+    mission, kept = Mission(blocks, 1.0, (0, 100, 301), SETTINGS), list[Packed]()
+    whole = integrate_missions(mission, keep=kept.append)
+    n_runs = len(exact_blocks)
+    for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
+        exact_blocks.clear()
+        assert equal(integrate_missions(mission, resume=kept[place]), whole)
+        assert len(exact_blocks) == n_runs - place - 1
+
+
+def equal(one: MissionHistory, other: MissionHistory) -> bool:
+    """Whether two histories are equal to the last bit, but for their run time."""
+    names = [field.name for field in fields(MissionHistory) if field.name != "run_time"]
+    return all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name not in ("message", "outcome"))
+        for name in names
+    )
+
+
+def test_a_target_ends_the_missions(exact_blocks: list[int]) -> None:
+    rows = tuple(range(0, 2001, 50))
+    whole = exactly_known(rows, 0.3)
+    value = 0.2 * float(whole.wear_depth[-1].max())
+    history = exactly_known(rows, 0.3, until=WearTarget("wear_depth", value))
+    once = exactly_known(rows, 0.3, until=WearTarget("wear_depth", value), largest_step=1)
+    assert once.missions_to_target == pytest.approx(history.missions_to_target, abs=history.missions_to_target_error)
+    assert 0.0 < history.missions_to_target_error < 0.05 * history.missions_to_target
+    assert np.isnan(history.worn_volume[-1])
+    assert np.isnan(whole.missions_to_target)
+
+
+def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And one that fails in a single mission ends the history there, with what was computed."""
+
+    def run(case: Any, like: Any = None) -> BlockRun:
+        found = exact_run(case, like)
+        lost = case.missions[-1] > 9 or case.depth.max() > limit
+        return replace(found, failure=Failure(Outcome.MARCH_FAILED, "lost")) if lost else found
+
+    monkeypatch.setattr(solutions, "run_block", run)
+    limit = 1.0
+    history = exactly_known((0, 60), 1.0)
+    assert history.outcome is Outcome.CONVERGED
+    assert history.steps.max() <= 9
+    limit = 0.5 * float(history.wear_depth[-1].max())
+    history = exactly_known((0, 60), 1.0)
+    assert history.outcome is Outcome.MARCH_FAILED
+    assert history.message == "lost"
+    assert 2 < history.last_mission < 60
+    assert np.isnan(history.worn_volume[-1])
+
+
+def test_growth_within_a_step_never_falls() -> None:
+    random = np.random.default_rng(1)
+    start = MissionNode(0, random.uniform(size=(2, 3)))
+    grown = random.uniform(size=(2, 3))
+    end = MissionNode(10, start.growth + grown, (4, start.growth + random.uniform(size=(2, 3)) * grown))
+    read = np.array([growth_within(start, end, mission) for mission in np.linspace(0.0, 10.0, 101)])
+    assert (np.diff(read, axis=0) >= -1e-15).all()
+    np.testing.assert_allclose(read[[0, -1]], [start.growth, end.growth], rtol=1e-12)
+    # a parabola is met
+    half = MissionNode(10, start.growth + grown, (4, start.growth + (0.4 + 0.24 * 0.5) * grown))
+    np.testing.assert_allclose(growth_within(start, half, 7.0), start.growth + (0.7 + 0.21 * 0.5) * grown, rtol=1e-12)
+
+
+def test_missions_that_are_read() -> None:
+    assert missions_read(1) == (0, 1)
+    assert missions_read(2) == (0, 1, 2)
+    assert missions_read(9) == (0, 1, 8, 9)
+
+
+# --- with the solver ---
+
+
+@pytest.mark.slow
+def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_last_bit() -> None:
+    """Amplitude and frequency change from block to block, and the depth takes off a third of the load."""
+    checked = tuple(replace(block, friction_coefficient=FRICTION) for block in two_blocks(cycles=4e3))
+    mission, kept = Mission(checked, WEAR, (0, 4, 8), SETTINGS), list[Packed]()
+    many = integrate_missions(mission, keep=kept.append)
+    once = integrate_missions(replace(mission, largest_step=1))
+    assert many.outcome is once.outcome is Outcome.CONVERGED
+    assert many.steps.max() > 2
+    assert (np.abs(many.wear_depth - once.wear_depth) <= many.wear_depth_error + once.wear_depth_error).all()
+    assert many.error_estimate < 2.0 * SETTINGS.rtol
+    np.testing.assert_allclose(many.response_begin, once.response_begin, rtol=0.01)
+    np.testing.assert_allclose(many.response_end, once.response_end, rtol=0.01)
+    # less load, less friction: the vibration grows
+    assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
+    assert equal(integrate_missions(mission, resume=kept[len(kept) // 2]), many)
+
+
+def test_depths_of_a_table_count_from_the_unworn_joint() -> None:
+    law = WearLaw("table", table=WearTable((0.0,), (0.0, 2e-5, 4e-5), ((1.0, 0.2, 0.0),)))
+    half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "up")
+    history = integrate((half, half), 1, law=law)
+    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, [2e4, 4e4], settings=SETTINGS, law=law)
+    bars = history.wear_depth_error[-1] + whole.wear_depth_error[-1]
+    assert (np.abs(history.wear_depth[-1] - whole.wear_depth[-1]) < bars).all()
+    assert (bars < 0.05 * whole.wear_depth[-1]).all()
+    assert history.block_volume[-1, 1] < 0.8 * history.block_volume[-1, 0]
+
+
+# --- what users may get wrong ---
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of ramp, up, down, continue instead of 'sweep'"),
+        ({"cycles": 0.0}, r"blocks\[1\]: cycles: give values above 0"),
+        ({"frequency": np.nan}, r"blocks\[1\]: frequency: give finite numbers"),
+        ({"excitation_amplitude": -1.0}, r"blocks\[1\]: excitation_amplitude: give values of at least 0"),
+        ({"excitation_amplitude": 0.0}, r"blocks\[1\]: excitation_amplitude: give values above 0"),
+        ({"friction_coefficient": [0.1, 0.2]}, r"blocks\[1\]: friction_coefficient has shape"),
+        ({"friction_coefficient": 0.4}, r"begin: continue goes with the model and friction"),
+        ({"model": scene("sdof_slider", area=2e-4)}, r"blocks.*: model: give equal contact pairs"),
+    ],
+)
+def test_a_wrong_block_is_named(changed: dict[str, Any], said: str) -> None:
+    one, other = two_blocks()
+    with pytest.raises(ValueError, match=said):
+        integrate((one, replace(other, **changed)), 10)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"missions": [1.5]}, "missions: give ascending whole numbers"),
+        ({"missions": [3, 2]}, "missions: give ascending whole numbers"),
+        ({"missions": 0}, "missions: give ascending whole numbers, the last of at least 1"),
+        ({"blocks": ()}, "blocks: give at least one block"),
+        ({"largest_step": 0}, "largest_step: give values of at least 1"),
+        ({"largest_step": 1.5}, "largest_step: give a whole number"),
+        ({"until": WearTarget("frequency_shift", 0.1)}, "until.quantity: give one of wear_depth, worn_volume"),
+        ({"sweep": "continue"}, "sweep: give one of up, down, ramp"),
+        ({"law": WearLaw("rust")}, 'wear law "rust"'),
+    ],
+)
+def test_a_wrong_mission_is_a_sentence(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        integrate(**{"blocks": two_blocks(), "missions": 10, **wrong})
+
+
+def test_a_block_without_a_start_state_is_an_outcome() -> None:
+    """The time is over before the first state."""
+    history = integrate_mission(two_blocks("up"), WEAR, 10, settings=replace(SETTINGS, time_limit=0.0))
+    assert history.outcome is Outcome.TIME_LIMIT
+    assert np.isnan(history.error_estimate) or history.last_mission == 0
+    assert np.isnan(history.worn_volume[1:]).all()
