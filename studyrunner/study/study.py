@@ -90,9 +90,7 @@ class Study(Section):
     def _check_variables(self) -> Study:
         for name in self.outputs.variables:
             if self.has_modes and name in (*ASKED, "exact") and name not in OF_MODES:
-                remedy = (
-                    f"give names out of {', '.join(OF_MODES)}: there is no wear in a study with axes.modal_amplitude"
-                )
+                remedy = f"give names out of {', '.join(OF_MODES)}, mesh: with axes.modal_amplitude nothing wears"
                 raise WrongValueError(name, remedy, "outputs.variables")
             if not self.has_modes and name in OF_MODES and name not in (*ASKED, "natural_frequency"):
                 remedy = "leave it out, or give axes.modal_amplitude: only nonlinear modes have it"
