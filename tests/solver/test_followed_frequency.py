@@ -65,6 +65,7 @@ def test_phase_resonance_is_that_of_the_exact_motion(scheme: Scheme) -> None:
         assert abs(found - expected) < error < 0.3
 
 
+@pytest.mark.slow
 def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
     history = worn("peak", rtol=1e-3)
     assert history.outcome is Outcome.CONVERGED
@@ -81,6 +82,7 @@ def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
         assert abs(response) == pytest.approx(curve(expected), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_of_two_masses_no_response_around_is_larger() -> None:
     """Brute force: responses over the frequency; the friction is constant, so that the joint does not change."""
     model, settings = scene("two_masses"), SolverSettings(harmonics=5, samples=128)
@@ -95,6 +97,7 @@ def test_of_two_masses_no_response_around_is_larger() -> None:
     assert abs(history.response[0, 0]) == pytest.approx(curve(expected), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequency() -> None:
     """Wear relaxes the spring of the slider: friction comes to its end with the wear."""
     model, settings = scene("sdof_slider", damping=DAMPING), SolverSettings(harmonics=3, samples=64)
@@ -164,6 +167,7 @@ def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
         np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)
 
 
+@pytest.mark.slow
 def test_both_sweeps_find_the_one_resonance_of_the_slider() -> None:
     model = scene("sdof_slider", damping=DAMPING)
     # the range lies in three quarter octaves, of which each has a sweep of its own
