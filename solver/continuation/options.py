@@ -89,15 +89,15 @@ class ContinuationOptions:
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
     derivative_solves: int = 4
-    """Most corrections of a derivative of the motion, each of which gains the digits of a Newton direction."""
-    derivative_error: float = 1e-6
+    """Most solves for a derivative of the motion, each of which gains the digits of a Newton direction."""
+    derivative_error: float = 1e-5
     """Relative residual of a derivative of the motion."""
 
     # largest amplitudes over the frequency
-    peak_rise: float = 1.0
+    peak_rise: float = 2.0
     """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts
-    as the largest one: its frequency is then within rtol of half the width of the resonance, and the amplitude within
-    rtol^2 / 2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
+    as the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
+    2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
     dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
     largest_peak_rise: float = 0.02
     """Upper limit of this rise, 1/rad."""

@@ -24,32 +24,41 @@ LOAD, FRICTION, WEAR = 0.5, 0.5, 1.1e-11  # N, 1, 1/Pa
 def main() -> None:
     """Print both tables."""
     model = build_scene("dovetail_sector", mesh=1)
-    cycles = np.linspace(0.0, 1e5, 11)
+    print_cost(model)
     for word in FOLLOWED:
-        history = march_wear(model, word, LOAD, FRICTION, WEAR, cycles, between=BETWEEN)
-        print(f"{word}: {history.outcome.meaning}, {1e9 * history.worn_volume[-1]:.4g} mm3")
-        for row, depth in enumerate(history.wear_depth):
-            found, error = history.excitation_frequency[row], history.excitation_frequency_error[row]
-            around = found + np.linspace(-0.2, 0.2, 9)
-            answer = frequency_response(model, around, LOAD, FRICTION, wear_depth=depth)
-            curve = np.polynomial.Polynomial.fit(around, abs(answer.response[:, 0]), 4)
-            fine = np.linspace(around[0], around[-1], 2001)
-            largest = float(fine[np.argmax(curve(fine))])
-            print(
-                f"{cycles[row]:8.0f} cycles  {found:.4f} +- {error:.4f} Hz, brute force {largest:.4f} Hz;"
-                f"  {1e3 * abs(history.response[row, 0]):.4f} +- {100 * history.response_error[row]:.2g} %,"
-                f" brute force {1e3 * curve(largest):.4f} mm",
-                flush=True,
-            )
-    at = float(march_wear(model, "resonance", LOAD, FRICTION, 0.0, 0.0, between=BETWEEN).excitation_frequency[0])
-    times: dict[str, float] = {}
-    for name, frequency in (("first", at), ("fixed", at), *((word, word) for word in FOLLOWED)):
+        print_brute_force(model, word)
+
+
+def print_brute_force(model: ReducedModel, word: Followed) -> None:
+    """Frequencies and amplitudes of a history beside the maxima of sweeps of the worn joint."""
+    history = march_wear(model, word, LOAD, FRICTION, WEAR, np.linspace(0.0, 1e5, 11), between=BETWEEN)
+    print(f"{word}: {history.outcome.meaning}, {1e9 * history.worn_volume[-1]:.4g} mm3")
+    for row, depth in enumerate(history.wear_depth):
+        found, error = history.excitation_frequency[row], history.excitation_frequency_error[row]
+        around = found + np.linspace(-0.2, 0.2, 9)
+        answer = frequency_response(model, around, LOAD, FRICTION, wear_depth=depth)
+        curve = np.polynomial.Polynomial.fit(around, abs(answer.response[:, 0]), 4)
+        fine = np.linspace(around[0], around[-1], 2001)
+        largest = float(fine[np.argmax(curve(fine))])
+        print(
+            f"{history.cycles[row]:8.0f} cycles  {found:.4f} +- {error:.4f} Hz, brute force {largest:.4f} Hz;"
+            f"  {1e3 * abs(history.response[row, 0]):.4f} mm +- {100 * history.response_error[row]:.2g} %,"
+            f" brute force {1e3 * curve(largest):.4f} mm",
+            flush=True,
+        )
+
+
+def print_cost(model: ReducedModel) -> None:
+    """CPU time of 40 followed steps over that of 40 steps at the first frequency."""
+    first = march_wear(model, "resonance", LOAD, FRICTION, 0.0, 0.0, between=BETWEEN)
+    given: tuple[float | Followed, ...] = (float(first.excitation_frequency[0]), *FOLLOWED)
+    seconds = []
+    for frequency in given:
         between = BETWEEN if isinstance(frequency, str) else None
         starting, whole = (_seconds(model, frequency, between, cycles) for cycles in (0.0, 1e4))
-        times[name] = whole - starting
-        print(f"{name}: start state {starting:.2f} s, 40 steps {times[name]:.2f} s", flush=True)
-    for word in FOLLOWED:
-        print(f"{word}: {times[word] / times['fixed']:.2f} of a fixed frequency")
+        seconds.append(whole - starting)
+        ratio = seconds[-1] / seconds[0]
+        print(f"{frequency}: start {starting:.2f} s, 40 steps {seconds[-1]:.2f} s, {ratio:.2f} of given", flush=True)
 
 
 def _seconds(
