@@ -136,7 +136,7 @@ def response_curve(
         return _reported(case, Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
     begin = PathPoint(float(first), at, balance.history)
     # a branch may turn back behind its start before it comes to the last value
-    back = max(2.0 * first - last, _LEAST_PART * first)
+    back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
     span = abs(last - first) / (CONTINUATION.longest_arc * _FEWEST_STEPS)
     branch = follow_branch_whole(balance_at, begin, last, back, span, settings.tolerance, Budget(), most)
     return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))

@@ -6,8 +6,8 @@ and of the predicted forces p of the pairs, with d = d/dt + sigma in place of d/
     M d^2 x + C d x + K x + S^T dlambda/dp p = 0,        S x = du/dp p.
 
 In harmonics this is an eigenvalue problem for sigma. Its determinant at sigma = 0 is that of the Jacobian, Eq. (16): an
-exponent passes through zero exactly at a fold of the branch. Of the copies `sigma + i k omega` of an exponent, which the
-truncated series gives ever worse, the ones with the smallest imaginary parts count (Moore, SIAM J. Numer. Anal. 42
+exponent passes through zero exactly at a fold of the branch. Of the copies `sigma + i k omega` of an exponent, which
+the truncated series gives ever worse, the ones with the smallest imaginary parts count (Moore, SIAM J. Numer. Anal. 42
 (2005) 2553). The march of `monodromy` puts impacts on whole time steps and needs very many of them.
 """
 

@@ -231,6 +231,9 @@ def test_curves_and_balances_without_a_state_say_why() -> None:
     curve = response_curve(model, (0.2, 0.26), 0.02, 0.0, settings=SETTINGS, errors=False, most_points=4)
     assert curve.outcome is Outcome.BRANCH_LOST
     assert "most_points = 4" in curve.message
+    unloaded = response_curve(model, 0.1, (0.0, 0.005), 0.0, settings=SolverSettings(harmonics=3), errors=False)
+    assert unloaded.outcome is Outcome.CONVERGED
+    assert unloaded.response[0] == 0.0
     doubled = balance_of(model, 0.146, 0.02, 0.0, settings=SETTINGS)
     assert doubled.outcome is Outcome.PERIOD_DOUBLED
     assert np.isnan(doubled.state).all()

@@ -1,0 +1,390 @@
+"""Wear of a reduced model once more, by nonsmooth time integration with cycle jumps: a second opinion.
+
+`python -m tests.benchmarks.time_integration [--mesh 1] [--frequency 211.5] [--jump 1000] [--steps 500]` prints worn
+volume and tip amplitude of the bundled dovetail root. Nothing of the solver is used but the model.
+
+- Time: backward differences of second order whose three weights are exact for the excitation frequency. With them
+  M x'' + C x' + K x + S^T lambda = f becomes x = G (r - S^T lambda) at each step, and the relative displacements of the
+  pairs are u = u_free - D lambda with a constant matrix D.
+- Contact, implicit and without penalty: Signorini u_N <= gap + depth, lambda_N >= 0, one of them equal; Coulomb with
+  the increment of u_T over a step along lambda_T, zero inside the cone. Newton's method on the set of open, sticking
+  and slipping pairs.
+- Wear: the rate of a pair, k_w / area times the sum of lambda_N |increment of u_T| over a period, of a settled motion;
+  Adams-Bashforth of second order over the jumps, the first ones graded.
+- Settling: the first mode of the glued joint dies out slowly. So its complex amplitude is found by Broyden's method on
+  the change over one period; all else settles in a few periods. A motion that does not settle ends the run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numba import njit
+
+from solver.model import FloatArray, ReducedModel
+
+_LOAD_STEPS = 20  # of the static load
+_CONTACT_ITERATIONS = 90
+_SETTLED = 1e-4  # change of the amplitude of the mode over a period, by which a step of Broyden's method would move it
+_SETTLED_WORK = 1e-3  # relative change of the slip work over a period
+_FAINT_WORK = 1e-5  # of the work of the excitation: slip work below which no change counts
+_MOST_PERIODS = 3000
+_TRIAL = 60  # periods after which Broyden's method is given up for as many plain ones, and begun again
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A model at one frequency and amplitude, for steps of equal length.
+
+    - omega, step: rad/s, s.
+    - weights (3,): of the derivative, 1/s: `weights @ (x now, before, before that)`.
+    - inertia, drag (n, n): M and C. flexibility (n, n): G, m/N.
+    - static (n,), cosine, sine (n,): loads, N. limits: friction coefficients (n_contact,).
+    - dofs (n_contact, 3), load (n_contact,): displacements of the pairs, -1 for none; constant normal forces, N.
+    - mode (n,), rate: glued mode nearest to the excitation, mass-normalised, and its exponent, 1/s; zeros for none.
+    """
+
+    omega: float
+    step: float
+    weights: FloatArray
+    inertia: FloatArray
+    drag: FloatArray
+    flexibility: FloatArray
+    static: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    limits: FloatArray
+    dofs: np.ndarray
+    load: FloatArray
+    mode: FloatArray
+    rate: complex
+
+
+@dataclass(frozen=True)
+class Motion:
+    """State at the end of a step: displacements, m, velocities, m/s (2, n), now and before; forces, N, of the pairs.
+
+    work (n_contact,): lambda_N times slip over the last period, J. responses (n_steps, n): its displacements, m.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    force: FloatArray
+    work: FloatArray
+    responses: FloatArray
+
+
+def fitted_weights(omega: float, step: float) -> FloatArray:
+    """Weights (3,) of a backward difference that is exact for constants and for exp(i omega t)."""
+    turn = np.exp(-1j * omega * step * np.arange(3))
+    rows = np.array([np.ones(3), turn.real, turn.imag])
+    return np.linalg.solve(rows, np.array([0.0, 0.0, omega]))
+
+
+def build(model: ReducedModel, friction: float, frequency: float, amplitude: float, n_steps: int) -> Structure:
+    """The model in `n_steps` steps of a period at a frequency, Hz, under an excitation amplitude, N."""
+    linear, omega = model.linear[0], 2.0 * np.pi * frequency
+    step = 2.0 * np.pi / omega / n_steps
+    weights = fitted_weights(omega, step)
+    mass, damping, stiffness = (np.real(part) for part in (linear.mass, linear.damping, linear.stiffness))
+    dofs = model.contact.dofs
+    free = np.setdiff1d(np.arange(len(mass)), dofs[dofs >= 0])
+    mode, rate = np.zeros(len(mass)), 0.0 + 0.0j
+    if free.size and np.abs(mass[np.ix_(free, free)]).max() > 0.0:
+        squares, shapes = scipy.linalg.eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
+        nearest = int(np.argmin(np.abs(np.sqrt(np.abs(squares)) - omega)))
+        mode[free] = shapes[:, nearest]
+        rate = -0.5 * float(mode @ damping @ mode) + 1j * float(np.sqrt(squares[nearest]))
+    return Structure(
+        omega, step, weights, mass, damping, np.linalg.inv(weights[0] ** 2 * mass + weights[0] * damping + stiffness),
+        linear.load_static, amplitude * linear.load_harmonic.real, -amplitude * linear.load_harmonic.imag,
+        np.full(len(dofs), friction), dofs, np.where(dofs[:, 0] < 0, model.contact.normal_load, 0.0), mode, rate,
+    )  # fmt: skip
+
+
+def spread(matrix: FloatArray, dofs: np.ndarray) -> FloatArray:
+    """Rows and columns (3 n_contact, 3 n_contact) of a matrix (n, n) at the displacements of the pairs, 0 for none."""
+    places = dofs.ravel()
+    there = (places >= 0).astype(float)
+    return matrix[np.ix_(places, places)] * np.multiply.outer(there, there)
+
+
+@njit(cache=True)
+def solve_contact(
+    free: FloatArray, before: FloatArray, flexibility: FloatArray, gap: FloatArray, limits: FloatArray,
+    load: FloatArray, dofs: np.ndarray, force: FloatArray,
+) -> tuple[FloatArray, bool]:  # fmt: skip
+    """Contact forces (3 n_contact,), N, of a step, and whether they were found.
+
+    - free, before (3 n_contact,): displacements without contact forces, and those of the last step, m.
+    - flexibility (3 n_contact, 3 n_contact): m/N. gap (n_contact,): depth included, m. force: first guess, N.
+    """
+    n = limits.size
+    for iteration in range(_CONTACT_ITERATIONS):
+        moved = free - flexibility @ force
+        matrix, right = np.eye(3 * n), np.zeros(3 * n)
+        for i in range(n):
+            a = 3 * i
+            normal = load[i]
+            if dofs[i, 0] >= 0:
+                pushed = force[a] + (moved[a] - gap[i]) / flexibility[a, a]
+                if pushed <= 0.0:
+                    continue
+                matrix[a], right[a] = flexibility[a] / flexibility[a, a], (free[a] - gap[i]) / flexibility[a, a]
+                normal = pushed
+            else:
+                right[a] = load[i]
+            size = max(flexibility[a + 1, a + 1], flexibility[a + 2, a + 2])
+            if size == 0.0:
+                continue
+            pull = force[a + 1 : a + 3] + (moved[a + 1 : a + 3] - before[a + 1 : a + 3]) / size
+            for k in range(2):
+                if dofs[i, k + 1] < 0:
+                    pull[k] = 0.0
+            most, length = limits[i] * normal, np.hypot(pull[0], pull[1])
+            for k in range(2):
+                row = a + 1 + k
+                if dofs[i, k + 1] < 0:
+                    continue
+                if length <= most:
+                    matrix[row], right[row] = flexibility[row] / size, (free[row] - before[row]) / size
+                    continue
+                # lambda_T = mu lambda_N pull / |pull|, linearised in lambda
+                matrix[row, a] = -limits[i] * pull[k] / length
+                for j in range(2):
+                    turn = most / length * ((k == j) - pull[k] * pull[j] / length**2)
+                    matrix[row, a + 1 + j] -= turn
+                    matrix[row] += turn * flexibility[a + 1 + j] / size
+                    right[row] += turn * (free[a + 1 + j] - before[a + 1 + j]) / size
+                if dofs[i, 0] < 0:
+                    matrix[row, a] = 0.0
+                    right[row] += limits[i] * load[i] * pull[k] / length
+        change = np.linalg.solve(matrix, right) - force
+        # shorter steps where the sets go round in circles
+        force = force + (1.0 if iteration < 20 else 0.5) * change
+        if np.abs(change).max() <= 1e-10 * (np.abs(force).max() + 1e-30):
+            return force, True
+    return force, False
+
+
+@njit(cache=True)
+def march(
+    x: FloatArray, v: FloatArray, force: FloatArray, gap: FloatArray, loads: FloatArray, weights: FloatArray,
+    inertia: FloatArray, drag: FloatArray, flexibility: FloatArray, contact: FloatArray, limits: FloatArray,
+    load: FloatArray, dofs: np.ndarray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, bool]:  # fmt: skip
+    """Steps under the loads (n_steps, n), N: state as in `Motion`, work, displacements, and whether all were found."""
+    n_steps, n = loads.shape
+    pairs, work, seen = limits.size, np.zeros(limits.size), np.zeros((n_steps, n))
+    x, v = x.copy(), v.copy()
+    before, free = np.zeros(3 * pairs), np.zeros(3 * pairs)
+    for step in range(n_steps):
+        known = weights[1] * x[0] + weights[2] * x[1]
+        push = loads[step] - drag @ known - inertia @ (weights[0] * known + weights[1] * v[0] + weights[2] * v[1])
+        now = flexibility @ push
+        for i in range(pairs):
+            for k in range(3):
+                if dofs[i, k] >= 0:
+                    free[3 * i + k], before[3 * i + k] = now[dofs[i, k]], x[0, dofs[i, k]]
+        force, found = solve_contact(free, before, contact, gap, limits, load, dofs, force)
+        if not found:
+            return x, v, force, work, seen, False
+        for i in range(pairs):
+            for k in range(3):
+                if dofs[i, k] >= 0:
+                    push[dofs[i, k]] -= force[3 * i + k]
+        now = flexibility @ push
+        for i in range(pairs):
+            slip = 0.0
+            for k in range(1, 3):
+                if dofs[i, k] >= 0:
+                    slip += (now[dofs[i, k]] - x[0, dofs[i, k]]) ** 2
+            work[i] += force[3 * i] * np.sqrt(slip)
+        speed = weights[0] * now + known
+        x[1], v[1] = x[0], v[0]
+        x[0], v[0], seen[step] = now, speed, now
+    return x, v, force, work, seen, True
+
+
+def advance(structure: Structure, motion: Motion, gap: FloatArray, loads: FloatArray) -> Motion:
+    """The motion after steps under loads (n_steps, n), N. Raises RuntimeError where a step has no solution."""
+    contact = spread(structure.flexibility, structure.dofs)
+    s = structure
+    *state, found = march(
+        motion.x, motion.v, motion.force, gap, loads, s.weights, s.inertia, s.drag, s.flexibility, contact, s.limits,
+        s.load, s.dofs,
+    )  # fmt: skip
+    if not found:
+        raise RuntimeError("a step in time has no contact forces")
+    return Motion(*state)
+
+
+def one_period(structure: Structure, motion: Motion, gap: FloatArray) -> Motion:
+    """The motion a period later; it ends at phase 0 of the excitation."""
+    n_steps = round(2.0 * np.pi / (structure.omega * structure.step))
+    phases = 2.0 * np.pi * np.arange(1, n_steps + 1) / n_steps
+    varying = np.outer(np.cos(phases), structure.cosine) + np.outer(np.sin(phases), structure.sine)
+    return advance(structure, motion, gap, structure.static + varying)
+
+
+def at_rest(model: ReducedModel, structure: Structure, gap: FloatArray) -> Motion:
+    """Static state: the static load is raised in steps, with friction, and held; a drag omega^2 M holds loose parts."""
+    linear = model.linear[0]
+    n, s = len(linear.mass), structure
+    drag = s.omega**2 * s.inertia
+    stiffness = np.real(linear.stiffness)
+    still = replace(
+        s, inertia=np.zeros((n, n)), drag=drag, weights=np.array([1.0, -1.0, 0.0]),
+        flexibility=np.linalg.inv(stiffness + drag),
+    )  # fmt: skip
+    start = Motion(np.zeros((2, n)), np.zeros((2, n)), np.zeros(s.dofs.size), np.zeros(len(s.dofs)), np.zeros((1, n)))
+    shares = np.minimum(np.arange(1, 5 * _LOAD_STEPS + 1) / _LOAD_STEPS, 1.0)
+    found = advance(still, start, gap, np.outer(shares, s.static))
+    return replace(found, x=np.repeat(found.x[:1], 2, axis=0), v=np.zeros((2, n)))
+
+
+def amplitude_of_mode(structure: Structure, motion: Motion) -> complex:
+    """Complex amplitude Q of the glued mode at the end of a period, phase 0: q = Re Q, q' = Re(i omega Q)."""
+    share = structure.mode @ structure.inertia
+    mean = share @ motion.responses.mean(axis=0)
+    return complex(share @ motion.x[0] - mean, -(share @ motion.v[0]) / structure.omega)
+
+
+def push_mode(structure: Structure, motion: Motion, change: complex) -> Motion:
+    """The motion with another amplitude of the glued mode, which moves no pair."""
+    turns = change * np.exp(-1j * structure.omega * structure.step * np.arange(2))
+    return replace(
+        motion,
+        x=motion.x + np.outer(turns.real, structure.mode),
+        v=motion.v + np.outer((1j * structure.omega * turns).real, structure.mode),
+    )
+
+
+def settle(
+    structure: Structure, motion: Motion, gap: FloatArray, work_change: float = _SETTLED_WORK
+) -> tuple[Motion, int]:
+    """The periodic motion to which a motion comes, and the periods that it took. Raises RuntimeError if it does not.
+
+    work_change: relative change of the slip work over a period; a mass on rigid ground turns on whole steps only.
+    """
+    motion = one_period(structure, motion, gap)
+    period = 2.0 * np.pi / structure.omega
+    growth = np.exp((structure.rate - 1j * structure.omega) * period) - 1.0 if structure.rate else -1.0 + 0.0j
+    linear = np.array([[growth.real, -growth.imag], [growth.imag, growth.real]])
+    slope, last, calm = linear, None, 0
+    for periods in range(2, _MOST_PERIODS):
+        here, work = amplitude_of_mode(structure, motion), motion.work
+        moved = one_period(structure, motion, gap)
+        change = amplitude_of_mode(structure, moved) - here
+        defect = np.array([change.real, change.imag])
+        if last is not None and structure.rate:
+            step, before = last
+            slope = slope + np.outer(defect - before - slope @ step, step) / max(float(step @ step), 1e-300)
+        correction = -np.linalg.solve(slope, defect)
+        size = max(abs(here), 1e-300)
+        faint = _FAINT_WORK * np.pi * size * abs(structure.mode @ (structure.cosine - 1j * structure.sine))
+        still = np.abs(moved.work - work).max() <= work_change * max(float(moved.work.max()), faint)
+        calm = calm + 1 if still and np.linalg.norm(correction) <= _SETTLED * size else 0
+        if calm >= 2:
+            return moved, periods
+        if periods % _TRIAL == 0:
+            slope, last = linear, None
+        elif structure.rate and periods // _TRIAL % 2 == 0:
+            correction *= min(1.0, 0.3 * size / max(float(np.linalg.norm(correction)), 1e-300))
+            # the motion after this period has moved by `defect` already
+            moved = push_mode(structure, moved, complex(*(correction - defect)))
+            last = correction, defect
+        motion = moved
+    raise RuntimeError(f"the motion does not settle in {_MOST_PERIODS} periods")
+
+
+def sweep(
+    model: ReducedModel, friction: float, frequencies: FloatArray, amplitude: float, n_steps: int
+) -> tuple[Structure, Motion]:
+    """Unworn settled motion at the last of some frequencies, Hz, each from the one before, the first from rest."""
+    gap = model.contact.gap
+    structure = build(model, friction, float(frequencies[0]), amplitude, n_steps)
+    motion = at_rest(model, structure, gap)
+    for frequency in frequencies.tolist():
+        structure = build(model, friction, frequency, amplitude, n_steps)
+        motion, _ = settle(structure, motion, gap)
+    return structure, motion
+
+
+def wear(
+    model: ReducedModel,
+    structure: Structure,
+    motion: Motion,
+    wear_coefficient: float,
+    jumps: FloatArray,
+    work_change: float = _SETTLED_WORK,
+) -> Iterator[tuple[float, FloatArray, Motion, int]]:
+    """Cycle count, depths (n_contact,), m, settled motion and its periods, after each of the jumps, cycles."""
+    depth, cycle = np.zeros(model.contact.n_contact), 0.0
+    last_rate, last_jump = None, 1.0
+    for jump in jumps.tolist():
+        rate = wear_coefficient * motion.work / model.contact.area
+        ahead = rate if last_rate is None else rate + 0.5 * jump / last_jump * (rate - last_rate)
+        depth = depth + jump * np.maximum(ahead, 0.0)
+        cycle += jump
+        last_rate, last_jump = rate, jump
+        motion, periods = settle(structure, motion, model.contact.gap + depth, work_change)
+        yield cycle, depth, motion, periods
+
+
+def graded(jump: float, cycles: float, first: float = 0.01) -> FloatArray:
+    """Jumps that grow from a share of the full length by 1.5 each, and end at a number of cycles."""
+    lengths = []
+    length = first * jump
+    while sum(lengths) < cycles * (1.0 - 1e-12):
+        lengths.append(min(length, cycles - sum(lengths)))
+        length = min(1.5 * length, jump)
+    return np.array(lengths)
+
+
+def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np.ndarray:
+    """First harmonic (n_rows,), m, of some displacements; rows (n_rows, n)."""
+    phase = 2.0 * np.pi * np.arange(1, len(motion.responses) + 1) / len(motion.responses)
+    return 2.0 * (np.exp(-1j * phase) @ (motion.responses @ rows.T)) / len(phase)
+
+
+def main() -> None:
+    """Worn volume and tip of the dovetail root."""
+    from studies import build_scene
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    for name, value in (("mesh", 1), ("steps", 500), ("nodes", 40)):
+        parser.add_argument(f"--{name}", type=int, default=value)
+    for name, value in (("frequency", 211.5), ("jump", 1000.0), ("cycles", 1e5), ("amplitude", 0.5), ("begin", 0.97)):
+        parser.add_argument(f"--{name}", type=float, default=value)
+    given = parser.parse_args()
+    model = build_scene("dovetail_sector", mesh=given.mesh)
+    frequencies = given.frequency * (1.0 - (1.0 - given.begin) * np.linspace(1.0, 0.0, given.nodes) ** 1.5)
+    began = time.process_time()
+    structure, motion = sweep(model, 0.5, frequencies, given.amplitude, given.steps)
+    rows = np.real(model.linear[0].response)
+    tip = 1e3 * abs(first_harmonic(structure, motion, rows)[0])
+    print(
+        f"unworn: tip {tip:.4f} mm, slip work {motion.work.sum():.4e} J, {time.process_time() - began:.0f} CPU s",
+        flush=True,
+    )
+    shown = 0.0
+    for cycle, depth, now, periods in wear(model, structure, motion, 1.1e-11, graded(given.jump, given.cycles)):
+        if cycle >= shown or cycle >= given.cycles * (1.0 - 1e-12):
+            shown = cycle + 0.05 * given.cycles
+            volume = 1e9 * float(depth @ model.contact.area)
+            tip = 1e3 * abs(first_harmonic(structure, now, rows)[0])
+            spent = time.process_time() - began
+            print(
+                f"{cycle:8.0f} cycles: {volume:.4f} mm3, tip {tip:.4f} mm, {periods} periods, {spent:.0f} CPU s",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

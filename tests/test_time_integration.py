@@ -1,0 +1,155 @@
+"""The plain time integration of the benchmarks: against closed forms, and nonlinear modes against its free decay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import backbone, build_model
+from solver.model import FloatArray, ReducedModel
+from tests.benchmarks.time_integration import (
+    Motion,
+    Structure,
+    advance,
+    at_rest,
+    build,
+    first_harmonic,
+    fitted_weights,
+    graded,
+    one_period,
+    settle,
+    wear,
+)
+from tests.references import den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
+from tests.solver.models import scene
+
+MASS, STIFFNESS, FREQUENCY, FORCE = 0.1, 1.6e5, 160.0, 10.0
+OMEGA = 2.0 * np.pi * FREQUENCY
+
+
+def test_the_differences_are_exact_for_the_excitation() -> None:
+    weights = fitted_weights(3.0, 0.02)
+    times = 0.7 - 0.02 * np.arange(3)
+    assert weights @ np.cos(3.0 * times) == pytest.approx(-3.0 * np.sin(2.1), rel=1e-9)
+    assert weights.sum() == pytest.approx(0.0, abs=1e-9)
+    # those of a short step are the usual ones
+    np.testing.assert_allclose(0.02 * fitted_weights(1e-2, 0.02), [1.5, -2.0, 0.5], rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form() -> None:
+    """Of first order, with some noise: the mass turns on whole steps."""
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    path = 4.0 * den_hartog_amplitude(MASS, STIFFNESS, FORCE, 5.0, OMEGA)
+    first = abs(slider_orbit(MASS, 0.0, STIFFNESS, FORCE, 5.0, OMEGA).harmonic(0))
+    errors = []
+    for n_steps in (200, 3200):
+        structure = build(model, 0.5, FREQUENCY, FORCE, n_steps)
+        motions = [at_rest(model, structure, model.contact.gap)]
+        for _ in range(40):
+            motions.append(one_period(structure, motions[-1], model.contact.gap))
+        found = np.mean([abs(first_harmonic(structure, motion, np.eye(1))[0]) for motion in motions[-8:]])
+        work = np.mean([motion.work[0] for motion in motions[-8:]])
+        errors.append(max(abs(found / first - 1.0), abs(work / (10.0 * path) - 1.0)))
+    assert errors[0] < 1e-2
+    assert errors[1] < min(0.4 * errors[0], 2e-3)
+
+
+@pytest.mark.slow
+def test_wear_of_a_slider_follows_its_differential_equation() -> None:
+    model = scene("sdof_slider", damping=8.0)
+    structure = build(model, 0.5, FREQUENCY, FORCE, 400)
+    gap, jumps = model.contact.gap, graded(2e4, 1e5, 0.1)
+    assert jumps.sum() == pytest.approx(1e5)
+    motion, _ = settle(structure, at_rest(model, structure, gap), gap, work_change=5e-3)
+    # the mount of the closing displacement is massless
+    for part in (np.full(1, 0.0), np.full(1, 1e-9)):
+        assert at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
+    *_, (cycle, depth, _, _) = wear(model, structure, motion, 1.1e-11, jumps, work_change=5e-3)
+    exact = slider_wear_depth(
+        np.array([0.0, 1e5]),
+        wear_coefficient=1.1e-11,
+        area=1e-4,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA),
+    )
+    assert cycle == pytest.approx(1e5)
+    assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
+
+
+def free_decay(structure: Structure, motion: Motion, gap: FloatArray, periods: int) -> FloatArray:
+    """Displacements (n_times, n), m, without excitation from a motion on, in the steps of the structure."""
+    n_steps = round(2.0 * np.pi / (structure.omega * structure.step))
+    loads = np.repeat(structure.static[None], n_steps, axis=0)
+    seen = []
+    for _ in range(periods):
+        motion = advance(structure, motion, gap, loads)
+        seen.append(motion.responses)
+    return np.concatenate(seen)
+
+
+def decay_of(signal: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Amplitude, frequency, Hz, and damping ratio of each cycle of a decaying signal (n_times,).
+
+    From its peaks up and down, each by a parabola through three samples: amplitude over half a cycle to both sides.
+    """
+    middle = signal[1:-1]
+    turns = 1 + np.flatnonzero((middle - signal[:-2]) * (signal[2:] - middle) < 0.0)
+    left, here, right = signal[turns - 1], signal[turns], signal[turns + 1]
+    offset = 0.5 * (left - right) / (left - 2.0 * here + right)
+    times, peaks = step * (turns + offset), here - 0.25 * (left - right) * offset
+    heights = 0.5 * np.abs(np.diff(peaks))
+    middles = 0.5 * (times[1:] + times[:-1])
+    span = middles[2:] - middles[:-2]
+    rate = np.log(heights[:-2] / heights[2:])
+    return heights[1:-1], 1.0 / span, rate / np.hypot(2.0 * np.pi, rate)
+
+
+def decaying(
+    model: ReducedModel, place: int, pull: float, frequency: float, periods: int
+) -> tuple[Structure, tuple[FloatArray, ...]]:
+    """Free decay of a displacement that is let go at `pull`, m: amplitude, frequency, Hz, damping ratio by cycle."""
+    structure = build(model, 0.5, frequency, 0.0, 400)
+    rest = at_rest(model, structure, model.contact.gap)
+    begun = rest.x.copy()
+    begun[:, place] += pull
+    signal = free_decay(structure, replace(rest, x=begun), model.contact.gap, periods)[:, place]
+    return structure, decay_of(signal, structure.step)
+
+
+def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle() -> None:
+    model, limit = scene("sdof_slider", normal_stiffness=0.0), 5.0 / STIFFNESS
+    natural = np.sqrt(STIFFNESS / MASS) / (2.0 * np.pi)
+    _, (amplitude, frequency, damping) = decaying(model, 0, 30.0 * limit, natural, 6)
+    np.testing.assert_allclose(np.diff(amplitude), -2.0 * limit, rtol=0.03)
+    np.testing.assert_allclose(frequency, natural, rtol=2e-3)
+    exact = np.log((amplitude + 2.0 * limit) / (amplitude - 2.0 * limit))
+    np.testing.assert_allclose(damping, exact / np.hypot(exact, 2.0 * np.pi), rtol=0.03)
+
+
+@pytest.mark.slow
+def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_three_amplitudes() -> None:
+    """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
+    # of the stiffness of the tip a twelfth goes over the foot, which sticks up to 25 N
+    model = build_model(
+        np.diag([1e-3, 1e-3, 0.2]),
+        1e-6 * np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]]),
+        np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]]),
+        [[0, 1, -1]],
+        1e-4,
+        load_static=[50.0, 0.0, 0.0],
+        load_harmonic=[0.0, 0.0, 1.0],
+        response=[2],
+    )
+    modal = np.array([8e-5, 2e-4, 8e-4])
+    mode = backbone(model, modal, 0.5)
+    tips = abs(mode.response[:, 0])
+    _, (amplitude, frequency, damping) = decaying(model, 2, 1.5 * float(tips[-1]), float(mode.frequency[1]), 160)
+    for place, tip in enumerate(tips.tolist()):
+        seen, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
+        assert seen == pytest.approx(mode.frequency[place], rel=2e-3)
+        assert damped == pytest.approx(mode.damping_ratio[place], rel=0.05)
