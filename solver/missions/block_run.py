@@ -41,6 +41,7 @@ class BlockRun:
     like: what the reference solution takes over.
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
+    begins_alike: whether each mission begins with the first response, as a passage does.
     swiftness: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
     """
 
@@ -56,6 +57,7 @@ class BlockRun:
     like: Like | None = None
     last: StartState | None = None
     iterations: int = 0
+    begins_alike: bool = False
     swiftness: float = 0.0
 
     @property

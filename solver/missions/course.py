@@ -141,6 +141,7 @@ def responses_of(first: int, runs: tuple[BlockRun, ...]) -> tuple[Responses, ...
     n = runs[0].missions[-1]
     found = []
     for mission in dict.fromkeys((0, n - 1)):
-        begin, end = (np.array([run.response[run.missions.index(at)] for run in runs]) for at in (mission, mission + 1))
-        found.append(Responses(first + mission, begin, end))
+        begin = [run.response[0 if run.begins_alike else run.missions.index(mission)] for run in runs]
+        end = [run.response[run.missions.index(mission + 1)] for run in runs]
+        found.append(Responses(first + mission, np.array(begin), np.array(end)))
     return tuple(found)

@@ -120,7 +120,9 @@ def _errors(
     met = Met(ends, np.abs(own - at_ends) @ area)
     error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
     # the error of the start states remains, even where later states agree by chance
-    error = np.fmax(error, fine.growth_at(counts) @ area @ _start_errors(fine, reference, area))
+    of_blocks, at_start = fine.growth_at(counts) @ area, _start_errors(fine, reference, area)
+    # the error of a block that wears nothing may be unknown
+    error = np.fmax(error, np.where(of_blocks > 0.0, np.fmax(of_blocks, 1e-300) * at_start, 0.0).sum(axis=1))
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
     unknown = np.isfinite(volume) & ~np.isfinite(other).all(axis=1) & (volume > 0.0)
     relative[unknown] = np.inf

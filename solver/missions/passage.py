@@ -15,7 +15,7 @@ A slow passage finds the steady states: it has to be slow against the decay of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -102,6 +102,7 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
         like=Like((), float("nan"), iterations),
         last=spots[-1].start if case.mission.continued_by(case.place) else None,
         iterations=iterations,
+        begins_alike=True,
         swiftness=swiftness(passage, first.spots),
     )
     return in_rows(found)
@@ -173,16 +174,17 @@ def interval_errors(spots: list[Spot], area: FloatArray) -> FloatArray:
 def _states(case: BlockCase, passage: Passage, depth: FloatArray, frequencies: FloatArray) -> list[Spot] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
     began, block = computing_time(), case.block
-    left = replace(case.settings, time_limit=case.settings.time_limit)
     model, sweep = worn(block.model, depth), passage.sweep
     found = []
-    branch = follow_branch(model, block.friction_coefficient, block.excitation_amplitude, frequencies, sweep, left)
+    branch = follow_branch(
+        model, block.friction_coefficient, block.excitation_amplitude, frequencies, sweep, case.settings
+    )
     for index, start in branch:
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() - began > case.settings.time_limit:
             return Failure(Outcome.TIME_LIMIT)
-        of_state = build_case(model, block.friction_coefficient, start.penalty_omega, left, start.resolution)
+        of_state = build_case(model, block.friction_coefficient, start.penalty_omega, case.settings, start.resolution)
         work = WearingJoint.of(of_state, start.state, case.mission.wear_coefficient, case.law)
         # the limit of the explicit step is not asked for
         begun = work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from solver.clock import computing_time
-from solver.missions.block_run import BlockCase, BlockRun, run_block
+from solver.missions.block_run import BlockCase, BlockRun, not_flown, run_block
 from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
 from solver.missions.options import MISSIONS
@@ -20,6 +20,7 @@ from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
+from solver.wear.integrate import guarded
 from solver.wear.interpolation import fraction_where
 from solver.wear.state import Failure
 
@@ -140,7 +141,8 @@ class MissionSolutions:
             left = replace(settings, time_limit=settings.time_limit - self.spent)
             case = BlockCase(self.mission, place, depth, carried, missions, left)
             through = run_passage if isinstance(case.block.frequency, Passage) else run_block
-            found = through(case, None if like is None else like.likes[place])
+            flown = guarded(lambda: through(case, None if like is None else like.likes[place]))
+            found = not_flown(case, flown, 0) if isinstance(flown, Failure) else flown
             if found.failure.outcome is not Outcome.TIME_LIMIT:
                 # with more time it goes on from the block before
                 self.progress = replace(self.progress, runs=(*self.progress.runs, found), spent=self.spent)
@@ -162,7 +164,8 @@ class MissionSolutions:
         if length > MISSIONS.first_step and wanted < MISSIONS.step_safety * length:
             self._shorten(length, wanted)
             return
-        ahead = int(np.clip(wanted, MISSIONS.first_step, MISSIONS.largest_step_ratio * length))
+        longest = MISSIONS.first_step if length == 1 else MISSIONS.largest_step_ratio * length
+        ahead = int(np.clip(wanted, MISSIONS.first_step, longest))
         self.progress = replace(self.progress, fine=_longer(course, step), length=ahead, runs=())
 
     def _shorten(self, length: int, wanted: float) -> None:
