@@ -257,7 +257,7 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
     head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
     untouched = [] if summary.written else [f"{path} is the finished result that it was"]
-    samples = []
+    samples: list[str] = []
     if study.scatter is not None and summary.written:
         from studyrunner.sample_lines import describe_samples  # where it is used: it takes a second to load
 

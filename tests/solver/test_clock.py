@@ -40,6 +40,7 @@ def test_compiling_takes_no_computing_time() -> None:
     assert 0.0 <= computing < 0.2 * cpu
 
 
+@pytest.mark.slow
 def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = SolverSettings(harmonics=3, samples=64)
     model = scene("sdof_slider", 3)

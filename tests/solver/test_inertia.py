@@ -267,6 +267,7 @@ def assert_derivative(case: MassCase, slack: float = 1e-6) -> int:
     return away
 
 
+@pytest.mark.slow
 def test_the_derivative_goes_through_the_closure_of_the_period() -> None:
     # masses that turn without ever stopping remember their start for many periods: of the derivative of the velocity at
     # the start nothing may be left out
