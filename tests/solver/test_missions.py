@@ -285,12 +285,12 @@ def test_missions_that_are_read() -> None:
 @pytest.mark.slow
 def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_last_bit() -> None:
     """Amplitude and frequency change from block to block."""
-    checked = tuple(replace(block, friction_coefficient=FRICTION) for block in two_blocks(cycles=500.0))
+    checked = tuple(replace(block, friction_coefficient=FRICTION) for block in two_blocks(cycles=300.0))
     mission, kept = Mission(checked, WEAR, (0, 3, 6), SETTINGS), list[Packed]()
     many = integrate_missions(mission, keep=kept.append)
     once = integrate_missions(replace(mission, largest_step=1))
     assert many.outcome is once.outcome is Outcome.CONVERGED
-    assert many.steps.tolist() == [2, 4]
+    assert many.steps.max() > 2
     assert (np.abs(many.wear_depth - once.wear_depth) <= many.wear_depth_error + once.wear_depth_error).all()
     assert many.error_estimate < 2.0 * SETTINGS.rtol
     # missions whose responses are known
@@ -298,7 +298,7 @@ def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_
     np.testing.assert_allclose(many.response_end[[0, 2]], once.response_end[[0, 2]], rtol=0.03)
     # less load, less friction: the vibration grows
     assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
-    assert equal(integrate_missions(mission, resume=kept[len(kept) // 2]), many)
+    assert equal(integrate_missions(mission, resume=kept[-4]), many)
 
 
 @pytest.mark.slow
@@ -348,7 +348,7 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies() -> None:
     history = integrate((block,), 1)
     mission = Mission((block,), WEAR, (0, 1), SETTINGS)
     case = BlockCase(mission, 0, np.zeros(1), None, (0, 1), SETTINGS)
-    grid = np.linspace(185.0, 215.0, 41)
+    grid = np.linspace(185.0, 215.0, 33)
     fixed = _states(case, passage, case.depth, grid)
     assert isinstance(fixed, list)
     volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
