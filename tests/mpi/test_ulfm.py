@@ -42,11 +42,14 @@ def run_and_kill(
 ) -> Ended:
     """A run of which a rank is killed after so many histories; no process outlives it, and it never hangs.
 
-    Rank 0 is killed when some of them are on the disk, too, which takes its time where others use it.
+    Rank 0 is killed when some of them are on the disk, too, which takes its time where others use it. What is counted
+    may be of a transaction that is not complete: with the third count those before are.
     """
+    counts = set()
 
     def is_time() -> bool:
-        return count_noted(folder) >= n_noted and (rank != 0 or count_rows("results", folder / "out.nc") > 0)
+        counts.add(count_rows("results", folder / "out.nc") if rank == 0 else 0)
+        return count_noted(folder) >= n_noted and (rank != 0 or len(counts - {0}) >= 3)
 
     def kill(running: Running) -> None:
         if rank is not None:
