@@ -51,7 +51,7 @@ def bdf2_attempt(work: WearingJoint, state: WearState, length: float) -> Attempt
         base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
         factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
     balance = Balance(joint, state.point.history, base, work.gain(factor * length), work.wearing)
-    end = work.solved(state, balance, length)
+    end = work.solved(state, *work.predicted(state, balance, length))
     if end is None:
         return None
     new = end.point.evaluation

@@ -46,8 +46,11 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     base = PathPoint(0.0, state.point.evaluation, state.point.history)
     balance_at = euler_balance(joint, scheme, base.evaluation, length, work.wear_coefficient, work.wearing)
     whole = balance_at(1.0, base.history)
-    if (state.change is not None or work.follow is not None) and (end := work.solved(state, whole, length)) is not None:
-        return _euler(work, state, end, length)
+    start, whole = work.predicted(state, whole, length)
+    if work.follow is not None or start is not base.evaluation.predicted_h:
+        end = work.solved(state, start, whole)
+        if end is not None:
+            return _euler(work, state, end, length)
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
     shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
@@ -71,7 +74,8 @@ def _shortened(work: WearingJoint, state: WearState, length: float, balance_at: 
     """A step at the frequency that is followed, halved until its end is found; shortest: as a fraction of the step."""
     fraction = 0.5
     while fraction >= shortest and not work.budget.exhausted:
-        end = work.solved(state, balance_at(fraction, state.point.history), fraction * length)
+        balance = balance_at(fraction, state.point.history)
+        end = work.solved(state, *work.predicted(state, balance, fraction * length))
         if end is not None:
             return _euler(work, state, end, fraction * length)
         fraction *= 0.5

@@ -160,10 +160,9 @@ class WearingJoint:
             state = replace(state, step_limit=limit)
         return state
 
-    def solved(self, state: WearState, balance: Balance, length: float) -> Reached | None:
-        """End of a step of `length` cycles with this balance; None where it is not found."""
+    def solved(self, state: WearState, start: FloatArray, balance: Balance) -> Reached | None:
+        """End of a step from a state, with values from `predicted`; None where it is not found."""
         settings, most = self.case.settings, WEAR.step_iterations
-        start, balance = self.predicted(state, balance, length)
         if self.follow is not None:
             return end_at_resonance(self.case, balance, start, state, self.follow, self.solver, self.budget)
         found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)
