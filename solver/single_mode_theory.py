@@ -36,7 +36,7 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     With the natural frequency omega, the damping ratio zeta and the mass-normalised shape phi at the modal amplitude a,
 
-        (omega^2 - Omega^2 + 2 i zeta omega Omega) q = phi^H F,      |q| = a,
+        (omega^2 - Omega^2 + 2 i zeta omega Omega) q = phi^H F,      abs(q) = a,
 
     is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
     above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142

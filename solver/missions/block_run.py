@@ -42,7 +42,7 @@ class BlockRun:
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
     begins_alike: whether each mission begins with the first response, as a passage does.
-    swiftness: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
+    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
     """
 
     missions: tuple[int, ...]
@@ -58,7 +58,7 @@ class BlockRun:
     last: StartState | None = None
     iterations: int = 0
     begins_alike: bool = False
-    swiftness: float = 0.0
+    sweep_rate: float = 0.0
 
     @property
     def completed(self) -> bool:

@@ -60,7 +60,7 @@ class MissionCourse:
     start_rates (n_block, n_contact): wear rates at the starts of the blocks of the first mission, m per cycle.
     start_errors (n_block,): estimated relative errors of these rates.
     inaccurate (n_block,): largest error of a state of each block above rtol, 0 where there is none.
-    swiftness (n_block,): largest `BlockRun.swiftness` of each block.
+    sweep_rate (n_block,): largest `BlockRun.sweep_rate` of each block.
     held, cut_off: number of missions from which on a block has `BlockRun.held`, `BlockRun.cut_off`; NaN if never.
     iterations: Newton iterations.
     """
@@ -70,7 +70,7 @@ class MissionCourse:
     start_rates: FloatArray
     start_errors: FloatArray
     inaccurate: FloatArray
-    swiftness: FloatArray
+    sweep_rate: FloatArray
     held: float = float("nan")
     cut_off: float = float("nan")
     iterations: int = 0

@@ -82,7 +82,7 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
         wear_depth_error=of_pairs,
         block_volume=volumes,
         reference_volume=other @ area,
-        swiftness=fine.swiftness,
+        sweep_rate=fine.sweep_rate,
         error_estimate=float(relative[reached[-1]]) if reached.size else math.nan,
         last_mission=float(fine.ends[-1]),
         steps=np.diff(fine.ends),
@@ -184,9 +184,9 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
         remarks.append(
             f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
         )
-    for place in np.flatnonzero(fine.swiftness > MISSIONS.largest_swiftness):
-        swift = "too swift for the steady states that it is computed from: its rate over (zeta f)^2 is"
-        remarks.append(f"{_called(mission, int(place))} is {swift} {fine.swiftness[place]:.2g}")
+    for place in np.flatnonzero(fine.sweep_rate > MISSIONS.largest_sweep_rate):
+        too_fast = "too fast for the steady states that it is computed from: its sweep rate over (zeta f)^2 is"
+        remarks.append(f"{_called(mission, int(place))} is {too_fast} {fine.sweep_rate[place]:.2g}")
     if not math.isnan(fine.cut_off):
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
     if error > SENSITIVE_ERROR:

@@ -72,7 +72,7 @@ def _as_missions(
         response_begin=begin,
         response_end=end,
         reference_volume=history.reference_volume[rows],
-        swiftness=np.zeros(1),
+        sweep_rate=np.zeros(1),
         error_estimate=history.error_estimate,
         last_mission=history.last_cycle / cycles,
         steps=np.array([history.last_cycle / cycles]),

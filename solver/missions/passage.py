@@ -37,7 +37,7 @@ from solver.wear.wearing_joint import WearingJoint
 
 
 @dataclass(frozen=True)
-class Spot:
+class SweptState:
     """The state at a frequency of a passage.
 
     frequency: Hz.
@@ -56,13 +56,13 @@ class Spot:
 class Swept:
     """The wear of one passage.
 
-    spots: in the order of their frequencies.
+    states: in the order of their frequencies.
     wear (n_contact,): m.
     error: estimated error by the number of frequencies, m3.
     iterations: Newton iterations.
     """
 
-    spots: tuple[Spot, ...]
+    states: tuple[SweptState, ...]
     wear: FloatArray
     error: float
     iterations: int
@@ -82,12 +82,12 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
             return not_flown(case, after, iterations)
         wear, iterations = 0.5 * (wear + after.wear), iterations + after.iterations
     order = 1 if passage.stop > passage.start else -1
-    spots = first.spots[::order]
+    states = first.states[::order]
     area, volume = case.mission.area, float(first.wear @ case.mission.area)
     by_states = sum(
-        _part(first.spots, place) @ area * spot.start.wear_rate_error for place, spot in enumerate(first.spots)
+        _part(first.states, place) @ area * state.start.wear_rate_error for place, state in enumerate(first.states)
     )
-    ends = [spots[0].response, *(spots[-1].response for _ in case.missions[1:])]
+    ends = [states[0].response, *(states[-1].response for _ in case.missions[1:])]
     found = BlockRun(
         missions=case.missions,
         growth=np.array(case.missions, np.float64)[:, None] * wear,
@@ -96,70 +96,72 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
         start_rate=first.wear / passage.cycles,
         start_error=float(by_states + first.error) / volume if volume > 0.0 else 0.0,
         inaccurate=max(
-            (max(spot.start.response_error, spot.start.wear_rate_error) for spot in spots if _inaccurate(spot)),
+            (max(state.start.response_error, state.start.wear_rate_error) for state in states if _inaccurate(state)),
             default=0.0,
         ),
         like=Like((), float("nan"), iterations),
-        last=spots[-1].start if case.mission.continued_by(case.place) else None,
+        last=states[-1].start if case.mission.continued_by(case.place) else None,
         iterations=iterations,
         begins_alike=True,
-        swiftness=swiftness(passage, first.spots),
+        sweep_rate=sweep_rate(passage, first.states),
     )
     return in_rows(found)
 
 
-def _inaccurate(spot: Spot) -> bool:
-    return spot.start.outcome is Outcome.INACCURATE
+def _inaccurate(state: SweptState) -> bool:
+    return state.start.outcome is Outcome.INACCURATE
 
 
-def _part(spots: tuple[Spot, ...], place: int) -> FloatArray:
+def _part(states: tuple[SweptState, ...], place: int) -> FloatArray:
     """Wear (n_contact,), m, that belongs to a frequency."""
-    low, high = spots[max(place - 1, 0)].frequency, spots[min(place + 1, len(spots) - 1)].frequency
-    return 0.5 * (high - low) * spots[place].density
+    low, high = states[max(place - 1, 0)].frequency, states[min(place + 1, len(states) - 1)].frequency
+    return 0.5 * (high - low) * states[place].density
 
 
 def _swept(case: BlockCase, passage: Passage, depth: FloatArray, aim: float) -> Swept | Failure:
     """The wear of one passage at depths (n_contact,), m; aim: error by the frequencies over the volume, over rtol."""
     low, high = sorted((passage.start, passage.stop))
     wanted = list(np.linspace(low, high, MISSIONS.first_frequencies))
-    spots: list[Spot] = []
+    states: list[SweptState] = []
     iterations, error, area = 0, np.inf, case.mission.area
     while wanted:
         found = _states(case, passage, depth, np.array(sorted(wanted)))
         if isinstance(found, Failure):
             return found
-        iterations += max((spot.start.newton_iterations for spot in found), default=0)
-        spots = sorted([*spots, *found], key=lambda spot: spot.frequency)
-        errors = interval_errors(spots, area)
-        volume = float(sum(_part(tuple(spots), place) @ area for place in range(len(spots))))
+        iterations += max((state.start.newton_iterations for state in found), default=0)
+        states = sorted([*states, *found], key=lambda state: state.frequency)
+        errors = interval_errors(states, area)
+        volume = float(sum(_part(tuple(states), place) @ area for place in range(len(states))))
         allowed, error = aim * case.settings.rtol * volume, float(errors.sum())
-        if error <= allowed or len(spots) >= MISSIONS.most_frequencies:
+        if error <= allowed or len(states) >= MISSIONS.most_frequencies:
             break
         wanted = []
         for place in np.flatnonzero(errors > allowed / len(errors)):
-            wanted.extend(_between(spots[place], spots[place + 1]))
-    wear = np.sum([_part(tuple(spots), place) for place in range(len(spots))], axis=0)
-    return Swept(tuple(spots), wear, error, iterations)
+            wanted.extend(_between(states[place], states[place + 1]))
+    wear = np.sum([_part(tuple(states), place) for place in range(len(states))], axis=0)
+    return Swept(tuple(states), wear, error, iterations)
 
 
-def _between(one: Spot, other: Spot) -> list[float]:
+def _between(one: SweptState, other: SweptState) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle."""
     low, high = one.frequency, other.frequency
     near = MISSIONS.beside_jump * low
-    folds = {spot.start.fold_frequency for spot in (one, other) if low + near < spot.start.fold_frequency < high - near}
+    folds = {
+        state.start.fold_frequency for state in (one, other) if low + near < state.start.fold_frequency < high - near
+    }
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
     return [0.5 * (low + high)] if high - low > 2.0 * near else []
 
 
-def interval_errors(spots: list[Spot], area: FloatArray) -> FloatArray:
+def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
     """Estimated errors (n - 1,) of the trapezoidal rule between neighbouring frequencies, m3, pair by pair.
 
     h^3 / 12 times the larger second derivative of the integrand at both ends, from three neighbours on one branch. An
     interval with a jump, or without a third state on its branch, may be wrong by half of the difference of its ends.
     """
-    at, density = np.array([spot.frequency for spot in spots]), np.array([spot.density for spot in spots])
-    branch = np.array([spot.start.branch for spot in spots])
+    at, density = np.array([state.frequency for state in states]), np.array([state.density for state in states])
+    branch = np.array([state.start.branch for state in states])
     width, rise = np.diff(at), np.diff(density, axis=0)
     slope = rise / width[:, None]
     # divided differences of three states (n - 2, n_contact), NaN across a jump
@@ -171,7 +173,9 @@ def interval_errors(spots: list[Spot], area: FloatArray) -> FloatArray:
     return np.asarray(errors @ area)
 
 
-def _states(case: BlockCase, passage: Passage, depth: FloatArray, frequencies: FloatArray) -> list[Spot] | Failure:
+def _states(
+    case: BlockCase, passage: Passage, depth: FloatArray, frequencies: FloatArray
+) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
     began, block = computing_time(), case.block
     model, sweep = worn(block.model, depth), passage.sweep
@@ -193,20 +197,20 @@ def _states(case: BlockCase, passage: Passage, depth: FloatArray, frequencies: F
         density = work.rate(at) * frequency / abs(passage.rate)
         joint = work.at(begun)
         response = joint.structure.response_h(joint.to_relative(at.displacement_h))
-        found.append(Spot(frequency, start, density, response[:, 1] - 1j * response[:, 2]))
+        found.append(SweptState(frequency, start, density, response[:, 1] - 1j * response[:, 2]))
     return found
 
 
-def swiftness(passage: Passage, spots: tuple[Spot, ...]) -> float:
+def sweep_rate(passage: Passage, states: tuple[SweptState, ...]) -> float:
     """|df/dt| / (zeta f)^2 at the largest response, with the half-power width 2 zeta f; 0 where no peak is passed."""
-    at = np.array([spot.frequency for spot in spots])
-    size = np.array([np.abs(spot.response).max() for spot in spots])
+    at = np.array([state.frequency for state in states])
+    size = np.array([np.abs(state.response).max() for state in states])
     top = int(np.argmax(size))
-    if top in (0, len(spots) - 1):
+    if top in (0, len(states) - 1):
         return 0.0
     sides = []
     for way in (-1, 1):
-        places = np.arange(top, len(spots)) if way > 0 else np.arange(top, -1, -1)
+        places = np.arange(top, len(states)) if way > 0 else np.arange(top, -1, -1)
         below = np.flatnonzero(size[places] < size[top] / np.sqrt(2.0))
         if below.size:
             one, other = places[below[0] - 1], places[below[0]]

@@ -12,25 +12,25 @@ from solver.outcome import Outcome
 class MissionHistory:
     """A joint over its missions, at `n_output` numbers of flown missions. Values not reached are NaN.
 
-    missions (n_output,): numbers of flown missions.
-    worn_volume (n_output,): m3.
-    worn_volume_error (n_output,): estimated relative error by the steps over missions, the integration of each block
-        and their propagation, harmonics, samples and start states; 0 where nothing has worn.
-    wear_depth, wear_depth_error (n_output, n_contact): m.
-    block_volume (n_output, n_block): m3, worn volume by block; their sum is `worn_volume`.
-    response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
-        block, in the mission that ends at the number, at 0 in the first one.
-    reference_volume (n_output,): m3, worn volume of the reference solution.
-    swiftness (n_block,): |df/dt| / (zeta f)^2 of each passage, with its half-power width 2 zeta f; 0 where none is
-        passed and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
-    error_estimate: `worn_volume_error` at the last number that was reached.
-    last_mission: number of missions up to which the history was computed.
-    steps (n_step,): missions flown in each step.
-    missions_to_target: number of missions at which the target was reached, NaN if never or without a target.
-    missions_to_target_error: its estimated error, missions; NaN if it was never reached.
-    newton_iterations: of history and reference solution.
-    run_time: CPU seconds of the computing thread.
-    outcome, message: how the computation ended, and additions.
+    - missions (n_output,): numbers of flown missions.
+    - worn_volume (n_output,): m3.
+    - worn_volume_error (n_output,): estimated relative error by the steps over missions, the integration of each block
+      and their propagation, harmonics, samples and start states; 0 where nothing has worn.
+    - wear_depth, wear_depth_error (n_output, n_contact): m.
+    - block_volume (n_output, n_block): m3, worn volume by block; their sum is `worn_volume`.
+    - response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
+      block, in the mission that ends at the number, at 0 in the first one.
+    - reference_volume (n_output,): m3, worn volume of the reference solution.
+    - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, with its half-power width 2 zeta f; 0 where none is
+      passed and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
+    - error_estimate: `worn_volume_error` at the last number that was reached.
+    - last_mission: number of missions up to which the history was computed.
+    - steps (n_step,): missions flown in each step.
+    - missions_to_target: number of missions at which the target was reached, NaN if never or without a target.
+    - missions_to_target_error: its estimated error, missions; NaN if it was never reached.
+    - newton_iterations: of history and reference solution.
+    - run_time: CPU seconds of the computing thread.
+    - outcome, message: how the computation ended, and additions.
     """
 
     outcome: Outcome
@@ -43,7 +43,7 @@ class MissionHistory:
     response_begin: ComplexArray
     response_end: ComplexArray
     reference_volume: FloatArray
-    swiftness: FloatArray
+    sweep_rate: FloatArray
     error_estimate: float
     last_mission: float
     steps: FloatArray

@@ -208,16 +208,16 @@ def _longer(course: MissionCourse, step: Step) -> MissionCourse:
     """The course with another step."""
     before, n_block = course.nodes[-1], len(course.inaccurate)
     nodes = (*course.nodes[:-1], replace(before, carried=None), step.node)
-    inaccurate, swiftness = course.inaccurate.copy(), course.swiftness.copy()
+    inaccurate, sweep_rate = course.inaccurate.copy(), course.sweep_rate.copy()
     for place, run in enumerate(step.runs):
         # runs of one block lie n_block apart
         inaccurate[place % n_block] = max(inaccurate[place % n_block], run.inaccurate)
-        swiftness[place % n_block] = max(swiftness[place % n_block], run.swiftness)
+        sweep_rate[place % n_block] = max(sweep_rate[place % n_block], run.sweep_rate)
     found = replace(
         course,
         nodes=nodes,
         inaccurate=inaccurate,
-        swiftness=swiftness,
+        sweep_rate=sweep_rate,
         held=_first(course.held, before.mission, any(run.held for run in step.runs)),
         cut_off=_first(course.cut_off, before.mission, any(run.cut_off for run in step.runs)),
         iterations=course.iterations + sum(run.iterations for run in step.runs),

@@ -18,7 +18,7 @@ from solver.missions.blocks import Begin, Mission
 from solver.missions.course import MissionNode, growth_within
 from solver.missions.history import integrate_missions
 from solver.missions.options import MISSIONS
-from solver.missions.passage import Spot, _states, interval_errors, swiftness
+from solver.missions.passage import SweptState, _states, interval_errors, sweep_rate
 from solver.missions.step import Step, missions_read, take_step
 from solver.model import FloatArray, ReducedModel
 from solver.packing import Packed
@@ -316,29 +316,29 @@ def test_depths_of_a_table_count_from_the_unworn_joint() -> None:
 # --- passages ---
 
 
-def spot(frequency: float, density: float, branch: int = 0, response: float = 0.0) -> Spot:
+def state(frequency: float, density: float, branch: int = 0, response: float = 0.0) -> SweptState:
     nan = float("nan")
     start = StartState(Outcome.CONVERGED, None, nan, Resolution((1,), 4), 0.0, 0.0, 0, 0.0, branch, 1.5)
-    return Spot(frequency, start, np.array([density]), np.array([response + 0j]))
+    return SweptState(frequency, start, np.array([density]), np.array([response + 0j]))
 
 
 def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump() -> None:
     """A parabola a m/Hz up to the jump at 1.5 Hz, a constant behind it."""
-    before = [spot(at, at**2) for at in (0.0, 0.5, 1.0, 1.5 - 1e-6)]
-    behind = [spot(at, 5.0, 1) for at in (1.5 + 1e-6, 2.0, 3.0)]
+    before = [state(at, at**2) for at in (0.0, 0.5, 1.0, 1.5 - 1e-6)]
+    behind = [state(at, 5.0, 1) for at in (1.5 + 1e-6, 2.0, 3.0)]
     errors = interval_errors(before + behind, np.array([2.0]))
     np.testing.assert_allclose(errors[:3], 2.0 * 0.5**3 / 6.0, rtol=1e-4)
     assert 0.0 < errors[3] < 1e-5
     np.testing.assert_allclose(errors[4:], 0.0, atol=1e-12)
 
 
-def test_the_swiftness_is_that_of_the_half_power_width() -> None:
+def test_the_sweep_rate_is_that_of_the_half_power_width() -> None:
     """A linear oscillator of 100 Hz and damping ratio 0.01, and no peak at the edge of the range."""
     at = np.linspace(90.0, 110.0, 401)
     peak = 1.0 / np.abs(1.0 - (at / 100.0) ** 2 + 0.02j * at / 100.0)
-    spots = tuple(spot(*of) for of in zip(at, at, np.zeros(401, int), peak, strict=True))
-    assert swiftness(Passage(90.0, 110.0, 0.5), spots) == pytest.approx(0.5 / (0.01 * 100.0) ** 2, rel=0.05)
-    assert swiftness(Passage(90.0, 110.0, 0.5), spots[:150]) == 0.0
+    states = tuple(state(*of) for of in zip(at, at, np.zeros(401, int), peak, strict=True))
+    assert sweep_rate(Passage(90.0, 110.0, 0.5), states) == pytest.approx(0.5 / (0.01 * 100.0) ** 2, rel=0.05)
+    assert sweep_rate(Passage(90.0, 110.0, 0.5), states[:150]) == 0.0
 
 
 @pytest.mark.slow
@@ -356,7 +356,7 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies() -> None:
     assert history.worn_volume[-1] == pytest.approx(volume, abs=bar)
     assert bar < 0.02 * volume
     assert history.outcome is Outcome.CONVERGED
-    assert 0.0 < history.swiftness[0] < MISSIONS.largest_swiftness
+    assert 0.0 < history.sweep_rate[0] < MISSIONS.largest_sweep_rate
 
 
 # --- what users may get wrong ---
