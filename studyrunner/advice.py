@@ -46,7 +46,9 @@ def advise(outcome: str, used: Used) -> str:
     Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
     """
     if outcome == "resonance_lost":
-        return _try("another range in loading.between", *_other_sweeps(used))
+        # a ramp holds the frequency
+        other = "down" if used.sweep == "up" else "up"
+        return _try("another range in loading.between", *([] if other in used.sweeps else [f'sweep = "{other}"']))
     if outcome in ("start_failed", "branch_lost", "unstable"):
         # more harmonics make no state stable
         finer = () if outcome == "unstable" else _given(used)

@@ -46,7 +46,9 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     whole = bool(reached.all())
     # one that was not reached to its end has ended as the integrated history has
     shared = place > 0 and whole and (not endless or history.outcome.complete)
-    outcome, message = history.outcome, history.message if place == 0 or history.outcome is Outcome.EXCEPTION else ""
+    # of the integrated history, and of all without a start state
+    own_message = place == 0 or not known.size or history.outcome is Outcome.EXCEPTION
+    outcome, message = history.outcome, history.message if own_message else ""
     if shared:
         outcome, message = judge(history, known, task.settings.rtol, slower)
     last = 0.0 if task.to_the_end is not None else task.cycles[-1]

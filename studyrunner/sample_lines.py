@@ -17,6 +17,10 @@ def describe_samples(path: Path) -> list[str]:
     with xr.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
         if "worn_volume" not in dataset:
             return []
-        lines = sentences(worn_volume_statistics(dataset))
+        statistics = worn_volume_statistics(dataset)
+        if "excitation_frequency" in dataset:
+            # the coordinate is the middle of the range of a frequency that is followed
+            statistics = statistics.squeeze("frequency", drop=True)
+        lines = sentences(statistics)
     more = [f"and {len(lines) - _MOST_LINES} more points"] if len(lines) > _MOST_LINES else []
     return lines[:_MOST_LINES] + more
