@@ -3,7 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.resonance
 
 For each tenth of 1e5 cycles: frequency and amplitude of the history with their errors, and those of a sweep up of the
-joint as it is worn at this count. The sweep has a loading history of its own, which the worn joint did not have.
+joint as it is worn at this count. The sweep has a friction history of its own, which the worn joint did not have: after
+1e4 cycles both differ by 0.01 Hz and 1 %, later by more than any error (at a given frequency a worn joint of a history
+and a sweep of the same depths differ by as much).
 Then the CPU time of a followed step over that of a step at a fixed frequency, from the same start, in one process.
 """
 
