@@ -135,7 +135,7 @@ def march_wear(
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
-    _, start = next(follow_branch(model, friction, load, np.array([at]), sweep, settings, follow=follow))
+    _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     stepping: Scheme = "adaptive" if scheme == "final" else scheme
     asked = SlowTime(per_pressure, stepping, read_at, length, law=law, until=until, follow=follow)

@@ -113,12 +113,11 @@ def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartR
         task.joint.friction_coefficient,
         task.excitation_amplitude,
         # no state depends on those that are known
-        np.array([task.frequencies[position] for position in wanted]),
+        task.follow or np.array([task.frequencies[position] for position in wanted]),
         cast("Literal['up', 'down', 'ramp']", task.sweep),
         task.settings,
         keep=keep,
         resume=task.resume,
-        follow=task.follow,
     )
     n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
     for place, start in branch:

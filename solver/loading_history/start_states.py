@@ -28,12 +28,11 @@ def follow_branch(
     model: ReducedModel,
     friction_coefficient: float | FloatArray | None,
     excitation_amplitude: float,
-    frequencies: FloatArray,
+    frequencies: FloatArray | FollowedFrequency,
     sweep: Sweep,
     settings: SolverSettings,
     keep: Callable[[Packed | str], None] | None = None,
     resume: Packed | None = None,
-    follow: FollowedFrequency | None = None,
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies: index and state, one by one.
 
@@ -51,9 +50,9 @@ def follow_branch(
     excitation_amplitude
         N.
     frequencies
-        Hz, ascending.
+        Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
     sweep
-        Loading history: "up" or "down" along the frequency, or "ramp" of the excitation at a fixed frequency.
+        Loading history: "up" or "down" along the frequency, or "ramp" of the excitation at a given frequency.
     settings
         Harmonics, samples, tolerances, limit of time.
     keep
@@ -62,16 +61,14 @@ def follow_branch(
     resume
         Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
         frequencies not yet passed. The states are equal to the last bit, except `run_time`.
-    follow
-        What is sought in place of given frequencies: the first resonance that the sweep meets. `frequencies` has then
-        one entry, which is not used; the sweep is "up" or "down".
 
     Yields
     ------
     tuple of int and StartState
         Index of the frequency, in the order of the sweep, and the state or the reason why there is none.
     """
-    order = np.arange(frequencies.size)[:: -1 if sweep == "down" else 1]
+    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
+    order = np.arange(n_states)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
     line.budget.tell = keep or line.budget.tell
     if resume is not None:
@@ -87,8 +84,10 @@ def follow_branch(
         line.set_deadline(started + settings.time_limit)
         message = ""
         try:
-            at = float(frequencies[index])
-            found = line.advance(at) if follow is None else advance_to_resonance(line, follow)
+            if isinstance(frequencies, FollowedFrequency):
+                found = advance_to_resonance(line, frequencies)
+            else:
+                found = line.advance(float(frequencies[index]))
         except OutOfTimeError:
             found = Found(Outcome.TIME_LIMIT)
             line.abandon()

@@ -118,7 +118,7 @@ def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
 def slider_start(word: Followed) -> StartState:
     """Start state of the slider."""
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN)
-    ((_, start),) = follow_branch(model, 0.5, 10.0, np.array([math.nan]), "up", SolverSettings(), follow=follow)
+    ((_, start),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings())
     return start
 
 
@@ -156,13 +156,12 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeyp
 def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
     given: list[Packed | str] = []
-    nowhere = np.array([math.nan])
-    ((_, whole),) = follow_branch(model, 0.5, 10.0, nowhere, "up", SolverSettings(), given.append, follow=follow)
+    ((_, whole),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), given.append)
     kept = [progress for progress in given if not isinstance(progress, str)]
     assert whole.state is not None
     assert len(kept) > 2
     for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
-        ((_, again),) = follow_branch(model, 0.5, 10.0, nowhere, "up", SolverSettings(), resume=progress, follow=follow)
+        ((_, again),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), resume=progress)
         assert again.state is not None
         assert again.state.omega == whole.state.omega
         np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)

@@ -17,7 +17,7 @@ SMALL = [
     *("slow_time.cycles=8000", "slow_time.outputs=5", "solver.harmonics=3", "solver.samples=64"),
     "outputs.loops=[0, 3]",
 ]
-RUN = ("wear_maps", "explicit_and_implicit")  # `python -m tests.benchmarks.notebooks` runs all of them
+RUN = ("wear_maps",)  # `python -m tests.benchmarks.notebooks` runs all of them
 READ_A_RESULT = ("read_a_result", "frf_before_and_after", "wear_maps")  # the others run a study of their own
 FIGURES = {
     "read_a_result": 2,
