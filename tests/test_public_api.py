@@ -55,6 +55,7 @@ def test_every_name_is_there_and_is_said() -> None:
             package.nothing  # noqa: B018
 
 
+@pytest.mark.slow
 def test_importing_loads_no_more_than_is_needed() -> None:
     """The commands say how many threads there are to be before numpy is loaded; what takes long to load, each rank of
     each run would load."""
@@ -268,6 +269,7 @@ def test_the_response_is_that_of_den_hartog() -> None:
     assert curve.branch.tolist() == [0, 0]
 
 
+@pytest.mark.slow
 def test_the_response_without_friction_is_linear() -> None:
     mass, damping, stiffness = np.diag([0.1, 0.2]), np.diag([2.0, 3.0]), np.array([[3e5, -1e5], [-1e5, 2e5]])
     model = build_model(

@@ -129,6 +129,7 @@ def test_wear_with_den_hartog_has_its_closed_solution() -> None:
     assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)
 
 
+@pytest.mark.slow
 def test_no_periodic_motion_is_said() -> None:
     # At resonance without damping, friction below pi/4 of the force cannot bound the motion.
     with pytest.raises(NoPeriodicMotionError):

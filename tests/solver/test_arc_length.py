@@ -61,6 +61,7 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
     assert min(visited) < 0.02
 
 
+@pytest.mark.slow
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
     balance_at, first, _ = wall(0.5)
     budget = Budget()

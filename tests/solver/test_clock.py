@@ -63,6 +63,7 @@ def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
     assert says < 0.5 * (compiled + fresh)
 
 
+@pytest.mark.slow
 def test_what_is_compiled_is_noticed_and_what_is_there_is_not() -> None:
     code = """
 from numba import njit

@@ -89,6 +89,7 @@ def worn_off(work: WearingJoint, state: WearState) -> WornOff:
     return wear_off(work, state, state.depth, np.zeros(state.depth.size, bool), 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["cylinder", "slider", *SLOW])
 def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -> None:
     direct, march = found(case), marched(case)

@@ -53,6 +53,7 @@ def exact_response(frequency: float, depth: float) -> complex:
     return complex(slider_orbit(0.1, DAMPING, 1.6e5, 10.0, friction, 2.0 * np.pi * frequency).harmonic(0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_phase_resonance_is_that_of_the_exact_motion(scheme: Scheme) -> None:
     history = worn(scheme=scheme)
@@ -108,6 +109,7 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
     assert history.excitation_frequency[0] < 199.5
 
 
+@pytest.mark.slow
 def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
     fast = worn(wear=10.0 * WEAR)
     np.testing.assert_allclose(fast.excitation_frequency, worn().excitation_frequency, rtol=1e-9)
@@ -122,6 +124,7 @@ def slider_start(word: Followed) -> StartState:
     return start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
 def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR_OPTIONS, iterations_per_save=8))
@@ -153,6 +156,7 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeyp
         assert again.newton_iterations == whole.newton_iterations
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
     given: list[Packed | str] = []

@@ -150,6 +150,7 @@ def exactly_known(missions: Any, cycles: float = 1.0, order: int = 1, **more: An
     return integrate_missions(Mission(blocks[::order], 1.0, missions, SETTINGS, **more))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cycles", "limit"), [(0.1, 60), (0.3, 100), (3.0, 1000)])
 def test_two_thousand_missions_agree_with_missions_one_by_one(
     exact_blocks: list[int], cycles: float, limit: float

@@ -28,6 +28,7 @@ def test_without_slip_the_curve_is_that_of_a_linear_oscillator() -> None:
     np.testing.assert_allclose(curve.response[near], full.response[0], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_with_slip_the_curve_is_near_the_full_response() -> None:
     """A mass on a rigid slider: both sides of the resonance, where friction damps more than the damper."""
     model = slider(damping=2.0)

@@ -62,6 +62,7 @@ def foot_modes() -> Backbone:
     return backbone(foot(), FOOT_AMPLITUDES, 0.5)
 
 
+@pytest.mark.slow
 def test_a_mass_on_a_rigid_slider_has_the_closed_form() -> None:
     found = slider_modes()
     assert set(found.outcome) == {Outcome.CONVERGED}
@@ -129,6 +130,7 @@ def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it() -> None
     np.testing.assert_allclose(found.response[:, 0], found.shape[:, 2], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs() -> None:
     """Without damping the mode is the free motion: a spring of 1 N/m, and from the gap on one of 100 N/m beside it."""
     gap, stiff = 0.1, 101.0
@@ -180,6 +182,7 @@ def energies(problem: ModeProblem, state: ModeState) -> tuple[float, float]:
     return fed, taken
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["foot", "slider", "travelling wave"])
 def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint: str) -> None:
     if joint == "foot":

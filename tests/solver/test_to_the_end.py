@@ -97,6 +97,7 @@ def test_a_constant_load_wears_without_end_at_the_rate_of_its_path() -> None:
     assert np.isfinite(found.worn_volume).all()
 
 
+@pytest.mark.slow
 def test_gross_slip_of_a_pressed_body_has_no_end() -> None:
     # shallow enough to be worn flat: every strip bears, and all wear alike
     model = build_scene("cylinder_on_flat", strips=8, P=18.5e3, stroke=25e-6, half_width=0.15e-3)

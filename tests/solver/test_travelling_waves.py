@@ -75,6 +75,7 @@ def test_what_wears_does_so_at_the_resonance(nodal_diameter: int) -> None:
     assert volumes[2] < 1e-6 * volumes[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nodal_diameter", [3, 20])
 def test_the_structure_settles_to_the_state_that_the_balance_has(nodal_diameter: int) -> None:
     """Steps in time know nothing of the balance of a travelling wave but its matrices: from rest they lead to a state

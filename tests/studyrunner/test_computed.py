@@ -62,6 +62,7 @@ def test_a_scene_is_built_once(case: str, monkeypatch: pytest.MonkeyPatch) -> No
     assert type(again.contact.surface) is type(built.contact.surface)
 
 
+@pytest.mark.slow
 def test_natural_frequencies_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     study, kept = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['natural_frequency']"]), InMemory()
     model = build_study_scene(study, computed=kept)

@@ -129,6 +129,7 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(
         pass
 
 
+@pytest.mark.slow
 def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", WRITER], cwd=ROOT, capture_output=True, text=True, timeout=200.0, check=False

@@ -116,6 +116,7 @@ def test_what_is_no_result_is_not_replaced_at_all(
     assert list(Path().iterdir()) == [Path("out.nc")]
 
 
+@pytest.mark.slow
 def test_a_scene_replaces_scenes_only(capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):
         assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0

@@ -43,6 +43,7 @@ def computed(path: str, **more: object) -> xr.Dataset:
     return compute("sdof_slider", path, *words)
 
 
+@pytest.mark.slow
 def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixture[str]) -> None:
     found = computed("out.nc")
     said = capsys.readouterr()

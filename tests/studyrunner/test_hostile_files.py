@@ -123,6 +123,7 @@ def put_scene_into_result() -> None:
             pytest.skip("the library cannot copy it")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", IN_A_RESULT)
 def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
     change_scene(folder / "scene.h5", SCENES[case])
@@ -131,6 +132,7 @@ def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
     assert not line or "result: " in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
 def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
     check_result_file(folder / "result", "result")

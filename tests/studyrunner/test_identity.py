@@ -171,6 +171,7 @@ def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
         identity.solver_digest.cache_clear()
 
 
+@pytest.mark.slow
 def test_an_edit_anywhere_in_the_solver_makes_all_results_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

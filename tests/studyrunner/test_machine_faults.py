@@ -62,6 +62,7 @@ def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
     assert "a fault of the machine; the task is tried once more" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
 def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) -> None:
     assert main([*SMALL[:-1], "whole.nc"]) == 0
@@ -78,6 +79,7 @@ def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) 
         xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
 
 
+@pytest.mark.slow
 def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the solver itself, whose histories break off in their midst."""
     from solver.wear.wearing_joint import WearingJoint

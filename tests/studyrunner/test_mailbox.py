@@ -40,6 +40,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 def test_a_wait_that_signals_interrupt_past_its_deadline_ends() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", BUSY], cwd=ROOT, capture_output=True, text=True, timeout=200, check=False

@@ -19,6 +19,8 @@ from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 
+pytestmark = pytest.mark.slow
+
 # a mass on a rigid slider has its mode while it slides: above 1e-5 m sqrt(kg)
 SLIDER = """
 [study]
@@ -165,7 +167,6 @@ def test_equal_ratios_end_where_they_are_told_to() -> None:
             read_study("sdof_slider", {"axes.wear_coefficient": wrong})
 
 
-@pytest.mark.slow
 def test_the_report_draws_frequency_and_damping(result: xr.Dataset, study_file: Path, tmp_path: Path) -> None:
     with open_for_report(study_file.with_name("out.nc")).dataset as dataset:
         assert dataset.sizes == result.sizes

@@ -84,6 +84,7 @@ def message(*overrides):
     return text
 
 
+@pytest.mark.slow
 @needs_meshio
 def test_gmsh(folder):
     (folder / "lap.msh").write_text(Plates().gmsh())

@@ -93,6 +93,7 @@ def rough_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "s.toml"
 
 
+@pytest.mark.slow
 def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file: str) -> None:
     study = read_study(rough_file)
     assert study.friction_coefficient is None

@@ -51,6 +51,7 @@ def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
     assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
 
 
+@pytest.mark.slow
 def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
     command = f"{sys.executable} -m studyrunner.cli two_masses --plan"
     status, _, said = shell(f"{command} >/dev/full", tmp_path)

@@ -149,6 +149,7 @@ def as_foreign_model(parameters):
     return replace(model, layers=None), replace(joint, pairs=None, cut=cut)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nodal_diameter", [0, 3])
 def test_bundled_dovetail_as_a_foreign_model(nodal_diameter):
     parameters = Parameters(mesh=1, nodal_diameter=nodal_diameter)

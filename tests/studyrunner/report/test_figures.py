@@ -121,6 +121,7 @@ def _check_panels(drawing: Drawing) -> None:
             assert label.endswith(")") or label in WITHOUT_UNITS, label
 
 
+@pytest.mark.slow
 def test_a_complete_file_gives_every_figure_of_the_paper_in_its_order() -> None:
     items = list(draw_report(_complete()))
     assert _names(items, Drawing) == ALL_DRAWINGS
@@ -181,6 +182,7 @@ def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
         assert dataset["worn_volume"].variable._in_memory
 
 
+@pytest.mark.slow
 def test_an_exact_answer_is_drawn_beside_the_computed_one() -> None:
     result = make_result()
     exact = 1.02 * result.dataset["worn_volume"]

@@ -101,6 +101,7 @@ def test_only_the_most_worn_of_many_loops_are_shown() -> None:
     assert "pairs 0, 1, 2, 3, 4, 5, 6, 7, ..." in drawing.caption
 
 
+@pytest.mark.slow
 def test_a_pair_with_one_tangent_has_no_path() -> None:
     result = with_loops(make_result())
     only = result.dataset["loop_displacement"].where(result.dataset["component"] != "tangent_2")

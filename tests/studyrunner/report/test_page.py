@@ -158,6 +158,7 @@ def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path: Path, monkey
     assert base64.b64decode(content) == (tmp_path / "heavy.png").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, 625).tolist()}
     result = as_result(build_file(axes, cycles=np.arange(21.0)), tmp_path / "some.nc")
@@ -166,6 +167,7 @@ def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
     assert "most worn of 2500 points" in read(tmp_path / "index.html").text
 
 
+@pytest.mark.slow
 def test_too_many_points_leave_a_page_without_scripts(tmp_path: Path) -> None:
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, MOST_POINTS).tolist()}
     dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))

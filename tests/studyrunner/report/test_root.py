@@ -134,6 +134,7 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -
     assert len(surface.faces) == 16
 
 
+@pytest.mark.slow
 def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None:
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     assert surface is not None

@@ -69,6 +69,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Datas
         assert (np.bincount(surface + 1)[1:] == 2 * 3).all()
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_series_beside_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], dataset: xr.Dataset
 ) -> None:
