@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studyrunner.cli import main
 from studyrunner.plan.planning import build_tasks
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
-from tests.studyrunner.test_scene_axes import compute
+from tests.studyrunner.test_scene_axes import arguments, compute
 
 SLIDER = {
     "axes.frequency": "resonance",
@@ -57,6 +58,22 @@ def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixt
     assert (found.excitation_frequency_error > 0.0).all()
     first, last = float(followed[0, 0]), float(followed[0, -1])
     assert f"the resonance moves from {first:.6g} to {last:.6g} Hz" in said.out + said.err
+
+
+@pytest.mark.slow
+def test_every_point_without_a_resonance_says_why(capsys: pytest.CaptureFixture[str]) -> None:
+    # so little excitation that the slider sticks: its resonance is far above the range
+    given = {**SLIDER, "axes.excitation_amplitude": 1.0, "slow_time.cycles": 10.0}
+    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
+    scatter = ("scatter.samples=2", "scatter.excitation_amplitude={uniform={half_width=0.1}}")
+    assert main(arguments("sdof_slider", "none.nc", *words, *scatter)) == 3
+    said = capsys.readouterr().out
+    with xr.open_dataset("none.nc") as found:
+        messages = {str(message) for message in found.message.values.ravel()}
+    assert messages == {"the sweep up meets no resonance between 180 and 230 Hz: give another range"}
+    assert 'sweep = "down"' in said
+    assert "ramp" not in said
+    assert "205 Hz" not in said
 
 
 def test_the_report_draws_the_frequency_over_cycles() -> None:
